@@ -1,0 +1,164 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.dynamic_model.model import (
+    CORNERING_FRONT,
+    CORNERING_REAR,
+    FRONT,
+    GAIN_FORWARD,
+    INERTIA,
+    MASS,
+    REAR,
+    RESISTANCE,
+    Motion,
+    Vehicle,
+    pedal_position,
+    step,
+    wheel_angle,
+)
+
+SECOND = 1_000_000
+
+
+def drive(vehicle: Vehicle, seconds: float, period: int = 10_000, start: int = 0) -> Motion:
+    for now in range(start, start + int(seconds * SECOND) + 1, period):
+        vehicle.update(now)
+    return vehicle.motion
+
+
+@pytest.mark.parametrize(
+    ("pedal", "speed"), [(0.14, 0.91), (1.0, 0.91), (-0.9, -1.125), (-5.0, -1.125), (0.0, 0.0)]
+)
+def test_steady_speed(pedal: float, speed: float) -> None:
+    vehicle = Vehicle(freq=100)
+    vehicle.press(pedal)
+    assert drive(vehicle, 10).vx == pytest.approx(speed, abs=1e-9)
+
+
+def test_speed_follows_the_first_order_response() -> None:
+    vehicle = Vehicle(freq=1000)
+    vehicle.press(0.1)
+    for millisecond in range(0, 2001):
+        vehicle.update(millisecond * 1000)
+        exact = GAIN_FORWARD * 0.1 / RESISTANCE * (1 - math.exp(-RESISTANCE / MASS * millisecond / 1000))
+        assert vehicle.motion.vx == pytest.approx(exact, abs=1e-3)
+
+
+def test_euler_steps_are_the_ones_of_the_difference_equation() -> None:
+    vehicle = Vehicle(freq=100)
+    vehicle.press(0.1)
+    drive(vehicle, 0.5)
+    ratio = 1 - 0.01 * RESISTANCE / MASS
+    assert vehicle.motion.vx == pytest.approx(GAIN_FORWARD * 0.1 / RESISTANCE * (1 - ratio**50), rel=1e-12)
+
+
+def test_one_step_by_hand() -> None:
+    wheel, dt = 0.2, 0.01
+    before = Motion(vx=0.5, vy=0.02, yaw_rate=0.3)
+    front = wheel - (0.02 + 0.12 * 0.3) / 0.5
+    rear = (0.104 * 0.3 - 0.02) / 0.5
+    after = step(before, wheel, 0.1, dt)
+    assert after.vx == pytest.approx(0.5 + dt * (2.6 - 2.0) / 1.113)
+    assert after.vy == pytest.approx(0.02 + dt * ((15 * front + 15 * rear) / 1.113 - 0.5 * 0.3))
+    assert after.yaw_rate == pytest.approx(0.3 + dt * (0.12 * 15 * front - 0.104 * 15 * rear) / 0.01)
+
+
+def test_slip_in_reverse_divides_by_the_amount_of_the_speed() -> None:
+    before = Motion(vx=-0.5, vy=0.02, yaw_rate=0.3)
+    after = step(before, 0.2, 0.0, 0.01)
+    front, rear = 0.2 - (0.02 + 0.036) / 0.5, (0.0312 - 0.02) / 0.5
+    assert after.vy == pytest.approx(0.02 + 0.01 * (15 * (front + rear) / 1.113 + 0.5 * 0.3))
+
+
+@pytest.mark.parametrize("vx", [0.0, 0.1, -0.1, 0.05])
+def test_tyres_carry_nothing_sideways_at_low_speed(vx: float) -> None:
+    after = step(Motion(vx, 0.3, 2.0), 0.6, 0.0, 0.01)
+    assert (after.vy, after.yaw_rate) == (0.0, 0.0)
+
+
+def test_steady_turn_agrees_with_the_linear_single_track_model() -> None:
+    vehicle = Vehicle(freq=100)
+    vehicle.press(0.1)
+    vehicle.steer(0.1)
+    motion = drive(vehicle, 5)
+    base = FRONT + REAR
+    balance = REAR * CORNERING_REAR - FRONT * CORNERING_FRONT
+    gradient = MASS * balance / (base * CORNERING_FRONT * CORNERING_REAR)
+    assert motion.yaw_rate == pytest.approx(
+        motion.vx * wheel_angle(0.1) / (base + gradient * motion.vx**2), rel=1e-9
+    )
+    assert INERTIA > 0 and motion.yaw_rate > 0
+
+
+def test_left_is_positive_and_right_its_mirror() -> None:
+    left, right = Vehicle(100), Vehicle(100)
+    for vehicle, sign in ((left, 1), (right, -1)):
+        vehicle.press(0.1)
+        vehicle.steer(sign * 0.15)
+    a, b = drive(left, 2), drive(right, 2)
+    assert a.yaw_rate > 0.5
+    assert (b.vx, b.vy, b.yaw_rate) == (a.vx, -a.vy, -a.yaw_rate)
+
+
+def test_requests_are_scaled_and_limited() -> None:
+    assert wheel_angle(0.290888) == pytest.approx(0.6)
+    assert wheel_angle(0.1) == pytest.approx(0.2062649, abs=1e-7)
+    assert (wheel_angle(2), wheel_angle(-2)) == (0.6, -0.6)
+    assert (pedal_position(0.05), pedal_position(0.5), pedal_position(-1)) == (0.05, 0.14, -0.9)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_requests_that_are_no_numbers_change_nothing(value: float) -> None:
+    vehicle, same = Vehicle(100), Vehicle(100)
+    for each in (vehicle, same):
+        assert each.press(0.1) and each.steer(0.1)
+    assert not vehicle.press(value) and not vehicle.steer(value)
+    assert vehicle.rejected == 2
+    assert drive(vehicle, 1) == drive(same, 1)
+
+
+def test_the_first_update_advances_nothing() -> None:
+    vehicle = Vehicle(100)
+    vehicle.press(0.14)
+    assert vehicle.update(5 * SECOND) == Motion()
+    assert vehicle.update(5 * SECOND + 10_000).vx == pytest.approx(0.01 * GAIN_FORWARD * 0.14 / MASS)
+
+
+def test_time_does_not_run_backwards() -> None:
+    vehicle = Vehicle(100)
+    vehicle.update(10)
+    with pytest.raises(ValueError, match="backwards by 3 us"):
+        vehicle.update(7)
+
+
+def test_a_long_pause_is_taken_in_steps_of_the_period() -> None:
+    once, often = Vehicle(100), Vehicle(100)
+    for vehicle in (once, often):
+        vehicle.press(0.1)
+        vehicle.steer(0.2)
+        vehicle.update(0)
+    once.update(3 * SECOND)
+    assert once.motion == drive(often, 3)
+
+
+@given(st.integers(1, 2_000_000), st.sampled_from([7.5, 10, 30, 60, 100, 300, 1000]))
+def test_steps_are_never_longer_than_the_period_and_lose_no_time(elapsed: int, freq: float) -> None:
+    vehicle = Vehicle(freq)
+    vehicle.press(0.1)
+    vehicle.update(0)
+    vehicle.update(elapsed)
+    steps = math.ceil(elapsed / math.ceil(SECOND / freq))
+    limit = GAIN_FORWARD * 0.1 / RESISTANCE
+    ratio = 1 - elapsed / SECOND / steps * RESISTANCE / MASS
+    assert vehicle.motion.vx == pytest.approx(limit * (1 - ratio**steps), rel=1e-4)
+
+
+def test_steps_too_long_for_the_tyres_are_an_error_and_not_a_state() -> None:
+    vehicle = Vehicle(10)
+    vehicle.press(0.05)
+    vehicle.steer(0.1)
+    with pytest.raises(ArithmeticError, match="higher freq"):
+        drive(vehicle, 600, period=100_000)
