@@ -1,0 +1,118 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.integrator.model import Integrator, Pose, Twist
+from services.integrator.rotation import quaternion
+
+SECOND = 1_000_000
+CIRCLE = Twist((0.8, 0.1, 0.0), (0.0, 0.0, 1.3))
+
+
+def start(x: float = 0, y: float = 0, yaw: float = 0) -> Pose:
+    return Pose((x, y, 0.0), quaternion(0, 0, yaw))
+
+
+def on_the_circle(begin: Pose, yaw: float, time: float) -> tuple[float, float, float]:
+    """Exact pose after `time` seconds of CIRCLE: the body turns about a centre that it holds to its left."""
+    (vx, vy, _), rate = CIRCLE.velocity, CIRCLE.rates[2]
+    angle = yaw + rate * time
+    x = (
+        begin.position[0]
+        + (vx * (math.sin(angle) - math.sin(yaw)) + vy * (math.cos(angle) - math.cos(yaw))) / rate
+    )
+    y = (
+        begin.position[1]
+        + (vx * (math.cos(yaw) - math.cos(angle)) + vy * (math.sin(angle) - math.sin(yaw))) / rate
+    )
+    return x, y, angle
+
+
+def heading(pose: Pose) -> float:
+    return 2 * math.atan2(pose.attitude[2], pose.attitude[3])
+
+
+@pytest.mark.parametrize("period", [1_000, 10_000, 100_000, 700_000])
+def test_a_circle_is_exact_whatever_the_step(period: int) -> None:
+    body = Integrator(start(1, 2, 0.7))
+    body.update(0)
+    body.feed(CIRCLE, 0)
+    for now in range(period, 7 * SECOND + 1, period):
+        pose = body.update(now)
+    x, y, angle = on_the_circle(start(1, 2), 0.7, 7.0)
+    assert pose.position == pytest.approx((x, y, 0.0), abs=1e-9)
+    assert math.remainder(heading(pose) - angle, math.tau) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_plane_motion_stays_in_the_plane_exactly() -> None:
+    body = Integrator(Pose((0.0, 0.0, 0.25), quaternion(0, 0, 1)))
+    body.update(0)
+    body.feed(CIRCLE, 0)
+    for now in range(0, SECOND, 10_000):
+        pose = body.update(now)
+        assert (pose.position[2], pose.attitude[0], pose.attitude[1]) == (0.25, 0.0, 0.0)
+
+
+def test_forward_goes_where_the_body_looks() -> None:
+    body = Integrator(start(yaw=math.pi / 2))
+    body.update(0)
+    body.feed(Twist((2.0, 0.0, 0.0)), 0)
+    assert body.update(SECOND).position == pytest.approx((0, 2, 0))
+
+
+def test_a_climb_follows_the_pitch_rate() -> None:
+    body = Integrator(start())
+    body.update(0)
+    body.feed(Twist((1.0, 0.0, 0.0), (0.0, -math.pi / 2, 0.0)), 0)
+    radius = 2 / math.pi
+    assert body.update(SECOND).position == pytest.approx((radius, 0, radius))
+
+
+def test_the_first_update_advances_nothing_and_time_does_not_run_backwards() -> None:
+    body = Integrator(start(3, 4))
+    body.feed(CIRCLE, 0)
+    assert body.update(9 * SECOND).position == (3, 4, 0)
+    with pytest.raises(ValueError, match="backwards by 1000000 us"):
+        body.update(8 * SECOND)
+
+
+def test_a_twist_holds_from_its_own_time_on() -> None:
+    body = Integrator(start())
+    body.update(0)
+    body.feed(Twist((1.0, 0.0, 0.0)), 250_000)
+    body.feed(Twist((3.0, 0.0, 0.0)), 750_000)
+    assert body.update(SECOND).position == pytest.approx((0.5 + 0.75, 0, 0))
+
+
+def test_a_late_twist_holds_from_the_last_update() -> None:
+    body = Integrator(start())
+    body.update(SECOND)
+    body.feed(Twist((1.0, 0.0, 0.0)), 10)
+    assert body.update(2 * SECOND).position == pytest.approx((1, 0, 0))
+
+
+def test_a_twist_of_another_clock_holds_from_the_last_update() -> None:
+    body = Integrator(start())
+    body.update(0)
+    body.feed(Twist((1.0, 0.0, 0.0)), 10**15)
+    assert body.update(SECOND).position == pytest.approx((1, 0, 0))
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 100), st.floats(-2, 2), st.floats(-5, 5)), max_size=12),
+    st.lists(st.integers(1, 100), max_size=12),
+)
+def test_when_updates_fall_makes_no_difference(
+    twists: list[tuple[int, float, float]], updates: list[int]
+) -> None:
+    once, often = Integrator(start()), Integrator(start())
+    once.update(0)
+    often.update(0)
+    for body in (once, often):
+        for time, vx, rate in twists:
+            body.feed(Twist((vx, 0.0, 0.0), (0.0, 0.0, rate)), time * 10_000)
+    for now in sorted(updates):
+        often.update(now * 10_000)
+    assert often.update(SECOND).position == pytest.approx(once.update(SECOND).position, abs=1e-9)
