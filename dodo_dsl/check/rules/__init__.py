@@ -1,0 +1,1 @@
+"""One rule a module; each yields diagnostics under the names that its docstring explains."""

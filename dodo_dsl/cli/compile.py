@@ -1,0 +1,82 @@
+"""dodo compile: check tests and write their compose files and child pipeline."""
+
+import argparse
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.compiler import Checked, NoApplication, plan
+from dodo_dsl.diagnostics import FORMATS, Diagnostic, has_errors, ordered
+from dodo_dsl.emit.write import differences, write
+
+EXAMPLES = """examples:
+  dodo compile                             all tests of the deployment, into generated/
+  dodo compile tests/my-test -o out        one folder of tests
+  dodo compile --check                     problems of all tests; nothing is written
+  dodo compile --check --format gitlab     the same as a code quality report
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("path", nargs="*", metavar="PATH", help="specs, folders or names (default: all)")
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
+    parser.add_argument("--check", action="store_true", help="write nothing; show problems, and what is stale in DIR")
+    parser.add_argument("--format", choices=sorted(FORMATS), default="text", help="of the diagnostics")
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    try:
+        checked = selection.select(options.path, (), options.application)
+    except selection.NoSuchTest as error:
+        stderr.write(f"dodo compile: {error}\n")
+        return Exit.USAGE
+    if options.check:
+        return _check(checked, options, stdout)
+    return _write(checked, options, stdout, stderr)
+
+
+def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
+    if diagnostics or style != "text":
+        stdout.write(FORMATS[style](diagnostics))
+
+
+def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int:
+    diagnostics, stale = list(checked.diagnostics), ""
+    if checked.ok and checked.application is not None and checked.specs:
+        compiled, problems = plan(checked, options.output)
+        diagnostics = ordered([*diagnostics, *problems])
+        if options.output.is_dir() and not has_errors(diagnostics):
+            stale = differences(compiled, options.output)
+    _show(diagnostics, options.format, stdout)
+    if has_errors(diagnostics):
+        return Exit.USAGE
+    if options.format == "text":
+        stdout.write(stale)
+        state = f"{options.output} is stale" if stale else "no problems"
+        stdout.write(f"{_count(len(checked.specs))} checked: {state}\n")
+    return Exit.PROBLEMS if stale else Exit.OK
+
+
+def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if not checked.ok:
+        _show(list(checked.diagnostics), options.format, stdout)
+        return Exit.USAGE
+    try:
+        compiled, problems = plan(checked, options.output)
+    except NoApplication:
+        stderr.write("dodo compile: no application; name its compose file with --application or in dodo.yml\n")
+        return Exit.USAGE
+    diagnostics = ordered([*checked.diagnostics, *problems])
+    _show(diagnostics, options.format, stdout)
+    if has_errors(diagnostics):
+        return Exit.USAGE
+    write(compiled, options.output)
+    if options.format == "text":
+        stdout.write(f"{_count(len(compiled.suite.plans))} compiled into {options.output}\n")
+    return Exit.OK
+
+
+def _count(number: int) -> str:
+    return f"{number} test{'' if number == 1 else 's'}"

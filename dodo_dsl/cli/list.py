@@ -1,0 +1,62 @@
+"""dodo list: what tests and services there are."""
+
+import argparse
+import json
+from typing import TextIO
+
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.compiler import Checked, load
+from dodo_dsl.diagnostics import format_text, shown_path
+
+EXAMPLES = """examples:
+  dodo list                 the tests of the deployment
+  dodo list --services      the services that a test may use
+  dodo list --json          for programs
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--services", action="store_true", help="services instead of tests")
+    parser.add_argument("--json", action="store_true", help="as JSON")
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    checked = load([])
+    rows = _services(checked) if options.services else _tests(checked)
+    if options.json:
+        stdout.write(json.dumps(rows, indent=2) + "\n")
+    else:
+        columns = ("name", "layers", "description") if options.services else ("name", "level", "kind", "description")
+        _table(rows, columns, stdout)
+    if checked.ok:
+        return Exit.OK
+    stderr.write(format_text(checked.diagnostics))
+    return Exit.USAGE
+
+
+def _tests(checked: Checked) -> list[dict[str, str]]:
+    return [
+        {
+            "name": spec.name or spec.location.stem,
+            "level": spec.level or "?",
+            "kind": spec.kind or "?",
+            "description": spec.description or "",
+            "file": shown_path(str(spec.path)),
+        }
+        for spec in checked.specs
+    ]
+
+
+def _services(checked: Checked) -> list[dict[str, str]]:
+    return [
+        {"name": m.name, "layers": ", ".join(m.layers), "description": m.description}
+        for m in sorted(checked.manifests.values(), key=lambda m: m.name)
+    ]
+
+
+def _table(rows: list[dict[str, str]], columns: tuple[str, ...], stdout: TextIO) -> None:
+    """Columns padded to their widest cell; the last is left as it is, so that it can be piped on."""
+    widths = [max((len(row[c]) for row in rows), default=0) for c in columns[:-1]]
+    for row in rows:
+        cells = [row[c].ljust(w) for c, w in zip(columns, widths, strict=False)]
+        stdout.write("  ".join([*cells, row[columns[-1]]]) + "\n")

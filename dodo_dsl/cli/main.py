@@ -1,0 +1,77 @@
+"""``dodo``: parses the command line, calls one command and decides the exit code of what escapes it."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+from typing import TextIO
+
+from dodo_dsl import __version__
+from dodo_dsl.cli import compile as compile_command
+from dodo_dsl.cli import list as list_command
+from dodo_dsl.cli import report as report_command
+from dodo_dsl.cli import run as run_command
+from dodo_dsl.cli.exits import Exit
+
+COMMANDS: dict[str, ModuleType] = {
+    "compile": compile_command,
+    "run": run_command,
+    "list": list_command,
+    "report": report_command,
+}
+
+_EXAMPLES = """examples:
+  dodo list                          what tests there are
+  dodo compile --check               every problem of every test, nothing written
+  dodo run sil-closed-straight       run one test and judge the application
+  dodo run --level sil -j 2          all simulations, two at a time
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    top = argparse.ArgumentParser(
+        prog="dodo",
+        description="Declarative integration tests for robots and vehicles made of microservices.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action="version", version=f"dodo {__version__}")
+    commands = top.add_subparsers(metavar="COMMAND", required=True)
+    for name, module in COMMANDS.items():
+        summary = (module.__doc__ or "").splitlines()[0].split(": ", 1)[1]
+        command = commands.add_parser(
+            name,
+            help=summary,
+            description=summary,
+            epilog=module.EXAMPLES,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add(command)
+        command.set_defaults(main=module.main)
+    return top
+
+
+def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
+    """Runs one command; argparse leaves through SystemExit, which is an exit code here."""
+    try:
+        options = parser().parse_args(argv)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    try:
+        return int(options.main(options, stdout, stderr))
+    except KeyboardInterrupt:
+        return Exit.INTERRUPTED
+    except BrokenPipeError:
+        # the reader of a pipe left (`dodo list | head`): nothing to say, and nothing more to flush
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return Exit.OK
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        stderr.write(f"dodo: {place}{error.strerror or error}\n")
+        return Exit.ERROR
+
+
+def run() -> None:
+    sys.exit(main(sys.argv[1:], sys.stdout, sys.stderr))

@@ -1,0 +1,76 @@
+"""Live progress of a run: a moving display on a terminal, plain lines elsewhere."""
+
+import time
+from collections.abc import Sequence
+from typing import Any, Self, TextIO
+
+from dodo_dsl.outcome import Outcome
+
+_STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
+
+
+def summary_line(outcome: Outcome, width: int) -> str:
+    """One line on an ended test."""
+    times = ""
+    if outcome.setup_s is not None and outcome.execution_s is not None:
+        times = f" (set-up {outcome.setup_s:.1f} s, ran {outcome.execution_s:.1f} s)"
+    return f"{outcome.outcome.upper():<6}  {outcome.name:<{width}}  {outcome.reason}{times}"
+
+
+class PlainProgress:
+    """A line for each phase, with the seconds since the run began."""
+
+    def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
+        self.stream = stream
+        self.width = max(map(len, slugs), default=0)
+        self.start = time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stream.flush()
+
+    def note(self, text: str) -> None:
+        self.stream.write(f"{text}\n")
+        self.stream.flush()
+
+    def phase(self, slug: str, text: str) -> None:
+        self.note(f"[{time.monotonic() - self.start:6.1f} s] {slug:<{self.width}}  {text}")
+
+    def done(self, outcome: Outcome) -> None:
+        self.phase(outcome.slug, outcome.outcome)
+
+
+class LiveProgress:
+    """A line a test that moves while it runs."""
+
+    def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
+        from rich.console import Console
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[state]}"))
+        self._progress: Any = Progress(*columns, TimeElapsedColumn(), console=Console(file=stream))
+        self._tasks = {s: self._progress.add_task(s, total=None, start=False, state="waiting") for s in slugs}
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def note(self, text: str) -> None:
+        self._progress.console.print(text, markup=False)
+
+    def phase(self, slug: str, text: str) -> None:
+        self._progress.start_task(self._tasks[slug])
+        self._progress.update(self._tasks[slug], state=text)
+
+    def done(self, outcome: Outcome) -> None:
+        style = _STYLES[outcome.outcome]
+        self._progress.update(self._tasks[outcome.slug], state=f"[{style}]{outcome.outcome}[/]", total=1, completed=1)
+
+
+def choose(stream: TextIO, slugs: Sequence[str]) -> PlainProgress | LiveProgress:
+    return LiveProgress(stream, slugs) if stream.isatty() else PlainProgress(stream, slugs)

@@ -1,0 +1,28 @@
+"""dodo report: draw the report of a finished run again."""
+
+import argparse
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.report import results
+from dodo_dsl.report.write import write_summaries
+
+EXAMPLES = """examples:
+  dodo report dodo-report       index.html, junit.xml and metrics.txt from its results.json
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="DIR", type=Path, nargs="?", default=Path("dodo-report"))
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    try:
+        outcomes = results.load(options.folder / results.FILE_NAME)
+    except results.ResultsError as error:
+        stderr.write(f"dodo report: {error}\n")
+        return Exit.USAGE
+    write_summaries(options.folder, outcomes)
+    stdout.write(f"report: {options.folder / 'index.html'}\n")
+    return Exit.OK

@@ -1,0 +1,174 @@
+"""dodo run: run tests and judge the application."""
+
+import argparse
+import asyncio
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl.cli import progress, selection
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.compiler import NoApplication, plan
+from dodo_dsl.diagnostics import format_text, has_errors, ordered
+from dodo_dsl.emit.write import PLAN_FILE, write
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan, PlanError, from_json
+from dodo_dsl.report.write import Tested, write_report
+from dodo_dsl.run import lanes
+from dodo_dsl.run.runner import Job, Runner, default_backend, default_parallel, reap_folders, work_folder
+from dodo_dsl.spec.deployment import Deployment
+
+EXAMPLES = """examples:
+  dodo run                                     all tests of the deployment
+  dodo run sil-closed-straight                 one test
+  dodo run 'sil-*' -j 4                        by pattern, four at a time
+  dodo run --application ../app/docker-compose.yml --level sil
+  dodo run --compiled generated/sil-closed-straight --report dodo-report
+
+exit codes: 0 all passed, 1 some failed, 2 usage or spec, 3 some ended in error, 130 interrupted
+"""
+
+
+class _Usage(Exception):
+    """A sentence for the user; the exit code is 2."""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
+    parser.add_argument("--level", action="append", choices=("sil", "dil", "hil"), default=[], help="may be repeated")
+    parser.add_argument("--backend", choices=("process", "docker"), help="default: process when the application can")
+    parser.add_argument("-j", "--jobs", type=_positive, metavar="N", help="tests at once (default: one a core)")
+    parser.add_argument("--clock", choices=("realtime", "lockstep"), help="instead of the specs'")
+    parser.add_argument("--isolation", choices=("network", "host"), help="instead of the specs'")
+    parser.add_argument("--report", type=Path, default=Path("dodo-report"), metavar="DIR", help="default: dodo-report")
+    parser.add_argument("--seed", type=int, metavar="N", help="instead of the specs'")
+    parser.add_argument("--repeat", type=_positive, default=1, metavar="N", help="run every test N times")
+    parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="a test that dodo compile wrote")
+    parser.add_argument("--keep", action="store_true", help="leave everything up and say how to look inside")
+    selection.add_application(parser)
+
+
+def _positive(text: str) -> int:
+    number = int(text) if text.isdecimal() else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number of 1 or more")
+    return number
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    reap_folders()
+    for left in lanes.reap():
+        stdout.write(f"removed what a killed run left: {left}\n")
+    with work_folder() as folder:
+        try:
+            jobs, deployment = _prepare(options, folder.path, stdout)
+            runner = _runner(options, jobs, deployment, stdout, folder.lease.descriptor)
+        except (_Usage, selection.NoSuchTest) as error:
+            stderr.write(f"dodo run: {error}\n")
+            return Exit.USAGE
+        outcomes = _run(runner, jobs, options.report, stdout)
+        if runner.kept:
+            stdout.write("\n".join(["", *runner.kept, ""]))
+            folder.kept = True
+    return _exit_code(outcomes, runner.interrupted)
+
+
+def _prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
+    """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
+    if options.compiled:
+        if options.test or options.level or options.application:
+            raise _Usage("--compiled runs a test as it was compiled: no TEST, --level or --application beside it")
+        plans, deployment, folders = (
+            [_load_plan(options.compiled)],
+            Deployment(Path.cwd()),
+            [options.compiled.resolve()],
+        )
+    else:
+        plans, deployment = _compile(options, folder, stdout)
+        folders = [folder / p.slug for p in plans]
+    if options.seed is not None:
+        plans = [replace(p, seed=options.seed) for p in plans]
+    report = options.report.resolve()
+    return [
+        Job(p, f, report / p.slug) for n in range(options.repeat) for p, f in _repetition(plans, folders, n)
+    ], deployment
+
+
+def _repetition(plans: Sequence[Plan], folders: Sequence[Path], number: int) -> list[tuple[Plan, Path]]:
+    """The n-th time around: from the second on, name and slug say so."""
+    if number == 0:
+        return list(zip(plans, folders, strict=True))
+    renamed = [replace(p, name=f"{p.name}[run={number + 1}]", slug=f"{p.slug}--run-{number + 1}") for p in plans]
+    return list(zip(renamed, folders, strict=True))
+
+
+def _load_plan(folder: Path) -> Plan:
+    try:
+        return from_json((folder / PLAN_FILE).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise _Usage(f"there is no compiled test at '{folder}': {error.strerror}") from error
+    except (PlanError, UnicodeDecodeError) as error:
+        raise _Usage(f"{folder / PLAN_FILE}: {error}") from error
+
+
+def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Plan], Deployment]:
+    checked = selection.select(options.test, options.level, options.application)
+    if not checked.specs:
+        raise _Usage("there is no test to run")
+    problems = checked.diagnostics
+    if checked.ok:
+        try:
+            compiled, more = plan(checked, folder)
+        except NoApplication:
+            raise _Usage("no application; name its compose file with --application or in dodo.yml") from None
+        problems = tuple(ordered([*problems, *more]))
+    stdout.write(format_text(problems))
+    if has_errors(problems):
+        raise _Usage("the tests above cannot be compiled")
+    write(compiled, folder)
+    return list(compiled.suite.plans), checked.deployment
+
+
+def _runner(
+    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, descriptor: int
+) -> Runner:
+    plans = [job.plan for job in jobs]
+    backend = options.backend or default_backend(plans)
+    if backend == "docker":
+        raise _Usage("the docker backend is not part of this version; give application services 'x-dodo-process'")
+    without = sorted({s.name for p in plans for s in p.application.services if not s.process})
+    if without:
+        raise _Usage(f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs")
+    if "lockstep" in {options.clock, *(p.clock for p in plans)} and options.clock != "realtime":
+        stdout.write("note: lockstep is not part of this version; these tests run in real time\n")
+    parallel = min(options.jobs or default_parallel(), len(jobs))
+    stdout.write(f"{len(jobs)} test{'s' * (len(jobs) != 1)}, {parallel} at a time, process backend\n")
+    shown = progress.choose(stdout, [p.slug for p in plans])
+    return Runner(shown, deployment.cids, parallel, options.keep, options.isolation, (descriptor,))
+
+
+def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> list[Outcome]:
+    for job in jobs:
+        shutil.rmtree(job.report, ignore_errors=True)
+    with runner.progress:
+        outcomes = asyncio.run(runner.run(jobs))
+    write_report(report, outcomes, {job.plan.slug: Tested(job.plan, job.folder) for job in jobs})
+    stdout.write("\n")
+    width = max(len(o.name) for o in outcomes)
+    for outcome in outcomes:
+        stdout.write(progress.summary_line(outcome, width) + "\n")
+        if outcome.outcome != "passed":
+            stdout.writelines(f"        | {line}\n" for line in outcome.last_lines)
+    counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
+    stdout.write(f"\n{counts['passed']} passed, {counts['failed']} failed, {counts['error']} in error\n")
+    stdout.write(f"report: {report / 'index.html'}\n")
+    return outcomes
+
+
+def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:
+    if interrupted:
+        return Exit.INTERRUPTED
+    kinds = {o.outcome for o in outcomes}
+    return Exit.ERROR if "error" in kinds else Exit.PROBLEMS if "failed" in kinds else Exit.OK

@@ -1,0 +1,64 @@
+"""The compiler from end to end: from paths to checked specs, and on to Plans."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dodo_dsl.check import check
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, ordered
+from dodo_dsl.plan.application import ApplicationSource, read_application
+from dodo_dsl.plan.build import Compiled, build
+from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.manifest import Manifest, load_manifests
+from dodo_dsl.spec.model import Spec, load_spec
+from dodo_dsl.spec.registry import locate
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Specs with everything that was found wrong with them, sorted by place."""
+
+    deployment: Deployment
+    manifests: Mapping[str, Manifest]
+    specs: tuple[Spec, ...]
+    diagnostics: tuple[Diagnostic, ...]
+    application: ApplicationSource | None = None
+    empty: tuple[Path, ...] = field(default=())
+
+    @property
+    def ok(self) -> bool:
+        return not has_errors(self.diagnostics)
+
+
+class NoApplication(Exception):
+    """Plans need an application, and neither the command line nor a deployment names one."""
+
+
+def load(paths: Sequence[Path], application: Path | None = None, start: Path | None = None) -> Checked:
+    """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any."""
+    deployment, found = load_deployment(find_deployment(start or Path.cwd()))
+    manifests, manifest_problems = load_manifests()
+    locations, empty = locate(paths, deployment.registry)
+    loaded = [load_spec(location) for location in locations]
+    specs = tuple(spec for spec, _ in loaded)
+    found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
+    found.extend(check(specs, manifests))
+    file = application or deployment.application
+    source = None
+    if file is not None:
+        source, problems = read_application(file)
+        found.extend(problems)
+    return Checked(deployment, manifests, specs, tuple(ordered(found)), source, tuple(empty))
+
+
+def plan(checked: Checked, out: Path) -> tuple[Compiled, tuple[Diagnostic, ...]]:
+    """The Plans of specs without errors, for the output folder ``out``; raises NoApplication without one."""
+    if checked.application is None:
+        raise NoApplication
+    compiled, problems = build(checked.specs, checked.manifests, checked.deployment, checked.application, out.resolve())
+    return compiled, tuple(ordered(problems))
+
+
+def place_of_nothing(path: Path) -> Diagnostic:
+    """The diagnostic for a path that holds no spec."""
+    return Diagnostic(Span(str(path)), "missing-file", f"there is no test at '{path}'", "specs end in .dodo.yml")

@@ -1,0 +1,30 @@
+"""Where the package's data lies: schemas, templates, services and the shipped registry.
+
+An installed wheel carries them in ``dodo_dsl/_data``; in a checkout they lie beside the package.
+"""
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def root() -> Path:
+    """The folder that holds ``schemas``, ``templates``, ``services`` and ``tests_registry``."""
+    bundled = _PACKAGE / "_data"
+    return bundled if bundled.is_dir() else _PACKAGE.parent
+
+
+def schemas() -> Path:
+    return root() / "schemas"
+
+
+def templates() -> Path:
+    return root() / "templates"
+
+
+def services() -> Path:
+    return root() / "services"
+
+
+def registry() -> Path:
+    return root() / "tests_registry"

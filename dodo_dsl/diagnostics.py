@@ -1,0 +1,146 @@
+"""Problems as values: where, which rule, what is wrong and the way out."""
+
+import difflib
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+Severity = Literal["error", "warning"]
+
+_MAX_FRAME_LINE = 160
+
+
+@dataclass(frozen=True, order=True)
+class Span:
+    """A place in a file; line and column count from 1, ``length`` is what a code frame underlines."""
+
+    file: str
+    line: int = 1
+    column: int = 1
+    length: int = 1
+
+
+@dataclass(frozen=True, order=True)
+class Diagnostic:
+    """One problem; ``rule`` is its name in the rule catalogue."""
+
+    span: Span
+    rule: str
+    message: str
+    hint: str = ""
+    severity: Severity = "error"
+
+
+def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
+    return any(d.severity == "error" for d in diagnostics)
+
+
+def ordered(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Sorted by place, each once."""
+    return sorted(set(diagnostics))
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """A hint that names the nearest known words, or all of them when they are few; empty when there are none."""
+    choices = sorted(known)
+    close = difflib.get_close_matches(word.lower(), choices, n=2, cutoff=0.6)
+    if close:
+        return "did you mean " + " or ".join(f"'{c}'" for c in close) + "?"
+    if 0 < len(choices) <= 12:
+        return "known: " + ", ".join(choices)
+    return ""
+
+
+def shown_path(file: str) -> str:
+    """The path as a reader finds it: relative to the working folder where it lies below it."""
+    path = Path(file)
+    if not path.is_absolute():
+        return file
+    relative = os.path.relpath(path)
+    return file if relative.startswith("..") else relative
+
+
+def _source_line(span: Span) -> str | None:
+    try:
+        text = Path(span.file).read_bytes().decode("utf-8", "replace")
+    except OSError:
+        return None
+    lines = text.splitlines()
+    return lines[span.line - 1] if 0 < span.line <= len(lines) else None
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else ("→" if c == "\t" else "�") for c in text)
+
+
+def _code_frame(span: Span) -> list[str]:
+    line = _source_line(span)
+    if line is None:
+        return []
+    start = max(0, span.column - 1 - _MAX_FRAME_LINE // 2) if len(line) > _MAX_FRAME_LINE else 0
+    part = _printable(line[start : start + _MAX_FRAME_LINE])
+    offset = span.column - 1 - start
+    marks = "^" * max(1, min(span.length, len(part) - offset))
+    gutter = str(span.line)
+    return [f"  {gutter} | {part}", f"  {' ' * len(gutter)} | {' ' * offset}{marks}"]
+
+
+def _text(diagnostic: Diagnostic) -> str:
+    span = diagnostic.span
+    head = f"{shown_path(span.file)}:{span.line}:{span.column}: {diagnostic.severity}[{diagnostic.rule}]: "
+    lines = [head + _printable(diagnostic.message), *_code_frame(span)]
+    if diagnostic.hint:
+        lines.append(f"  hint: {_printable(diagnostic.hint)}")
+    return "\n".join(lines)
+
+
+def format_text(diagnostics: Sequence[Diagnostic]) -> str:
+    return "".join(_text(d) + "\n" for d in diagnostics)
+
+
+def format_json(diagnostics: Sequence[Diagnostic]) -> str:
+    rows = [
+        {
+            "file": shown_path(d.span.file),
+            "line": d.span.line,
+            "column": d.span.column,
+            "severity": d.severity,
+            "rule": d.rule,
+            "message": d.message,
+            "hint": d.hint,
+        }
+        for d in diagnostics
+    ]
+    return json.dumps(rows, indent=2) + "\n"
+
+
+def format_gitlab(diagnostics: Sequence[Diagnostic]) -> str:
+    """GitLab's code quality report; a fingerprint stays the same when lines move."""
+    rows = []
+    seen: dict[str, int] = {}
+    for d in diagnostics:
+        path = shown_path(d.span.file)
+        identity = f"{path}\0{d.rule}\0{d.message}"
+        seen[identity] = seen.get(identity, 0) + 1
+        fingerprint = hashlib.sha256(f"{identity}\0{seen[identity]}".encode()).hexdigest()
+        rows.append(
+            {
+                "description": d.message + (f" ({d.hint})" if d.hint else ""),
+                "check_name": d.rule,
+                "fingerprint": fingerprint,
+                "severity": "major" if d.severity == "error" else "minor",
+                "location": {"path": path, "lines": {"begin": d.span.line}},
+            }
+        )
+    return json.dumps(rows, indent=2) + "\n"
+
+
+FORMATS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {
+    "text": format_text,
+    "json": format_json,
+    "gitlab": format_gitlab,
+}

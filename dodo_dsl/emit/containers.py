@@ -1,0 +1,55 @@
+"""A planned service as a container sees it: command, volumes and what it waits for."""
+
+from dataclasses import dataclass
+
+from dodo_dsl.plan.model import Flag, Plan, Service
+
+FILES = "/dodo/files"
+REPORT = "/dodo/report"
+
+
+@dataclass(frozen=True)
+class Container:
+    """What the layer template needs of a service; ``after`` holds names with compose's condition."""
+
+    name: str
+    image: str
+    command: tuple[str, ...]
+    volumes: tuple[str, ...]
+    ready_file: str
+    after: tuple[tuple[str, str], ...]
+
+
+def containers(plan: Plan, layer: str) -> list[Container]:
+    """The containers of a layer, each waiting for the layers before it."""
+    earlier = {"environment": (), "action": ("environment",), "evaluation": ("environment", "action")}[layer]
+    after = [(s.name, "service_healthy") for name in earlier for s in plan.layer(name)]
+    if plan.isolation == "network":
+        after.insert(0, ("sandbox", "service_started"))
+    return [
+        Container(
+            service.name,
+            service.image,
+            tuple(_word(flag) for flag in service.flags),
+            _volumes(plan, service),
+            f"/tmp/dodo-ready-{service.name}",
+            tuple(after),
+        )
+        for service in plan.layer(layer)
+    ]
+
+
+def _word(flag: Flag) -> str:
+    """``--name=value`` with container paths, and with ``$`` doubled as compose wants it."""
+    folder = {"path": f"{FILES}/", "report": f"{REPORT}/"}.get(flag.kind, "")
+    return f"--{flag.name}={folder}{flag.value}".replace("$", "$$")
+
+
+def _volumes(plan: Plan, service: Service) -> tuple[str, ...]:
+    kinds = {flag.kind for flag in service.flags}
+    volumes = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
+    if "path" in kinds:
+        volumes.append(f"./files:{FILES}:ro")
+    if "report" in kinds:
+        volumes.append(f"./report:{REPORT}")
+    return tuple(volumes)

@@ -1,0 +1,129 @@
+"""Plans through the Jinja templates."""
+
+import functools
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import jinja2
+import yaml
+
+from dodo_dsl import data
+from dodo_dsl.emit.containers import containers
+from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
+
+CHILD = "child.gitlab-ci.yml"
+_STAGES = ("sil", "dil", "hil")
+_SPARE_MINUTES = 10
+
+
+@dataclass(frozen=True)
+class File:
+    """A generated file; ``path`` is relative to the output folder."""
+
+    path: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job of the child pipeline."""
+
+    name: str
+    stage: str
+    tag: str
+    gated: bool
+    minutes: int
+    interruptible: bool
+    script: str
+
+
+class _Dumper(yaml.SafeDumper):
+    """Block style, two spaces, lists indented, no aliases: what a reader of a compose file expects."""
+
+    def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:
+        super().increase_indent(flow, False)
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _yaml_block(value: Any) -> str:
+    return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000).rstrip("\n")
+
+
+def _yaml(value: Any) -> str:
+    """A scalar as JSON, which YAML reads as the same value whatever it holds."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+@functools.cache
+def _templates() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(data.templates()),
+        undefined=jinja2.StrictUndefined,
+        autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
+        keep_trailing_newline=True,
+    )
+    environment.filters.update(yaml=_yaml, yaml_block=_yaml_block)
+    return environment
+
+
+def _render(template: str, **values: object) -> str:
+    return _templates().get_template(template).render(**values)
+
+
+def render_plan(plan: Plan) -> list[File]:
+    """The compose layers, ``.env`` and ``test.json`` of one test."""
+    names = {layer: f"{layer}.compose.yml" for layer in LAYERS}
+    own_network = plan.isolation == "network"
+    files = [
+        File(
+            f"{plan.slug}/{names[layer]}",
+            _render(
+                "layer.compose.yml.j2",
+                plan=plan,
+                layer=layer,
+                services=containers(plan, layer),
+                own_network=own_network,
+                sandbox=own_network and layer == LAYERS[0],
+            ),
+        )
+        for layer in LAYERS
+        if layer != "application"
+    ]
+    files.append(File(f"{plan.slug}/{names['application']}", _render("application.compose.yml.j2", plan=plan)))
+    files.append(File(f"{plan.slug}/.env", _render("env.j2", plan=plan, files=list(names.values()))))
+    files.append(File(f"{plan.slug}/test.json", to_json(plan)))
+    return files
+
+
+def _jobs(suite: Suite, gated: bool, folder: str) -> list[Job]:
+    return [
+        Job(
+            name=plan.slug,
+            stage=plan.level,
+            tag=plan.tag,
+            gated=gated and plan.level == "hil",
+            minutes=math.ceil(plan.timeout_s / 60) + _SPARE_MINUTES,
+            interruptible=plan.level != "hil",
+            script=f"dodo run --compiled {folder}/{plan.slug} --report dodo-report",
+        )
+        for plan in suite.plans
+    ]
+
+
+def render_pipeline(suite: Suite, folder: str) -> File:
+    """The child pipeline; ``folder`` is the output folder's name, as the parent's artifact has it."""
+    levels = {plan.level for plan in suite.plans}
+    gated = suite.gates and "hil" in levels and bool(levels & {"sil", "dil"})
+    stages = [s for s in _STAGES if s in levels]
+    if gated:
+        stages.insert(stages.index("hil"), "gate")
+    return File(CHILD, _render("child.gitlab-ci.yml.j2", stages=stages, gate=gated, jobs=_jobs(suite, gated, folder)))
+
+
+def render(suite: Suite, folder: str) -> list[File]:
+    """Every generated file of a compilation, the pipeline first."""
+    return [render_pipeline(suite, folder), *(file for plan in suite.plans for file in render_plan(plan))]

@@ -1,0 +1,1 @@
+"""Everything decided: addresses, images, flags, files and the rewritten application of each test."""

@@ -1,0 +1,135 @@
+"""The Plan: frozen, made of plain values, and the same as JSON in ``test.json``."""
+
+import dataclasses
+import json
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+FORMAT = 1
+LAYERS = ("environment", "action", "evaluation", "application")
+
+FlagKind = Literal["text", "path", "memory", "report"]
+
+
+@dataclass(frozen=True)
+class Flag:
+    """``--name=value``; a path lies below ``files/``, a report below the report's folder, both relative."""
+
+    name: str
+    value: str
+    kind: FlagKind = "text"
+
+
+@dataclass(frozen=True)
+class Service:
+    """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts."""
+
+    layer: str
+    name: str
+    uses: str
+    image: str
+    process: tuple[str, ...]
+    flags: tuple[Flag, ...] = ()
+    judge: bool = False
+
+
+@dataclass(frozen=True)
+class ApplicationService:
+    """A service under test; ``process`` is what starts it without containers, None when only an image can."""
+
+    name: str
+    process: tuple[str, ...] | None = None
+    command: tuple[str, ...] = ()
+    environment: dict[str, str | None] = field(default_factory=dict)
+    takes_cid: bool = False
+    takes_memory: bool = False
+
+
+@dataclass(frozen=True)
+class Application:
+    """The application; ``folder`` is its compose file's folder, relative to the compiled test's."""
+
+    folder: str
+    services: tuple[ApplicationService, ...]
+    compose: dict[str, Any] = field(default_factory=dict)
+    changes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in a spec something was written; ``file`` is relative to the registry's root."""
+
+    file: str
+    line: int
+    column: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation."""
+
+    name: str
+    slug: str
+    spec: str
+    description: str
+    level: str
+    kind: str
+    timeout_s: float
+    clock: str
+    isolation: str
+    seed: int
+    cid: int
+    subnet: str
+    tag: str
+    sandbox_image: str
+    services: tuple[Service, ...]
+    application: Application
+    source_map: dict[str, Place] = field(default_factory=dict)
+
+    def layer(self, name: str) -> tuple[Service, ...]:
+        return tuple(s for s in self.services if s.layer == name)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """All instances of a compilation, in name order."""
+
+    plans: tuple[Plan, ...]
+    gates: bool = True
+
+
+class PlanError(ValueError):
+    """A ``test.json`` that this version cannot read."""
+
+
+def to_json(plan: Plan) -> str:
+    document = {"dodo": "plan", "version": FORMAT, **dataclasses.asdict(plan)}
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def from_json(text: str) -> Plan:
+    """The Plan that ``to_json`` wrote; raises PlanError for anything else."""
+    try:
+        raw = json.loads(text)
+        if raw.pop("dodo") != "plan" or raw.pop("version") != FORMAT:
+            raise PlanError(f"not a plan of version {FORMAT}; compile the test again")
+        raw["services"] = tuple(_service(s) for s in raw["services"])
+        application = raw["application"]
+        application["services"] = tuple(_application_service(s) for s in application["services"])
+        application["changes"] = tuple(application["changes"])
+        raw["application"] = Application(**application)
+        raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
+        return Plan(**raw)
+    except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
+        raise PlanError(f"not a compiled test ({error}); compile it again") from error
+
+
+def _service(raw: dict[str, Any]) -> Service:
+    return Service(**{**raw, "process": tuple(raw["process"]), "flags": tuple(Flag(**f) for f in raw["flags"])})
+
+
+def _application_service(raw: dict[str, Any]) -> ApplicationService:
+    process = raw["process"]
+    return ApplicationService(
+        **{**raw, "process": None if process is None else tuple(process), "command": tuple(raw["command"])}
+    )

@@ -1,0 +1,25 @@
+"""``index.html``: the run at a glance, in one file without scripts."""
+
+from collections.abc import Mapping, Sequence
+
+import jinja2
+
+from dodo_dsl import __version__, data
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.report.junit import check_line
+
+
+def render(outcomes: Sequence[Outcome], pictures: Mapping[str, str], logs: Mapping[str, Sequence[str]]) -> str:
+    """The page; ``pictures`` and ``logs`` are paths relative to it, by slug."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
+    )
+    counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
+    return environment.get_template("report.html.j2").render(
+        outcomes=outcomes,
+        pictures=pictures,
+        logs=logs,
+        counts=counts,
+        version=__version__,
+        check_line=check_line,
+    )

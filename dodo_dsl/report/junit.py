@@ -1,0 +1,52 @@
+"""``junit.xml`` as GitLab reads it: failed is a failure, error an error, the class name is the level."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.outcome import Outcome
+
+# what XML 1.0 cannot hold (section 2.2), whatever a service printed
+_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def write(path: Path, outcomes: Sequence[Outcome], attachments: dict[str, str]) -> None:
+    """Writes the file; ``attachments`` are paths of pictures by slug, relative to the working folder."""
+    from junitparser import JUnitXml, TestSuite
+
+    suite = TestSuite("dodo")
+    for outcome in outcomes:
+        suite.add_testcase(_case(outcome, attachments.get(outcome.slug)))
+    document = JUnitXml("dodo")
+    document.add_testsuite(suite)
+    document.update_statistics()  # type: ignore[no-untyped-call]
+    document.write(str(path), pretty=True)
+
+
+def _case(outcome: Outcome, attachment: str | None) -> Any:
+    from junitparser import Error, Failure, TestCase
+
+    case = TestCase(outcome.name, classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
+    case._elem.set("file", outcome.spec)
+    if outcome.outcome != "passed":
+        kind = Failure if outcome.outcome == "failed" else Error
+        result = kind(_xml_text(outcome.reason), outcome.outcome)
+        result.text = _xml_text("\n".join([outcome.reason, *outcome.last_lines]))
+        case.result = [result]
+    lines = [check_line(check) for check in outcome.checks]
+    if attachment:
+        lines.append(f"[[ATTACHMENT|{attachment}]]")
+    if lines:
+        case.system_out = _xml_text("\n".join(lines))
+    return case
+
+
+def _xml_text(text: str) -> str:
+    return _NOT_XML.sub("\ufffd", text)
+
+
+def check_line(check: dict[str, Any]) -> str:
+    limit = ", ".join(f"{k} {v:g}" for k, v in (check.get("limit") or {}).items())
+    value = "none" if check["value"] is None else f"{check['value']:g} {check.get('unit') or ''}".strip()
+    return f"{'ok  ' if check['ok'] else 'FAIL'} {check['name']}: {value}{f' ({limit})' if limit else ''}"

@@ -1,0 +1,28 @@
+"""``metrics.txt`` in OpenMetrics, which GitLab compares between branches."""
+
+from collections.abc import Sequence
+
+from dodo_dsl.outcome import Outcome
+
+
+def to_text(outcomes: Sequence[Outcome]) -> str:
+    """Duration of set-up and execution, outcome and every check's value, labelled with the test."""
+    from prometheus_client import CollectorRegistry, Gauge
+    from prometheus_client.openmetrics.exposition import generate_latest
+
+    registry = CollectorRegistry()
+    setup = Gauge("dodo_setup_seconds", "Time until all services were ready", ["test"], registry=registry)
+    execution = Gauge("dodo_execution_seconds", "Time from ready to the end", ["test"], registry=registry)
+    passed = Gauge("dodo_passed", "1 when the test passed", ["test"], registry=registry)
+    value = Gauge("dodo_check_value", "Value of an evaluator's check", ["test", "check", "unit"], registry=registry)
+    for outcome in outcomes:
+        passed.labels(outcome.slug).set(outcome.outcome == "passed")
+        if outcome.setup_s is not None:
+            setup.labels(outcome.slug).set(round(outcome.setup_s, 3))
+        if outcome.execution_s is not None:
+            execution.labels(outcome.slug).set(round(outcome.execution_s, 3))
+        for check in outcome.checks:
+            if check["value"] is not None:
+                value.labels(outcome.slug, check["name"], check.get("unit") or "").set(check["value"])
+    text: str = generate_latest(registry).decode()  # type: ignore[no-untyped-call]
+    return text

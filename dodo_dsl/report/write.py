@@ -1,0 +1,63 @@
+"""A run's report folder."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dodo_dsl.emit.write import replace_file, write_text
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.report import html, junit, metrics, results
+from dodo_dsl.report.drive import read_drive
+
+RECORDING = "test.rec"
+TRAJECTORY = "trajectory.png"
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A test's Plan and the folder that it was compiled into, for the map under its path."""
+
+    plan: Plan
+    folder: Path
+
+
+def write_report(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Tested]) -> None:
+    """Draws each drive and writes results.json, junit.xml, metrics.txt and index.html into ``folder``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for outcome in outcomes:
+        if outcome.slug in tests:
+            _draw(folder / outcome.slug, outcome, tests[outcome.slug])
+    write_summaries(folder, outcomes)
+
+
+def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
+    """The four files that stand for the whole run."""
+    pictures = {o.slug: f"{o.slug}/{TRAJECTORY}" for o in outcomes if (folder / o.slug / TRAJECTORY).is_file()}
+    attachments = {slug: f"{_shown(folder)}/{picture}" for slug, picture in pictures.items()}
+    write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    replace_file(folder / "junit.xml", lambda path: junit.write(path, outcomes, attachments))
+    write_text(folder / "metrics.txt", metrics.to_text(outcomes))
+    write_text(folder / "index.html", html.render(outcomes, pictures, _logs(folder, outcomes)))
+
+
+def _shown(folder: Path) -> str:
+    """The folder relative to the working folder, which GitLab's attachments are relative to."""
+    path = folder.resolve()
+    return path.relative_to(Path.cwd()).as_posix() if path.is_relative_to(Path.cwd()) else path.name
+
+
+def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
+    return {
+        o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / "logs").glob("*.log"))]
+        for o in outcomes
+    }
+
+
+def _draw(folder: Path, outcome: Outcome, test: Tested) -> None:
+    drive = read_drive(test.plan, test.folder, folder / RECORDING)
+    if drive is None:
+        return
+    from dodo_dsl.report.picture import draw
+
+    replace_file(folder / TRAJECTORY, lambda path: draw(drive, outcome, path))

@@ -1,0 +1,1 @@
+"""Running Plans: sandboxes, leases, layers in order, readiness, end, verdict, outcome and teardown."""

@@ -1,0 +1,194 @@
+"""One test from set-up to outcome, whatever backend it runs on."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.run.events import (
+    Backend,
+    BackendError,
+    Event,
+    Exited,
+    Lost,
+    Malformed,
+    Ready,
+    Unstartable,
+    Verdict,
+)
+from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended
+
+ORDER = ("environment", "action", "evaluation", "application")
+READY_PATIENCE_S = 60.0
+
+
+class _Ended(Exception):
+    """The test is over; what decided it stands in the facts."""
+
+
+@dataclass
+class Engine:
+    """Drives one backend through one Plan. ``say`` is told each phase, for live progress."""
+
+    plan: Plan
+    backend: Backend
+    say: Callable[[str], None]
+    facts: Facts = field(init=False)
+    layer_of: dict[str, str] = field(default_factory=dict)
+    exits: dict[str, int] = field(default_factory=dict)
+    ready: set[str] = field(default_factory=set)
+    began: float | None = None
+    finished: float | None = None
+    setup_s: float | None = None
+
+    def __post_init__(self) -> None:
+        self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
+
+    async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
+        """The outcome, and what to say of a test that is kept up. Cancelling gives the outcome error, too."""
+        kept: list[str] = []
+        start = time.monotonic()
+        try:
+            await self._set_up(start)
+            await self._execute()
+        except _Ended:
+            pass
+        except BackendError as error:
+            self._find("error", str(error))
+        except asyncio.CancelledError:
+            self._find("error", "the run was interrupted")
+            asyncio.current_task().uncancel()  # type: ignore[union-attr]
+        finally:
+            self.finished = time.monotonic()
+            self.say("taking down")
+            kept = await self.backend.close(keep)
+        return self._outcome(), kept
+
+    async def _set_up(self, start: float) -> None:
+        self.say("setting up")
+        await self.backend.open()
+        for layer in ORDER:
+            names = await self.backend.start(layer)
+            self.layer_of.update(dict.fromkeys(names, layer))
+            self.say(f"waiting for {layer}")
+            await self._until_ready(layer, names)
+        self.setup_s = time.monotonic() - start
+
+    async def _until_ready(self, layer: str, names: list[str]) -> None:
+        """Own services say that they are ready; those of the application are when they run."""
+        deadline = time.monotonic() + READY_PATIENCE_S
+        waits = set() if layer == "application" else set(names)
+        while waits - self.ready:
+            event = await self._next(deadline)
+            if event is None:
+                late = min(waits - self.ready)
+                self._end("error", f"service '{late}' was not ready within {READY_PATIENCE_S:g} s", late)
+            else:
+                self._take(event)
+
+    async def _next(self, deadline: float) -> Event | None:
+        try:
+            return await asyncio.wait_for(self.backend.next_event(), max(0.0, deadline - time.monotonic()))
+        except TimeoutError:
+            return None
+
+    async def _execute(self) -> None:
+        self.began = time.monotonic()
+        await self.backend.begin()
+        self.say("running")
+        deadline = self.began + self.plan.timeout_s
+        while not self._all_judged():
+            event = await self._next(deadline)
+            if event is None:
+                self._time_out()
+            else:
+                self._take(event)
+
+    def _all_judged(self) -> bool:
+        return all(judge in self.exits for judge in self.facts.judges)
+
+    def _time_out(self) -> None:
+        late = next(judge for judge in self.facts.judges if judge not in self.exits)
+        self._end(
+            "error",
+            f"evaluator '{late}' gave no verdict within the timeout of {self.plan.timeout_s:g} s",
+            late,
+        )
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Ready(service):
+                self.ready.add(service)
+            case Verdict(service):
+                self.facts.verdicts.setdefault(service, []).append(event)
+            case Malformed(service, problem):
+                self._end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
+            case Unstartable(service, why):
+                self._end("error", f"service '{service}' could not be started: {why}", service)
+            case Lost(why):
+                self._end("error", why)
+            case Exited(service, code):
+                self.exits[service] = code
+                self._take_exit(service, code)
+
+    def _take_exit(self, service: str, code: int) -> None:
+        layer, when = self.layer_of.get(service, "application"), self._when()
+        ended = f"{how_it_ended(code)} {when}"
+        if layer == "application":
+            if not self._all_given():
+                self._end("failed", f"application service '{service}' {ended}, before the test was decided", service)
+        elif code != 0:
+            self._end("error", f"service '{service}' of layer {layer} {ended}", service)
+        elif service not in self.ready and self.began is None:
+            self._end("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
+        elif service in self.facts.judges and not self.facts.verdicts.get(service):
+            self._end("error", f"evaluator '{service}' ended without a verdict {when}", service)
+
+    def _all_given(self) -> bool:
+        return all(self.facts.verdicts.get(judge) for judge in self.facts.judges)
+
+    def _when(self) -> str:
+        if self.began is None:
+            return "during set-up"
+        return f"after {time.monotonic() - self.began:.1f} s"
+
+    def _find(self, result: Any, reason: str, service: str = "") -> None:
+        self.facts.findings.append(Finding(result, reason, service))
+
+    def _end(self, result: Any, reason: str, service: str = "") -> None:
+        self._find(result, reason, service)
+        raise _Ended
+
+    def _outcome(self) -> Outcome:
+        plan, finding = self.plan, decide(self.facts)
+        checks = [
+            check for judge in self.facts.judges for v in self.facts.verdicts.get(judge, []) for check in v.checks
+        ]
+        return Outcome(
+            name=plan.name,
+            slug=plan.slug,
+            spec=plan.spec,
+            level=plan.level,
+            kind=plan.kind,
+            outcome=finding.result,
+            reason=finding.reason,
+            cid=self.backend.cid,
+            seed=plan.seed,
+            clock="realtime",
+            backend=self.backend.name,
+            setup_s=self.setup_s,
+            execution_s=self.finished - self.began if self.finished and self.began else None,
+            services=tuple(self._service_rows()),
+            checks=tuple(checks),
+            last_lines=tuple(self.backend.tail(finding.service)) if finding.result != "passed" else (),
+        )
+
+    def _service_rows(self) -> list[dict[str, Any]]:
+        uses = {s.name: s.uses for s in self.plan.services}
+        return [
+            {"name": name, "layer": layer, "uses": uses.get(name), "exit_code": self.exits.get(name)}
+            for name, layer in sorted(self.layer_of.items(), key=lambda item: (LAYERS.index(item[1]), item[0]))
+        ]

@@ -1,0 +1,82 @@
+"""What a backend tells the engine while a test runs."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+
+@dataclass(frozen=True)
+class Ready:
+    service: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A well-formed verdict line of an evaluator."""
+
+    service: str
+    passed: bool
+    reason: str
+    checks: tuple[dict[str, Any], ...]
+
+
+@dataclass(frozen=True)
+class Malformed:
+    """A line that means to be a verdict and is none."""
+
+    service: str
+    problem: str
+
+
+@dataclass(frozen=True)
+class Exited:
+    """A service has ended; ``code`` is negative for a signal, as subprocess has it."""
+
+    service: str
+    code: int
+
+
+@dataclass(frozen=True)
+class Unstartable:
+    service: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Lost:
+    """The backend itself is gone."""
+
+    why: str
+
+
+Event = Ready | Verdict | Malformed | Exited | Unstartable | Lost
+
+
+class Backend(Protocol):
+    """Where a test's services live. ``open`` raises BackendError, the rest reports through events."""
+
+    name: str
+    cid: int
+
+    async def open(self) -> None: ...
+
+    async def start(self, layer: str) -> list[str]:
+        """Starts the services of a layer and returns their names."""
+        ...
+
+    async def next_event(self) -> Event: ...
+
+    async def begin(self) -> None:
+        """Tells the test's bus that everything is ready."""
+        ...
+
+    async def close(self, keep: bool) -> list[str]:
+        """Ends everything and cleans up; with ``keep``, leaves it and returns sentences on how to look inside."""
+        ...
+
+    def tail(self, service: str) -> list[str]:
+        """The last lines that a service wrote."""
+        ...
+
+
+class BackendError(Exception):
+    """The test cannot be run here, in a sentence."""

@@ -1,0 +1,130 @@
+"""Leases: lock files that die with their holder, for CIDs, shared-memory prefixes and running alone.
+
+A lease is a ``flock`` on an open file, which every process that inherited the descriptor holds; beside it lies a
+record of what it covers, so that the next run can remove what a killed holder left.
+"""
+
+import asyncio
+import contextlib
+import errno
+import fcntl
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+FOLDER_VARIABLE = "DODO_LEASES"
+DEFAULT_PATIENCE_S = 600.0
+_RETRY_S = 0.2
+
+
+class LeaseTimeout(Exception):
+    """Waiting for a lease took too long; the text names the holder."""
+
+
+def folder() -> Path:
+    """The machine's lease folder, open to all users as ``/run/lock`` is."""
+    wanted = os.environ.get(FOLDER_VARIABLE)
+    path = Path(wanted) if wanted else Path("/run/lock/dodo")
+    if not wanted and not path.parent.is_dir():
+        path = Path("/tmp/dodo-leases")
+    if not path.is_dir():
+        path.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(PermissionError):
+            path.chmod(0o1777)
+    return path
+
+
+@dataclass(frozen=True)
+class Lease:
+    """A held lock; ``descriptor`` is handed to whoever shall hold it too."""
+
+    name: str
+    descriptor: int
+    record: Path
+
+    def release(self) -> None:
+        """Gives up this process's hold, and the record with it when no other process holds on."""
+        with contextlib.suppress(FileNotFoundError):
+            self.record.unlink()
+        os.close(self.descriptor)
+
+    def leave(self) -> None:
+        """Gives up this process's hold and leaves record and lock to those who inherited it."""
+        os.close(self.descriptor)
+
+
+def _open(name: str) -> int:
+    descriptor = os.open(folder() / f"{name}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    with contextlib.suppress(PermissionError):
+        os.fchmod(descriptor, 0o666)
+    return descriptor
+
+
+def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease | None:
+    """The lease when it is free, else None. Shared leases exclude only exclusive ones."""
+    descriptor = _open(name)
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(descriptor)
+        if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+            return None
+        raise
+    record = folder() / (f"{name}.{os.getpid()}.json" if shared else f"{name}.json")
+    record.write_text(json.dumps({"pid": os.getpid(), **about}))
+    return Lease(name, descriptor, record)
+
+
+def holder(name: str) -> str:
+    """Who holds a lease, for a sentence."""
+    for record in sorted(folder().glob(f"{name}*.json")):
+        with contextlib.suppress(ProcessLookupError, FileNotFoundError, ValueError, KeyError):
+            about = json.loads(record.read_text())
+            os.kill(int(about["pid"]), 0)
+            return f"test {about.get('test', '?')} of process {about.get('pid', '?')}"
+    return "another process"
+
+
+async def lease_any(
+    names: Sequence[str],
+    about: dict[str, Any],
+    waiting: Callable[[str], None],
+    shared: bool = False,
+    patience_s: float = DEFAULT_PATIENCE_S,
+) -> Lease:
+    """The first of the leases that is free; waits for one, says once for whom, and raises LeaseTimeout at the limit."""
+    deadline = time.monotonic() + patience_s
+    told = False
+    while True:
+        for name in names:
+            if lease := try_lease(name, about, shared):
+                return lease
+        if time.monotonic() > deadline:
+            raise LeaseTimeout(f"no {_kind(names)} came free within {patience_s:g} s; {holder(names[0])} holds one")
+        if not told:
+            waiting(f"waiting for {holder(names[0])}")
+            told = True
+        await asyncio.sleep(_RETRY_S)
+
+
+def _kind(names: Sequence[str]) -> str:
+    return names[0].rpartition("-")[0] or names[0]
+
+
+def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
+    """Leases that nobody holds any more but whose record is still there; each is yielded held."""
+    for record in sorted(folder().glob(f"{prefix}*.json")):
+        name = record.name.removesuffix(".json")
+        with contextlib.suppress(OSError, ValueError):
+            about = json.loads(record.read_text())
+            descriptor = _open(name)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                os.close(descriptor)
+                continue
+            yield Lease(name, descriptor, record), about

@@ -1,0 +1,64 @@
+"""Lines that services print: JSON with the key ``dodo`` is meant for the runner, the rest is log."""
+
+import json
+import math
+from typing import Any
+
+from dodo_dsl.run.events import Event, Malformed, Ready, Verdict
+
+_OUTCOMES = ("passed", "failed")
+_CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
+
+
+def read_line(service: str, judge: bool, line: bytes) -> Event | None:
+    """The event that a line stands for, or None for a line of log; only judges give verdicts."""
+    text = line.strip()
+    if not text.startswith(b"{") or b'"dodo"' not in text:
+        return None
+    try:
+        message = json.loads(text)
+    except ValueError:
+        return Malformed(service, "its JSON cannot be read") if judge and b'"verdict"' in text else None
+    kind = message.get("dodo")
+    if kind == "ready":
+        return Ready(service)
+    if kind == "verdict" and judge:
+        problem = _problem(message)
+        if problem:
+            return Malformed(service, problem)
+        return Verdict(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
+    return None
+
+
+def _problem(message: dict[str, Any]) -> str:
+    if message.get("outcome") not in _OUTCOMES:
+        return f"its outcome is {json.dumps(message.get('outcome'))[:40]}, expected passed or failed"
+    if not isinstance(message.get("reason"), str):
+        return "it has no reason"
+    checks = message.get("checks")
+    if not isinstance(checks, list):
+        return "its checks are no list"
+    return next((p for p in map(_check_problem, checks) if p), "")
+
+
+def _check_problem(check: object) -> str:
+    if not isinstance(check, dict) or not isinstance(check.get("name"), str):
+        return "a check has no name"
+    name = check["name"]
+    surplus = set(check) - _CHECK_KEYS
+    if surplus:
+        return f"check '{name}' has an unknown key '{min(surplus)}'"
+    if not _is_number(check.get("value"), none=True):
+        return f"check '{name}' has a value that is no finite number"
+    limit = check.get("limit", {})
+    if not isinstance(limit, dict) or not all(k in ("min", "max") and _is_number(v) for k, v in limit.items()):
+        return f"check '{name}' has a limit that is not of min and max"
+    if not isinstance(check.get("ok"), bool):
+        return f"check '{name}' does not say whether it is ok"
+    return ""
+
+
+def _is_number(value: object, none: bool = False) -> bool:
+    if value is None:
+        return none
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

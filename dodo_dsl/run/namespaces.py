@@ -1,0 +1,107 @@
+"""An own network, IPC, process and ``/tmp`` for a test, by Linux namespaces; no other program is needed.
+
+Inside, ``lo`` is up and carries multicast, ``/tmp`` and ``/dev/shm`` are empty and private, and the folders that lay
+in ``/tmp`` stay visible, so that programs and specs kept there still run.
+"""
+
+import contextlib
+import ctypes
+import os
+import socket
+import struct
+from pathlib import Path
+
+_CLONE_NEWNS, _CLONE_NEWIPC, _CLONE_NEWUSER = 0x00020000, 0x08000000, 0x10000000
+_CLONE_NEWPID, _CLONE_NEWNET = 0x20000000, 0x40000000
+_MS_BIND, _MS_REC, _MS_PRIVATE, _MS_NOSUID, _MS_NODEV = 4096, 16384, 1 << 18, 2, 4
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_SIOCSIFFLAGS, _IFF_UP, _IFF_RUNNING = 0x8914, 1, 64
+_RTM_NEWROUTE, _NLM_F_REQUEST, _NLM_F_ACK, _NLM_F_CREATE = 24, 1, 4, 0x400
+_RTA_DST, _RTA_OIF, _RTA_PREFSRC = 1, 4, 7
+_TMP = Path("/tmp")
+_TMP_SIZE = "size=1g,mode=1777"
+
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+def _call(name: str, *arguments: object) -> None:
+    if getattr(_libc, name)(*arguments) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, f"{name}: {os.strerror(number)}")
+
+
+def die_with_parent(signal_number: int) -> None:
+    """This process gets a signal when its parent dies, however it dies."""
+    _call("prctl", _PR_SET_PDEATHSIG, signal_number, 0, 0, 0)
+
+
+def adopt_orphans() -> None:
+    """Processes whose parent dies become children of this one instead of init's."""
+    _call("prctl", _PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def unshare() -> None:
+    """Leaves the host's namespaces; the next fork is process 1 of its own. Raises OSError where the kernel refuses."""
+    flags = _CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID
+    user, group = os.getuid(), os.getgid()
+    if user == 0:
+        _call("unshare", flags)
+        return
+    _call("unshare", flags | _CLONE_NEWUSER)
+    Path("/proc/self/setgroups").write_text("deny")
+    Path("/proc/self/uid_map").write_text(f"{user} {user} 1")
+    Path("/proc/self/gid_map").write_text(f"{group} {group} 1")
+
+
+def furnish() -> None:
+    """Mounts and network of the new namespaces; to be called by their process 1."""
+    _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
+    with contextlib.suppress(OSError):  # containers may mask /proc; only tools like ps would miss it
+        _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
+    _private_tmp()
+    if Path("/dev/shm").is_dir():
+        _call("mount", b"tmpfs", b"/dev/shm", b"tmpfs", _MS_NOSUID | _MS_NODEV, _TMP_SIZE.encode())
+    _loopback_up()
+    _multicast_route()
+
+
+def _private_tmp() -> None:
+    """An empty ``/tmp`` with the old one's folders, but not its files: those may be another test's tokens."""
+    folders = {}
+    for entry in os.scandir(_TMP):
+        if entry.is_dir(follow_symlinks=False):
+            with contextlib.suppress(OSError):
+                folders[entry.name] = os.open(entry.path, os.O_PATH | os.O_DIRECTORY | os.O_NOFOLLOW)
+    _call("mount", b"tmpfs", bytes(_TMP), b"tmpfs", _MS_NOSUID | _MS_NODEV, _TMP_SIZE.encode())
+    for name, descriptor in folders.items():
+        target = _TMP / name
+        target.mkdir()
+        _call("mount", f"/proc/self/fd/{descriptor}".encode(), bytes(target), None, _MS_BIND | _MS_REC, None)
+        os.close(descriptor)
+
+
+def _loopback_up() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        import fcntl
+
+        request = struct.pack("16sh14x", b"lo", _IFF_UP | _IFF_RUNNING)
+        fcntl.ioctl(control, _SIOCSIFFLAGS, request)
+
+
+def _attribute(kind: int, value: bytes) -> bytes:
+    return struct.pack("HH", 4 + len(value), kind) + value
+
+
+def _multicast_route() -> None:
+    """224.0.0.0/4 through ``lo`` with source 127.0.0.1 (rtnetlink); without it a join has no device."""
+    loopback = struct.pack("i", socket.if_nametoindex("lo"))
+    body = struct.pack("BBBBBBBBI", socket.AF_INET, 4, 0, 0, 254, 3, 253, 1, 0)
+    body += _attribute(_RTA_DST, socket.inet_aton("224.0.0.0")) + _attribute(_RTA_OIF, loopback)
+    body += _attribute(_RTA_PREFSRC, socket.inet_aton("127.0.0.1"))
+    flags = _NLM_F_REQUEST | _NLM_F_ACK | _NLM_F_CREATE
+    message = struct.pack("IHHII", 16 + len(body), _RTM_NEWROUTE, flags, 1, 0) + body
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as netlink:
+        netlink.send(message)
+        error = struct.unpack_from("i", netlink.recv(4096), 16)[0]
+    if error:
+        raise OSError(-error, f"multicast route: {os.strerror(-error)}")

@@ -1,0 +1,71 @@
+"""A service's output: raw into its log, the last lines in memory, lines for the runner as events."""
+
+import asyncio
+import os
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+_MAX_LINE = 1 << 16
+_TAIL_LINES = 8
+_TAIL_WIDTH = 300
+
+
+class Output:
+    """The reading end of a pipe. ``writer`` is handed to the service; ``done`` is set at the end of its output."""
+
+    def __init__(self, log: Path, on_line: Callable[[bytes], None]) -> None:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        self._log = log.open("ab", buffering=0)
+        self._on_line = on_line
+        self._rest = b""
+        self._skipping = False
+        self._tail: deque[bytes] = deque(maxlen=_TAIL_LINES)
+        self._reader, self.writer = os.pipe2(os.O_CLOEXEC)
+        os.set_blocking(self._reader, False)
+        self.done = asyncio.Event()
+        asyncio.get_running_loop().add_reader(self._reader, self._read)
+
+    def release_writer(self) -> None:
+        """Closes this process's copy of the writing end, so that the service's end is the output's end."""
+        os.close(self.writer)
+
+    def tail(self) -> list[str]:
+        return [line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in self._tail]
+
+    def close(self) -> None:
+        if not self.done.is_set():
+            self._finish()
+
+    def _read(self) -> None:
+        try:
+            data = os.read(self._reader, 1 << 16)
+        except BlockingIOError:
+            return
+        if not data:
+            self._finish()
+            return
+        self._log.write(data)
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in lines:
+            self._take(line)
+        if len(self._rest) > _MAX_LINE:
+            if not self._skipping:
+                self._tail.append(self._rest[:_TAIL_WIDTH])
+            self._skipping, self._rest = True, b""
+
+    def _take(self, line: bytes) -> None:
+        if self._skipping:
+            self._skipping = False
+            return
+        if line.strip():
+            self._tail.append(line)
+            self._on_line(line)
+
+    def _finish(self) -> None:
+        asyncio.get_running_loop().remove_reader(self._reader)
+        os.close(self._reader)
+        if self._rest:
+            self._take(self._rest)
+        self._log.close()
+        self.done.set()

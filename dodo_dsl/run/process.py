@@ -1,0 +1,250 @@
+"""The process backend: services as local processes in a sandbox of their own."""
+
+import asyncio
+import contextlib
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import data
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.plan.argv import CID_VARIABLES, memory_name, with_cid, with_memory_prefix
+from dodo_dsl.plan.model import ApplicationService, Flag, Plan, Service
+from dodo_dsl.run import lines
+from dodo_dsl.run.environment import MissingVariable, base_environment, dotenv, interpolate
+from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Unstartable
+from dodo_dsl.run.output import Output
+
+_CLOSE_S = 10.0
+
+
+@dataclass(frozen=True)
+class Lane:
+    """What keeps tests apart: a CID, a name, a prefix of shared memory, and the descriptors of the leases."""
+
+    cid: int
+    name: str = ""
+    memory_prefix: str = ""
+    descriptors: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Command:
+    """A process to start."""
+
+    name: str
+    layer: str
+    argv: tuple[str, ...]
+    environment: Mapping[str, str]
+    folder: Path
+    judge: bool = False
+
+
+class ProcessBackend:
+    """One test in a sandbox; ``folder`` is the compiled test's, ``report`` takes logs and recordings."""
+
+    name = "process"
+
+    def __init__(self, plan: Plan, folder: Path, report: Path, isolation: str, lane: Lane) -> None:
+        self.plan = plan
+        self.folder = folder
+        self.report = report
+        self.isolation = isolation
+        self.lane = lane
+        self.cid = lane.cid
+        self._events: asyncio.Queue[Event] = asyncio.Queue()
+        self._outputs: dict[str, Output] = {}
+        self._process: subprocess.Popen[bytes] | None = None
+        self._channel: socket.socket | None = None
+        self._closing = False
+        self._up: asyncio.Future[dict[str, Any]] | None = None
+
+    async def open(self) -> None:
+        loop = asyncio.get_running_loop()
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        ours.setblocking(False)
+        self._channel, self._up = ours, loop.create_future()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), self.isolation],
+                pass_fds=(theirs.fileno(), *self.lane.descriptors),
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+                env={**os.environ, "PYTHONPATH": _package_path(), "DODO_LANE": self.lane.name},
+            )
+        loop.add_reader(ours, self._hear)
+        answer = await self._up
+        if "down" in answer:
+            await self.close(keep=False)
+            raise BackendError(f"no sandbox of isolation {self.isolation}: {answer['down']}")
+
+    def _hear(self) -> None:
+        assert self._channel is not None
+        try:
+            data = self._channel.recv(1 << 17)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._heard(json.loads(data))
+            return
+        asyncio.get_running_loop().remove_reader(self._channel)
+        self._resolve({"down": "it ended at once"})
+        if not self._closing:
+            self._events.put_nowait(Lost("the test's sandbox ended unexpectedly"))
+
+    def _resolve(self, answer: dict[str, Any]) -> None:
+        if self._up is not None and not self._up.done():
+            self._up.set_result(answer)
+
+    def _heard(self, message: dict[str, Any]) -> None:
+        if "up" in message or "down" in message:
+            self._resolve(message)
+        elif "unstartable" in message:
+            self._events.put_nowait(Unstartable(message["unstartable"], message["why"]))
+        elif "exited" in message:
+            task = asyncio.ensure_future(self._exited(message["exited"], message["code"]))
+            task.add_done_callback(lambda t: t.exception())
+
+    async def _exited(self, name: str, code: int) -> None:
+        """An end counts when its last output has been read, so that no verdict comes after it."""
+        output = self._outputs.get(name)
+        if output is not None:
+            with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
+                await asyncio.wait_for(output.done.wait(), 1.0)
+        self._events.put_nowait(Exited(name, code))
+
+    def _send(self, message: dict[str, Any], descriptors: tuple[int, ...] = ()) -> None:
+        assert self._channel is not None
+        try:
+            socket.send_fds(self._channel, [json.dumps(message).encode()], list(descriptors))
+        except OSError as error:
+            self._events.put_nowait(Lost(f"the test's sandbox cannot be reached: {error.strerror}"))
+
+    async def start(self, layer: str) -> list[str]:
+        commands = []
+        for service in self._services(layer):
+            try:
+                commands.append(self._command(service))
+            except MissingVariable as error:
+                self._events.put_nowait(Unstartable(service.name, str(error)))
+        for command in commands:
+            self._start(command)
+        return [command.name for command in commands]
+
+    def _services(self, layer: str) -> tuple[Service | ApplicationService, ...]:
+        return self.plan.application.services if layer == "application" else self.plan.layer(layer)
+
+    def _start(self, command: Command) -> None:
+        def on_line(line: bytes) -> None:
+            event = lines.read_line(command.name, command.judge, line)
+            if event is not None and command.layer != "application":
+                self._events.put_nowait(event)
+
+        output = Output(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
+        self._outputs[command.name] = output
+        order = {"do": "start", "id": command.name, "argv": command.argv, "cwd": str(command.folder)}
+        self._send({**order, "env": dict(command.environment)}, (output.writer,))
+        output.release_writer()
+
+    def _command(self, service: Service | ApplicationService) -> Command:
+        if isinstance(service, Service):
+            return self._own_command(service)
+        return self._application_command(service)
+
+    def _own_command(self, service: Service) -> Command:
+        environment = {
+            **base_environment(),
+            "PYTHONPATH": _package_path(),
+            "DODO_SERVICE": service.name,
+            "DODO_READY_FILE": f"/tmp/dodo-ready-{self.lane.name}{service.name}",
+            "DODO_LANE": self.lane.name,
+        }
+        words = (*service.process, *(self._flag(flag) for flag in service.flags))
+        return Command(service.name, service.layer, words, environment, self.folder, service.judge)
+
+    def _flag(self, flag: Flag) -> str:
+        values: dict[str, Callable[[], str]] = {
+            "path": lambda: str(self.folder / "files" / flag.value),
+            "report": lambda: str(self.report / flag.value),
+            "memory": lambda: memory_name(flag.value, self.lane.memory_prefix),
+        }
+        value = values.get(flag.kind, lambda: flag.value)()
+        return f"--{flag.name}={self.lane.cid if flag.name == 'cid' else value}"
+
+    def _application_command(self, service: ApplicationService) -> Command:
+        folder = (self.folder / self.plan.application.folder).resolve()
+        inherited = base_environment()
+        variables = {**dotenv(folder / ".env"), **inherited}
+        own = {
+            name: inherited.get(name, "") if value is None else interpolate(value, variables)
+            for name, value in service.environment.items()
+        }
+        own.update({name: str(self.lane.cid) for name in CID_VARIABLES if name in own})
+        words = tuple(interpolate(word, variables) for word in service.command)
+        argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.lane.cid), self.lane.memory_prefix)
+        environment = {**inherited, **own, "DODO_LANE": self.lane.name}
+        return Command(service.name, "application", argv, environment, folder)
+
+    async def next_event(self) -> Event:
+        return await self._events.get()
+
+    async def begin(self) -> None:
+        messages = MessageSet.standard()
+        message = messages.type("dodo.TestBegin")(seed=self.plan.seed)
+        now = time.time_ns() // 1000
+        envelope = Envelope(messages.id(message), messages.encode(message), now, 0, now, 0)
+        self._send({"do": "send", "cid": self.lane.cid, "data": encode_frame(envelope).hex()})
+
+    async def close(self, keep: bool) -> list[str]:
+        if self._process is None or self._channel is None:
+            return []
+        self._closing = True
+        if keep and self._process.poll() is None:
+            return self._kept()
+        self._send({"do": "close"})
+        await asyncio.get_running_loop().run_in_executor(None, self._end_process, self._process)
+        asyncio.get_running_loop().remove_reader(self._channel)
+        self._channel.close()
+        for output in self._outputs.values():
+            output.close()
+        return []
+
+    @staticmethod
+    def _end_process(process: subprocess.Popen[bytes]) -> None:
+        try:
+            process.wait(_CLOSE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+    def _kept(self) -> list[str]:
+        assert self._process is not None
+        self._send({"do": "keep"})
+        pid = self._process.pid
+        look = f"ps -s {pid} -f" if self.isolation == "host" else f"nsenter -t {pid} -n -i -m bash"
+        memory = f", shared memory '{self.lane.memory_prefix}*'" if self.lane.memory_prefix else ""
+        return [
+            f"{self.plan.slug} is kept up: CID {self.lane.cid}{memory}, logs in {self.report / 'logs'}",
+            f"look inside:  {look}",
+            f"take it down: kill {pid}",
+        ]
+
+    def tail(self, service: str) -> list[str]:
+        output = self._outputs.get(service)
+        return output.tail() if output else []
+
+
+def _package_path() -> str:
+    """``PYTHONPATH`` for services and sandbox: where ``services`` lies, and where ``dodo_dsl`` does."""
+    places = [str(data.root()), str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
+    return os.pathsep.join(dict.fromkeys(p for p in places if p))

@@ -1,0 +1,185 @@
+"""Several tests at once: chooses isolation, runs each Plan on its backend, and cleans up whatever happens."""
+
+import asyncio
+import contextlib
+import os
+import secrets
+import shutil
+import signal
+import tempfile
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, Protocol, Self
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run import lanes, leases
+from dodo_dsl.run.engine import Engine
+from dodo_dsl.run.events import BackendError
+from dodo_dsl.run.process import Lane, ProcessBackend
+
+BackendName = Literal["process", "docker"]
+FOLDER_PREFIX = "dodo-run-"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A Plan, the folder that it was compiled into, and the one that takes its logs and pictures."""
+
+    plan: Plan
+    folder: Path
+    report: Path
+
+
+class Progress(Protocol):
+    """Who is told how the run goes."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def note(self, text: str) -> None: ...
+
+    def phase(self, slug: str, text: str) -> None: ...
+
+    def done(self, outcome: Outcome) -> None: ...
+
+
+def default_backend(plans: Sequence[Plan]) -> BackendName:
+    """Processes when every application service says how to start as one, else containers."""
+    services = [s for plan in plans for s in plan.application.services]
+    return "process" if all(s.process for s in services) else "docker"
+
+
+@dataclass
+class WorkFolder:
+    """Where a run's tests are compiled; the next run removes it should this one be killed."""
+
+    path: Path
+    lease: leases.Lease
+    kept: bool = False
+
+    def __enter__(self) -> Self:
+        self.path.mkdir(mode=0o755)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.kept:
+            self.lease.leave()
+        else:
+            shutil.rmtree(self.path, ignore_errors=True)
+            self.lease.release()
+
+
+def work_folder() -> WorkFolder:
+    """A folder of a fresh name, leased."""
+    token = secrets.token_hex(4)
+    path = Path(tempfile.gettempdir()).resolve() / f"{FOLDER_PREFIX}{token}"
+    lease = leases.try_lease(f"run-{token}", {"folder": str(path)})
+    assert lease is not None, "a fresh name is free"
+    return WorkFolder(path, lease)
+
+
+def reap_folders() -> None:
+    """Removes the folders of killed runs."""
+    for lease, about in leases.orphans("run-"):
+        folder = Path(str(about.get("folder", "")))
+        if folder.name == f"{FOLDER_PREFIX}{lease.name.removeprefix('run-')}":
+            shutil.rmtree(folder, ignore_errors=True)
+        lease.release()
+
+
+class Runner:
+    """Runs jobs on the process backend, ``parallel`` at a time, in order."""
+
+    def __init__(
+        self,
+        progress: Progress,
+        cids: Sequence[int],
+        parallel: int,
+        keep: bool,
+        isolation: str | None = None,
+        descriptors: tuple[int, ...] = (),
+    ) -> None:
+        self.progress = progress
+        self.cids = cids
+        self.keep = keep
+        self.isolation = isolation
+        self.descriptors = descriptors
+        self.kept: list[str] = []
+        self.interrupted = False
+        self._places = asyncio.Semaphore(parallel)
+
+    async def run(self, jobs: Sequence[Job]) -> list[Outcome]:
+        """The outcomes in the order of the jobs; SIGINT and SIGTERM end all tests with their teardown."""
+        if self.isolation is None and any(job.plan.isolation == "network" for job in jobs):
+            refusal = await asyncio.get_running_loop().run_in_executor(None, lanes.namespaces_refusal)
+            if refusal:
+                self.progress.note(f"no namespaces here ({refusal}): tests share the host, each with leases")
+                self.isolation = "host"
+        tasks = [asyncio.ensure_future(self._one(job)) for job in jobs]
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self._interrupt, tasks)
+        try:
+            return list(await asyncio.gather(*tasks))
+        finally:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                loop.remove_signal_handler(number)
+
+    def _interrupt(self, tasks: Sequence["asyncio.Task[Outcome]"]) -> None:
+        if not self.interrupted:
+            self.interrupted = True
+            self.progress.note("interrupted: taking down")
+            for task in tasks:
+                task.cancel()
+
+    async def _one(self, job: Job) -> Outcome:
+        slug = job.plan.slug
+        try:
+            async with self._places, self._lane(job.plan) as (isolation, lane):
+                backend = ProcessBackend(job.plan, job.folder, job.report, isolation, lane)
+                engine = Engine(job.plan, backend, lambda text: self.progress.phase(slug, text))
+                outcome, kept = await engine.run(self.keep)
+                self.kept.extend(kept)
+        except BackendError as error:
+            outcome = _without_answer(job.plan, str(error))
+        except asyncio.CancelledError:
+            outcome = _without_answer(job.plan, "the run was interrupted before this test began")
+        self.progress.done(outcome)
+        return outcome
+
+    @contextlib.asynccontextmanager
+    async def _lane(self, plan: Plan) -> AsyncIterator[tuple[str, Lane]]:
+        isolation = self.isolation or plan.isolation
+        if isolation == "network":
+            yield isolation, Lane(plan.cid, descriptors=self.descriptors)
+            return
+
+        def say(text: str) -> None:
+            self.progress.phase(plan.slug, text)
+
+        async with lanes.host_lane(plan, self.cids, say, self.keep) as lane:
+            yield isolation, replace(lane, descriptors=(*lane.descriptors, *self.descriptors))
+
+
+def _without_answer(plan: Plan, reason: str) -> Outcome:
+    """The outcome of a test that never began."""
+    return Outcome(
+        name=plan.name,
+        slug=plan.slug,
+        spec=plan.spec,
+        level=plan.level,
+        kind=plan.kind,
+        outcome="error",
+        reason=reason,
+        cid=plan.cid,
+        seed=plan.seed,
+        clock="realtime",
+        backend="process",
+    )
+
+
+def default_parallel() -> int:
+    return len(os.sched_getaffinity(0))

@@ -1,0 +1,204 @@
+"""The sandbox of one test: a small process that starts, watches and ends the test's processes.
+
+It is process 1 of namespaces of its own (``network``), or their parent on the host (``host``). The runner talks to it
+over a socket; when that closes, whatever closed it, the sandbox ends everything that it started, and itself.
+
+    runner to sandbox   {"do": "start", "id", "argv", "env", "cwd"} with the output's descriptor; {"do": "close"};
+                        {"do": "send", "cid", "data"}; {"do": "keep"}
+    sandbox to runner   {"up": pid} or {"down": why}; {"unstartable": id, "why"}; {"exited": id, "code"}
+"""
+
+import contextlib
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.run import namespaces
+
+MAX_MESSAGE = 1 << 17
+GRACE_S = 3.0
+_PORT = 12175
+
+
+class Sandbox:
+    """The loop of the sandbox's process."""
+
+    def __init__(self, channel: socket.socket, isolation: str) -> None:
+        self.channel = channel
+        self.isolation = isolation
+        self.children: dict[str, subprocess.Popen[bytes]] = {}
+        self.keep = False
+        self.ended = False
+        self.wakeup, writer = os.pipe()
+        os.set_blocking(self.wakeup, False)
+        os.set_blocking(writer, False)
+        signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+        for number in (signal.SIGCHLD, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def _on_signal(self, number: int, _frame: object) -> None:
+        if number == signal.SIGTERM:
+            self.ended = True
+
+    def tell(self, **message: object) -> None:
+        with contextlib.suppress(OSError):
+            self.channel.send(json.dumps(message).encode())
+
+    def run(self) -> None:
+        """Serves the runner until it closes the channel, then ends every process."""
+        sources: list[socket.socket | int] = [self.channel, self.wakeup]
+        while not self.ended:
+            readable, _, _ = select.select(sources, [], [])
+            if self.wakeup in readable:
+                self._drain_wakeup()
+            self._reap()
+            if self.channel in readable and not self._serve():
+                if not self.keep:
+                    break
+                sources.remove(self.channel)
+        self._end_all()
+
+    def _drain_wakeup(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            os.read(self.wakeup, 4096)
+
+    def _serve(self) -> bool:
+        """Carries out one message; False when the runner has gone."""
+        try:
+            data, descriptors, _, _ = socket.recv_fds(self.channel, MAX_MESSAGE, 4)
+        except OSError:
+            return False
+        if not data:
+            return False
+        message = json.loads(data)
+        try:
+            getattr(self, f"_do_{message.pop('do')}")(descriptors, **message)
+        finally:
+            for descriptor in descriptors:
+                os.close(descriptor)
+        return True
+
+    def _do_start(self, descriptors: list[int], **order: Any) -> None:
+        name, output = order["id"], descriptors[0]
+        try:
+            self.children[name] = subprocess.Popen(
+                order["argv"],
+                env=order["env"],
+                cwd=order["cwd"],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                start_new_session=True,
+            )
+        except (OSError, ValueError) as error:
+            self.tell(unstartable=name, why=getattr(error, "strerror", None) or str(error))
+
+    def _do_send(self, _descriptors: list[int], cid: int, data: str) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
+            sender.sendto(bytes.fromhex(data), (f"225.0.0.{cid}", _PORT))
+
+    def _do_keep(self, _descriptors: list[int]) -> None:
+        self.keep = True
+
+    def _do_close(self, _descriptors: list[int]) -> None:
+        self.ended = True
+
+    def _reap(self) -> None:
+        """Collects ended processes: the test's own are told to the runner, adopted orphans only buried."""
+        by_pid = {child.pid: name for name, child in self.children.items()}
+        with contextlib.suppress(ChildProcessError):
+            while (info := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT | os.WNOHANG)) is not None:
+                name = by_pid.get(info.si_pid)
+                if name is None:
+                    os.waitpid(info.si_pid, 0)
+                else:
+                    self.tell(exited=name, code=self.children.pop(name).wait())
+
+    def _end_all(self) -> None:
+        """SIGTERM to the test's processes, a while to comply, then SIGKILL to all that is left."""
+        for child in self.children.values():
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(child.pid, signal.SIGTERM)
+        deadline = time.monotonic() + GRACE_S
+        while self.children and time.monotonic() < deadline:
+            select.select([self.wakeup], [], [], 0.05)
+            self._drain_wakeup()
+            self._reap()
+        for _ in range(100):
+            left = list(self._left())
+            if not left:
+                return
+            for pid in left:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            time.sleep(0.01)
+            self._reap()
+
+    def _left(self) -> Iterator[int]:
+        """Processes still there: all others of the namespace, or all descendants on the host."""
+        parents = dict(_parents())
+        if self.isolation == "network" and os.getpid() == 1:
+            yield from (pid for pid in parents if pid != 1)
+            return
+        for pid in parents:
+            ancestor = pid
+            while ancestor in parents and ancestor != os.getpid():
+                ancestor = parents[ancestor]
+            if ancestor == os.getpid() and pid != ancestor:
+                yield pid
+
+
+def _parents() -> Iterator[tuple[int, int]]:
+    """Every process that is no zombie, with its parent."""
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(OSError):
+                fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                if fields[0] != "Z":
+                    yield int(entry.name), int(fields[1])
+
+
+def _in_namespaces(channel: socket.socket) -> None:
+    """Forks process 1 of new namespaces, which goes on; this process only waits for it."""
+    namespaces.unshare()
+    child = os.fork()
+    if child == 0:
+        namespaces.die_with_parent(signal.SIGKILL)
+        namespaces.furnish()
+        return
+    channel.close()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: os.kill(child, signal.SIGTERM))
+    _, status = os.waitpid(child, 0)
+    os._exit(os.waitstatus_to_exitcode(status) & 0xFF)
+
+
+def main(argv: list[str]) -> int:
+    """``sandbox DESCRIPTOR network|host``: serves the runner at the other end of the descriptor."""
+    channel = socket.socket(fileno=int(argv[0]))
+    isolation, outside = argv[1], os.getpid()
+    try:
+        if isolation == "network":
+            _in_namespaces(channel)
+        else:
+            namespaces.adopt_orphans()
+    except OSError as error:
+        channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
+        return 1
+    sandbox = Sandbox(channel, isolation)
+    sandbox.tell(up=outside)
+    sandbox.run()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

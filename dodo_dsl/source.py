@@ -1,0 +1,298 @@
+"""YAML read with positions: every key and every value keeps its line and column.
+
+Plain scalars follow the core schema of YAML 1.2 (``on`` and ``yes`` are strings). The parser works on events,
+without recursion, so that nesting, size and aliases of hostile files are bounded before anything is built.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from dodo_dsl.diagnostics import Diagnostic, Span
+
+MAX_BYTES = 1 << 20
+MAX_DEPTH = 32
+MAX_NODES = 50_000
+
+Plain = str | int | float | bool | None
+
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_INT = re.compile(r"[-+]?[0-9]{1,300}\Z|0o[0-7]{1,300}\Z|0x[0-9a-fA-F]{1,300}\Z")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
+_SPECIAL: dict[str, Plain] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf"), float("inf")),
+    "-.inf": float("-inf"),
+    ".nan": float("nan"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A scalar: ``value`` as YAML 1.2 resolves it, ``text`` as it was written."""
+
+    span: Span
+    value: Plain
+    text: str
+    tag: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    span: Span
+    items: tuple["Node", ...]
+    tag: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A key's place and its value."""
+
+    key: Span
+    value: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    span: Span
+    entries: dict[str, Entry]
+    tag: str = ""
+
+    def get(self, key: str) -> "Node | None":
+        entry = self.entries.get(key)
+        return entry.value if entry else None
+
+
+Node = Scalar | Sequence | Mapping
+
+
+def plain(node: Node) -> Any:
+    """The node as dictionaries, lists and scalars."""
+    if isinstance(node, Mapping):
+        return {key: plain(entry.value) for key, entry in node.entries.items()}
+    if isinstance(node, Sequence):
+        return [plain(item) for item in node.items]
+    return node.value
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """The node and all below it."""
+    yield node
+    children: Iterator[Node] = iter(())
+    if isinstance(node, Mapping):
+        children = (entry.value for entry in node.entries.values())
+    elif isinstance(node, Sequence):
+        children = iter(node.items)
+    for child in children:
+        yield from walk(child)
+
+
+def resolve(text: str) -> Plain:
+    """A plain scalar's value in the core schema of YAML 1.2 (section 10.3.2)."""
+    if text in _SPECIAL:
+        return _SPECIAL[text]
+    if _INT.match(text):
+        return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
+    return float(text) if _FLOAT.match(text) else text
+
+
+class _Stop(Exception):
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+
+
+@dataclass
+class _Open:
+    """A collection whose end has not been read yet."""
+
+    span: Span
+    tag: str
+    anchor: str | None
+    is_mapping: bool
+    weight: int = 1
+    items: list[Node] = field(default_factory=list)
+    entries: dict[str, Entry] = field(default_factory=dict)
+    merged: list[Node] = field(default_factory=list)
+    key: Scalar | None = None
+
+
+class _Builder:
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.stack: list[_Open] = []
+        self.root: Node | None = None
+        self.anchors: dict[str, tuple[Node, int]] = {}
+        self.count = 0
+        self.documents = 0
+        self.diagnostics: list[Diagnostic] = []
+
+    def span(self, event: Any) -> Span:
+        start, end = event.start_mark, event.end_mark
+        length = end.column - start.column if end.line == start.line else 1
+        return Span(self.file, start.line + 1, start.column + 1, max(1, length))
+
+    def report(self, span: Span, rule: str, message: str, hint: str = "") -> None:
+        self.diagnostics.append(Diagnostic(span, rule, message, hint))
+
+    def feed(self, event: Any) -> None:
+        if isinstance(event, yaml.DocumentStartEvent):
+            self.documents += 1
+            if self.documents > 1:
+                raise _Stop(Diagnostic(self.span(event), "yaml-syntax", "a second document; one file holds one"))
+        elif isinstance(event, yaml.ScalarEvent):
+            self._scalar(event)
+        elif isinstance(event, yaml.AliasEvent):
+            self._alias(event)
+        elif isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
+            self._open(event)
+        elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
+            self._close()
+
+    def _grow(self, span: Span, weight: int) -> None:
+        self.count += weight
+        if self.count > MAX_NODES:
+            raise _Stop(Diagnostic(span, "too-large", f"more than {MAX_NODES} values, aliases counted"))
+
+    def _scalar(self, event: Any) -> None:
+        span = self.span(event)
+        is_plain = event.implicit[0]
+        value = resolve(event.value) if is_plain else event.value
+        self._add(Scalar(span, value, event.value, self._tag(event)), 1, event.anchor)
+
+    @staticmethod
+    def _tag(event: Any) -> str:
+        return event.tag if event.tag and event.tag not in ("!", "tag:yaml.org,2002:str") else ""
+
+    def _alias(self, event: Any) -> None:
+        span = self.span(event)
+        if event.anchor not in self.anchors:
+            raise _Stop(Diagnostic(span, "yaml-syntax", f"alias '*{event.anchor}' has no finished anchor before it"))
+        node, weight = self.anchors[event.anchor]
+        self._add(node, weight, None, span)
+
+    def _open(self, event: Any) -> None:
+        span = self.span(event)
+        if len(self.stack) >= MAX_DEPTH:
+            raise _Stop(Diagnostic(span, "too-large", f"nested deeper than {MAX_DEPTH} levels"))
+        is_mapping = isinstance(event, yaml.MappingStartEvent)
+        span = Span(span.file, span.line, span.column)
+        self.stack.append(_Open(span, self._tag(event), event.anchor, is_mapping))
+
+    def _close(self) -> None:
+        top = self.stack.pop()
+        node: Node
+        if top.is_mapping:
+            node = Mapping(top.span, self._with_merged(top), top.tag)
+        else:
+            node = Sequence(top.span, tuple(top.items), top.tag)
+        self.count -= top.weight - 1
+        self._add(node, top.weight, top.anchor)
+
+    def _with_merged(self, top: _Open) -> dict[str, Entry]:
+        entries = dict(top.entries)
+        for node in top.merged:
+            for source in node.items if isinstance(node, Sequence) else (node,):
+                if isinstance(source, Mapping):
+                    entries = {**source.entries, **entries}
+                else:
+                    self.report(source.span, "yaml-syntax", "'<<' merges mappings, and this is none")
+        return entries
+
+    def _add(self, node: Node, weight: int, anchor: str | None, at: Span | None = None) -> None:
+        span = at or node.span
+        self._grow(span, weight)
+        if anchor:
+            self.anchors[anchor] = (node, weight)
+        if not self.stack:
+            self.root = node
+            return
+        top = self.stack[-1]
+        top.weight += weight
+        if not top.is_mapping:
+            top.items.append(node)
+        elif top.key is None:
+            top.key = self._as_key(node, span)
+        else:
+            self._entry(top, top.key, node)
+            top.key = None
+
+    def _as_key(self, node: Node, span: Span) -> Scalar:
+        if not isinstance(node, Scalar):
+            raise _Stop(Diagnostic(span, "yaml-syntax", "a key must be a plain word, not a list or a mapping"))
+        return node
+
+    def _entry(self, top: _Open, key: Scalar, node: Node) -> None:
+        if key.text == "<<" and key.value == "<<":
+            top.merged.append(node)
+        elif key.text in top.entries:
+            first = top.entries[key.text].key
+            message = f"key '{key.text}' is written twice; the first is at line {first.line}"
+            self.report(key.span, "duplicate-key", message)
+        else:
+            top.entries[key.text] = Entry(key.span, node)
+
+
+def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    problem = str(getattr(error, "problem", "") or getattr(error, "reason", "") or error).splitlines()[0]
+    if mark is None:
+        position = int(getattr(error, "position", 0) or 0)
+        before = text[:position]
+        return Diagnostic(
+            Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1),
+            "yaml-syntax",
+            f"not YAML: {problem}",
+        )
+    span = Span(file, mark.line + 1, mark.column + 1)
+    lines = text.splitlines()
+    line = lines[mark.line] if mark.line < len(lines) else ""
+    indent = line[: len(line) - len(line.lstrip())]
+    if "\t" in indent or line[mark.column : mark.column + 1] == "\t":
+        column = line.index("\t") + 1
+        return Diagnostic(
+            Span(file, span.line, column),
+            "yaml-tab",
+            "a tab character indents this line",
+            "YAML takes spaces only",
+        )
+    context = str(getattr(error, "context", "") or "").strip()
+    return Diagnostic(span, "yaml-syntax", f"not YAML: {context + ': ' if context else ''}{problem}")
+
+
+def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:
+    """The document of a text, and what is wrong with it; None for an empty or unreadable one."""
+    builder = _Builder(file)
+    try:
+        for event in yaml.parse(text, Loader=_LOADER):
+            builder.feed(event)
+    except _Stop as stop:
+        return None, [*builder.diagnostics, stop.diagnostic]
+    except (yaml.YAMLError, ValueError) as error:
+        return None, [*builder.diagnostics, _syntax(file, text, error)]
+    return builder.root, builder.diagnostics
+
+
+def read(path: Path) -> tuple[Node | None, list[Diagnostic]]:
+    """As ``parse``, from a file; unreadable, oversized and non-UTF-8 files are diagnostics too."""
+    file = str(path)
+    try:
+        with path.open("rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        return None, [Diagnostic(Span(file), "unreadable-file", f"cannot read the file: {error.strerror}")]
+    if len(raw) > MAX_BYTES:
+        return None, [Diagnostic(Span(file), "too-large", f"the file is larger than {MAX_BYTES // 1024} KiB")]
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        column = error.start - (raw.rfind(b"\n", 0, error.start) + 1) + 1
+        return None, [Diagnostic(Span(file, line, column), "yaml-encoding", "the file is not UTF-8 from here on")]
+    return parse(text, file)

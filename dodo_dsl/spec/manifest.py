@@ -1,0 +1,101 @@
+"""Service manifests: what a service is, where it may stand, its parameters and its ports."""
+
+import functools
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dodo_dsl import data
+from dodo_dsl.diagnostics import Diagnostic, has_errors
+from dodo_dsl.source import plain, read
+from dodo_dsl.spec.schema import validate
+
+Value = str | int | float | bool | list[str | int | float] | None
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number."""
+
+    name: str
+    type: str
+    help: str
+    unit: str = ""
+    default: Value = None
+    required: bool = False
+    shared: bool = False
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Ports:
+    """Names that a service reads (``inputs``) and writes (``outputs``); ``{parameter}`` stands for its value."""
+
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """One service; ``folder`` holds its ``service.yml``."""
+
+    folder: Path
+    name: str
+    layers: tuple[str, ...]
+    image: str
+    process: tuple[str, ...]
+    description: str
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+    messages: Ports = Ports()
+    memory: Ports = Ports()
+    devices: tuple[str, ...] = ()
+
+
+def _ports(raw: dict[str, list[str]] | None) -> Ports:
+    raw = raw or {}
+    return Ports(tuple(raw.get("in", ())), tuple(raw.get("out", ())))
+
+
+def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
+    """The manifest of a ``service.yml`` and what is wrong with it."""
+    node, found = read(path)
+    if node is not None:
+        found = [*found, *validate(node, "service")]
+    if node is None or has_errors(found):
+        return None, found
+    raw = plain(node)
+    parameters = {
+        name: Parameter(name, **{**p, "choices": tuple(p.get("choices", ()))})
+        for name, p in (raw.get("parameters") or {}).items()
+    }
+    manifest = Manifest(
+        folder=path.parent,
+        name=raw["name"],
+        layers=tuple(raw["layers"]),
+        image=raw["image"],
+        process=tuple(raw["process"]),
+        description=raw["description"],
+        parameters=parameters,
+        messages=_ports(raw.get("messages")),
+        memory=_ports(raw.get("memory")),
+        devices=tuple(raw.get("devices") or ()),
+    )
+    return manifest, found
+
+
+@functools.cache
+def load_manifests(
+    folders: Iterable[Path] | None = None,
+) -> tuple[dict[str, Manifest], tuple[Diagnostic, ...]]:
+    """Every manifest ``<folder>/<service>/service.yml``, by service name; the shipped services by default."""
+    manifests: dict[str, Manifest] = {}
+    found: list[Diagnostic] = []
+    for folder in folders or (data.services(),):
+        for path in sorted(folder.glob("*/service.yml")):
+            manifest, problems = load_manifest(path)
+            found.extend(problems)
+            if manifest:
+                manifests[manifest.name] = manifest
+    return manifests, tuple(found)

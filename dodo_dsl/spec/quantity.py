@@ -1,0 +1,91 @@
+"""Quantities with units, converted decimally: ``9.5 cm`` to metres is 0.095, not 0.09500000000000001."""
+
+import re
+from decimal import Decimal, InvalidOperation, localcontext
+
+from dodo_dsl.diagnostics import did_you_mean
+
+_PI = Decimal("3.14159265358979323846264338328")
+_FACTORS: dict[str, dict[str, Decimal]] = {
+    "length": {"m": Decimal(1), "mm": Decimal("0.001"), "cm": Decimal("0.01"), "km": Decimal(1000)},
+    "time": {
+        "s": Decimal(1),
+        "us": Decimal("0.000001"),
+        "ms": Decimal("0.001"),
+        "min": Decimal(60),
+        "h": Decimal(3600),
+    },
+    "frequency": {"Hz": Decimal(1), "kHz": Decimal(1000)},
+    "angle": {"rad": Decimal(1), "deg": _PI / 180},
+    "speed": {"m/s": Decimal(1), "cm/s": Decimal("0.01"), "km/h": Decimal(1) / Decimal("3.6")},
+    "yaw rate": {"rad/s": Decimal(1), "deg/s": _PI / 180},
+    "acceleration": {"m/s2": Decimal(1), "cm/s2": Decimal("0.01")},
+    "angular acceleration": {"rad/s2": Decimal(1), "deg/s2": _PI / 180},
+    "share": {"1": Decimal(1), "%": Decimal("0.01")},
+    "pixels": {"px": Decimal(1)},
+    "mass": {"kg": Decimal(1), "g": Decimal("0.001")},
+}
+_DIMENSION = {unit: dimension for dimension, units in _FACTORS.items() for unit in units}
+_NUMBER = r"[-+]?(?:\d{1,40}(?:\.\d{0,40})?|\.\d{1,40})(?:[eE][-+]?\d{1,3})?"
+_QUANTITY = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>[A-Za-z%/°µ][A-Za-z0-9/%°µ^²]*)?\s*", re.ASCII)
+_DIGITS = 15
+
+UNITS = tuple(_DIMENSION)
+
+
+class QuantityError(ValueError):
+    """A value is no quantity of the wanted unit; ``hint`` names the way out."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+def _example(number: str, unit: str) -> str:
+    return f"write for example '{number} {unit}'"
+
+
+def convert(value: object, unit: str) -> Decimal:
+    """The number of ``unit`` that a written value such as ``"9.5 cm"`` stands for.
+
+    Raises QuantityError for a bare number, an unknown unit and a unit of another dimension.
+    """
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise QuantityError(f"expected a quantity in {unit}", _example("1", unit))
+    text = str(value)
+    match = _QUANTITY.fullmatch(text)
+    if not match:
+        raise QuantityError(f"'{text}' is not a quantity in {unit}", _example("1", unit))
+    if match["unit"] is None:
+        raise QuantityError(f"'{text}' has no unit, expected one of {unit}", _example(text.strip(), unit))
+    written = match["unit"]
+    if written not in _DIMENSION:
+        siblings = _FACTORS[_DIMENSION[unit]]
+        raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings))
+    if _DIMENSION[written] != _DIMENSION[unit]:
+        message = f"'{text}' is a {_DIMENSION[written]}, expected a {_DIMENSION[unit]} in {unit}"
+        raise QuantityError(message, _example(match["number"], unit))
+    return _converted(match["number"], written, unit)
+
+
+def _converted(number: str, written: str, unit: str) -> Decimal:
+    units = _FACTORS[_DIMENSION[unit]]
+    with localcontext() as context:
+        context.prec = 60
+        try:
+            exact = Decimal(number)
+        except InvalidOperation as error:
+            raise QuantityError(f"'{number}' is not a number") from error
+        if written == unit:
+            return exact
+        result = exact * units[written] / units[unit]
+        context.prec = _DIGITS
+        return +result
+
+
+def decimal_text(number: Decimal) -> str:
+    """A number as a flag carries it: no exponent, no trailing zeros, no negative zero."""
+    text = f"{number:f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text

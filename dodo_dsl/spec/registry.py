@@ -1,0 +1,52 @@
+"""Finding specs: registries are folders, a test is ``<name>/<name>.dodo.yml``."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+SUFFIX = ".dodo.yml"
+
+
+@dataclass(frozen=True, order=True)
+class Location:
+    """A spec's file and the registry's root, which its paths may not leave."""
+
+    path: Path
+    root: Path
+
+    @property
+    def stem(self) -> str:
+        return self.path.name.removesuffix(SUFFIX)
+
+
+def _specs_below(folder: Path, root: Path) -> Iterator[Location]:
+    for path in sorted(folder.rglob(f"*{SUFFIX}")):
+        if not any(part.startswith(".") for part in path.relative_to(folder).parts):
+            yield Location(path, root)
+
+
+def _root_of(path: Path, registries: Sequence[Path]) -> Path:
+    """The registry that holds a spec; for a spec outside all, the folder that its own folder stands in."""
+    for registry in registries:
+        if path.is_relative_to(registry):
+            return registry
+    own_folder = path.parent.name == path.name.removesuffix(SUFFIX)
+    return path.parent.parent if own_folder else path.parent
+
+
+def locate(paths: Iterable[Path], registries: Sequence[Path]) -> tuple[list[Location], list[Path]]:
+    """The specs that are or lie below ``paths`` (all registries without any), and the paths that hold none."""
+    roots = [r.resolve() for r in registries]
+    found: dict[Path, Location] = {}
+    empty = []
+    wanted = [p.resolve() for p in paths] or roots
+    for path in wanted:
+        if path.is_dir():
+            known = [r for r in roots if path.is_relative_to(r)]
+            specs = list(_specs_below(path, known[0] if known else path))
+        else:
+            specs = [Location(path, _root_of(path, roots))] if path.name.endswith(SUFFIX) else []
+        found.update((s.path, s) for s in specs)
+        if not specs and path not in roots:
+            empty.append(path)
+    return sorted(found.values(), key=lambda s: (s.stem, s.path)), empty

@@ -1,0 +1,173 @@
+"""JSON Schema errors as diagnostics at the line and column of the value they mean."""
+
+import functools
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from dodo_dsl import data
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.source import Mapping, Node, Scalar, Sequence, plain
+from dodo_dsl.spec import quantity
+
+_TYPE_NAMES = {
+    "object": "a mapping (key: value)",
+    "array": "a list",
+    "string": "a text",
+    "integer": "a whole number",
+    "number": "a number",
+    "boolean": "true or false",
+    "null": "nothing",
+}
+
+
+@functools.cache
+def _validator(name: str) -> Any:
+    from jsonschema import Draft202012Validator
+
+    schema = json.loads((data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
+    return Draft202012Validator(schema)
+
+
+def validate(node: Node, schema: str) -> list[Diagnostic]:
+    """All violations of ``schemas/<schema>.schema.json``; tags are refused as well."""
+    found = list(_tags(node))
+    for error in _validator(schema).iter_errors(plain(node)):
+        found.extend(_TRANSLATORS.get(error.validator, _fallback)(error, _locate(node, error.absolute_path)))
+    return found
+
+
+def _tags(node: Node) -> Iterator[Diagnostic]:
+    if node.tag:
+        yield Diagnostic(node.span, "yaml-tag", f"tag '{node.tag}' has no meaning here", "remove it; values are plain")
+    if isinstance(node, Mapping):
+        for entry in node.entries.values():
+            yield from _tags(entry.value)
+    elif isinstance(node, Sequence):
+        for item in node.items:
+            yield from _tags(item)
+
+
+class _Place:
+    """A node with the span that a reader expects: its own, or its key's where the value is a collection."""
+
+    def __init__(self, node: Node, key: Span | None, name: str) -> None:
+        self.node = node
+        self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
+        self.name = name
+
+    def key(self, name: str) -> Span:
+        entries = self.node.entries if isinstance(self.node, Mapping) else {}
+        return entries[name].key if name in entries else self.span
+
+
+def _locate(root: Node, path: Iterable[str | int]) -> _Place:
+    node, key, name = root, None, "the file"
+    for step in path:
+        if isinstance(node, Mapping) and str(step) in node.entries:
+            entry = node.entries[str(step)]
+            node, key, name = entry.value, entry.key, f"'{step}'"
+        elif isinstance(node, Sequence) and isinstance(step, int):
+            node, key, name = node.items[step], None, f"item {step + 1} of {name}"
+    return _Place(node, key, name)
+
+
+def _shown(value: object) -> str:
+    text = value if isinstance(value, str) else json.dumps(value, default=str)
+    return f"'{text if len(text) <= 60 else text[:57] + '...'}'"
+
+
+def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    known = error.schema.get("properties", {})
+    for name in error.instance:
+        if name not in known:
+            yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
+
+
+def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    # jsonschema reports each missing key by itself, in the order of the schema
+    missing = next(n for n in error.validator_value if n not in error.instance and f"'{n}'" in error.message)
+    about = error.schema.get("properties", {}).get(missing, {})
+    hint = about.get("description", "") if isinstance(about, dict) else ""
+    yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
+
+
+def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    if "x-unit" in error.schema:
+        yield from quantity_problem(place.node, error.schema["x-unit"])
+        return
+    wanted = error.validator_value
+    names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
+    found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
+    message = f"{place.name} {found}, expected {' or '.join(names)}"
+    hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and _kind(error.instance) != "object" else ""
+    yield Diagnostic(place.span, "wrong-type", message, hint if error.instance is not None else "")
+
+
+def _kind(value: object) -> str:
+    kinds: list[tuple[type, str]] = [(bool, "boolean"), (int, "integer"), (float, "number"), (str, "string")]
+    kinds += [(dict, "object"), (list, "array")]
+    return next((name for kind, name in kinds if isinstance(value, kind)), "null")
+
+
+def quantity_problem(node: Node, unit: str) -> Iterator[Diagnostic]:
+    """What keeps a value from being a quantity in ``unit``; nothing when it is one."""
+    try:
+        quantity.convert(node.text if isinstance(node, Scalar) else None, unit)
+    except quantity.QuantityError as error:
+        yield Diagnostic(node.span, "wrong-unit", str(error), error.hint)
+
+
+def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    choices = [str(v) for v in error.validator_value]
+    message = f"{_shown(error.instance)} is no value of {place.name}, expected {', '.join(choices)}"
+    hint = did_you_mean(str(error.instance), choices)
+    yield Diagnostic(place.span, "wrong-value", message, hint if hint.startswith("did") else "")
+
+
+def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    message = f"{place.name} is {_shown(error.instance)}, expected {error.validator_value}"
+    yield Diagnostic(place.span, "wrong-value", message)
+
+
+def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    expected = error.schema.get("x-expect", f"text that matches {error.schema.get('pattern')}")
+    span = place.span
+    if "propertyNames" in error.absolute_schema_path:
+        span = place.key(str(error.instance))
+    hint = ""
+    if isinstance(error.instance, str):
+        plain_name = re.sub(r"[^a-z0-9]+", "-", error.instance.lower()).strip("-")
+        hint = f"for example '{plain_name[:40]}'" if plain_name and plain_name != error.instance else ""
+    yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} cannot stand here, expected {expected}", hint)
+
+
+def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    low, high = error.schema.get("minimum"), error.schema.get("maximum")
+    message = f"{place.name} is {error.instance}, expected {low} to {high}"
+    yield Diagnostic(place.span, "out-of-range", message)
+
+
+def _too_few(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected at least one entry")
+
+
+def _fallback(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    yield Diagnostic(place.span, "wrong-value", f"{place.name}: {error.message[:200]}")
+
+
+_TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
+    "additionalProperties": _additional,
+    "required": _required,
+    "type": _type,
+    "enum": _choices,
+    "const": _const,
+    "pattern": _pattern,
+    "maxLength": _pattern,
+    "minimum": _bounds,
+    "maximum": _bounds,
+    "minProperties": _too_few,
+    "minItems": _too_few,
+    "minLength": _too_few,
+}

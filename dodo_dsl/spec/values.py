@@ -1,0 +1,178 @@
+"""A parameter's value as written in a spec, converted to what the service's flag carries."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Literal
+
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.source import Node, Scalar, Sequence
+from dodo_dsl.spec import quantity
+from dodo_dsl.spec.manifest import Parameter
+
+Kind = Literal["text", "path", "memory"]
+
+_MEMORY = re.compile(r"/?[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_MAX_TEXT = 4096
+
+
+@dataclass(frozen=True)
+class Value:
+    """What a flag carries: text, the absolute path of a file of the registry, or a shared memory's name."""
+
+    text: str
+    kind: Kind = "text"
+    path: Path | None = None
+
+
+class ValueProblem(Exception):
+    """A written value does not fit its parameter."""
+
+    def __init__(self, span: Span, rule: str, message: str, hint: str = "") -> None:
+        super().__init__(message)
+        self.diagnostic = Diagnostic(span, rule, message, hint)
+
+
+def convert(parameter: Parameter, node: Node, root: Path) -> Value:
+    """The flag's value; raises ValueProblem at the place of what does not fit."""
+    return _CONVERTERS[parameter.type](parameter, node, root)
+
+
+def default_value(parameter: Parameter) -> Value | None:
+    """The manifest's default as the flag carries it."""
+    default = parameter.default
+    if default is None:
+        return None
+    kind: Kind = "memory" if parameter.type == "memory" else "text"
+    if isinstance(default, bool):
+        return Value("true" if default else "false")
+    if isinstance(default, list):
+        return Value(",".join(str(item) for item in default))
+    if isinstance(default, int | float):
+        return Value(quantity.decimal_text(Decimal(str(default))))
+    return Value(str(default), kind)
+
+
+def _name(parameter: Parameter) -> str:
+    return f"parameter '{parameter.name}'"
+
+
+def _scalar(parameter: Parameter, node: Node, expected: str) -> Scalar:
+    if not isinstance(node, Scalar) or node.value is None:
+        found = "is empty" if isinstance(node, Scalar) else "is a list"
+        raise ValueProblem(node.span, "wrong-type", f"{_name(parameter)} {found}, expected {expected}")
+    return node
+
+
+def _number(parameter: Parameter, node: Node, _: Path) -> Value:
+    expected = f"a quantity in {parameter.unit}" if parameter.unit else "a number"
+    scalar = _scalar(parameter, node, expected)
+    if parameter.unit:
+        try:
+            number = quantity.convert(scalar.text, parameter.unit)
+        except quantity.QuantityError as error:
+            raise ValueProblem(scalar.span, "wrong-unit", f"{_name(parameter)}: {error}", error.hint) from error
+    else:
+        number = _bare_number(parameter, scalar)
+    return _bounded(parameter, scalar, number)
+
+
+def _bare_number(parameter: Parameter, scalar: Scalar) -> Decimal:
+    whole = parameter.type == "integer"
+    wanted: type | tuple[type, ...] = int if whole else (int, float)
+    if isinstance(scalar.value, bool) or not isinstance(scalar.value, wanted):
+        expected = "a whole number" if whole else "a number"
+        rule = "wrong-unit" if re.match(r"[-+.\d]+\s*[A-Za-z%]", scalar.text) else "wrong-type"
+        message = f"{_name(parameter)} is '{scalar.text}', expected {expected} without a unit"
+        raise ValueProblem(scalar.span, rule, message)
+    number = Decimal(str(scalar.value))
+    if not number.is_finite():
+        raise ValueProblem(
+            scalar.span, "wrong-type", f"{_name(parameter)} is '{scalar.text}', expected a finite number"
+        )
+    return number
+
+
+def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:
+    low, high = parameter.minimum, parameter.maximum
+    if (low is not None and number < Decimal(str(low))) or (high is not None and number > Decimal(str(high))):
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        if low is not None and high is not None:
+            expected = f"{low:g} to {high:g}{unit}"
+        else:
+            expected = f"at least {low:g}{unit}" if low is not None else f"at most {high:g}{unit}"
+        raise ValueProblem(scalar.span, "out-of-range", f"{_name(parameter)} is {scalar.text}, expected {expected}")
+    return Value(quantity.decimal_text(number))
+
+
+def _text(parameter: Parameter, node: Node, _: Path) -> Value:
+    scalar = _scalar(parameter, node, "a text")
+    _check_text(parameter, scalar)
+    if parameter.choices and scalar.text not in parameter.choices:
+        message = f"{_name(parameter)} is '{scalar.text}', expected one of {', '.join(parameter.choices)}"
+        raise ValueProblem(scalar.span, "wrong-value", message, did_you_mean(scalar.text, parameter.choices))
+    return Value(scalar.text)
+
+
+def _check_text(parameter: Parameter, scalar: Scalar) -> None:
+    if len(scalar.text) > _MAX_TEXT or not scalar.text.isprintable():
+        message = f"{_name(parameter)} has control characters or is longer than {_MAX_TEXT} characters"
+        raise ValueProblem(scalar.span, "wrong-value", message)
+
+
+def _boolean(parameter: Parameter, node: Node, _: Path) -> Value:
+    scalar = _scalar(parameter, node, "true or false")
+    if not isinstance(scalar.value, bool):
+        message = f"{_name(parameter)} is '{scalar.text}', expected true or false"
+        raise ValueProblem(scalar.span, "wrong-type", message)
+    return Value("true" if scalar.value else "false")
+
+
+def _memory(parameter: Parameter, node: Node, _: Path) -> Value:
+    scalar = _scalar(parameter, node, "a shared memory's name")
+    if not _MEMORY.fullmatch(scalar.text):
+        message = f"{_name(parameter)} is '{scalar.text}', expected a shared memory's name such as video0.argb"
+        raise ValueProblem(scalar.span, "wrong-value", message)
+    return Value(scalar.text, "memory")
+
+
+def _list(parameter: Parameter, node: Node, root: Path) -> Value:
+    items = node.items if isinstance(node, Sequence) else (node,)
+    texts = []
+    for item in items:
+        text = _text(parameter, item, root).text
+        if "," in text:
+            raise ValueProblem(item.span, "wrong-value", f"{_name(parameter)}: '{text}' may not hold a comma")
+        texts.append(text)
+    return Value(",".join(texts))
+
+
+def _path(parameter: Parameter, node: Node, root: Path) -> Value:
+    scalar = _scalar(parameter, node, "a path relative to the spec")
+    _check_text(parameter, scalar)
+    folder = Path(scalar.span.file).parent
+    if not scalar.text or Path(scalar.text).is_absolute():
+        message = f"{_name(parameter)} is '{scalar.text}', expected a path relative to the spec"
+        raise ValueProblem(scalar.span, "path-escape", message)
+    target = (folder / scalar.text).resolve()
+    if not target.is_relative_to(root.resolve()):
+        message = f"{_name(parameter)}: '{scalar.text}' leaves the registry"
+        raise ValueProblem(scalar.span, "path-escape", message, "files of a test lie in its registry")
+    if not target.exists():
+        beside = [p.name for p in target.parent.iterdir()] if target.parent.is_dir() else []
+        message = f"{_name(parameter)}: there is no file or folder '{scalar.text}'"
+        raise ValueProblem(scalar.span, "missing-file", message, did_you_mean(target.name, beside))
+    return Value(scalar.text, "path", target)
+
+
+_CONVERTERS: dict[str, Callable[[Parameter, Node, Path], Value]] = {
+    "number": _number,
+    "integer": _number,
+    "string": _text,
+    "boolean": _boolean,
+    "path": _path,
+    "memory": _memory,
+    "list": _list,
+}
