@@ -1,0 +1,59 @@
+"""The words of a message specification (`.odvd`) with their places; comments and blanks are dropped."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+
+class OdvdError(ValueError):
+    """A specification that cannot be used; the text begins with `file:line:column`."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something stands; line and column count from 1."""
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+_TOKEN = re.compile(
+    r"""(?P<space>[ \t\r\n]+|//[^\n]*|/\*.*?\*/)
+      | (?P<name>[A-Za-z][A-Za-z0-9_]*(?:\.[A-Za-z][A-Za-z0-9_]*)*)
+      | (?P<number>[+-]?[0-9]+(?:\.[0-9]*)?)
+      | "(?P<string>[^"]*)"
+      | '(?P<char>[^'])'
+      | (?P<sign>[\[\]{};=,])""",
+    re.VERBOSE | re.DOTALL,
+)
+
+
+@dataclass(frozen=True)
+class Token:
+    kind: str
+    text: str
+    place: Place
+
+    def __str__(self) -> str:
+        return "the end of the file" if self.kind == "end" else f"`{self.text}`"
+
+
+def tokens(text: str, file: str) -> Iterator[Token]:
+    position, line, line_start = 0, 1, 0
+    while position < len(text):
+        place = Place(file, line, position - line_start + 1)
+        match = _TOKEN.match(text, position)
+        if match is None:
+            raise OdvdError(f"{place}: `{text[position]}` does not belong here")
+        kind = match.lastgroup or ""
+        if kind != "space":
+            yield Token(kind, match[kind], place)
+        if newlines := match[0].count("\n"):
+            line += newlines
+            line_start = match.start() + match[0].rindex("\n") + 1
+        position = match.end()
+    yield Token("end", "", Place(file, line, position - line_start + 1))
