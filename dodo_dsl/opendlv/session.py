@@ -1,0 +1,168 @@
+"""A session on the bus: UDP multicast as libcluon's OD4Session speaks it, without threads."""
+
+import itertools
+import select
+import socket
+import struct
+import time
+from types import TracebackType
+from typing import Self
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.envelope import Envelope, FrameError, decode_frame, encode_frame
+from dodo_dsl.opendlv.messages import MessageSet
+
+PORT = 12175
+MAX_DATAGRAM_BYTES = 65_507
+RECEIVE_BUFFER_BYTES = 26_214_400
+CIDS = range(1, 255)
+MAX_DROPPED = 1000  # before a flood of garbage can end a wait
+_SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
+_TIMESPEC = struct.Struct("@qq")
+
+
+class SessionError(OSError):
+    """The bus cannot be joined or does not take a message."""
+
+
+class Session:
+    """One member of the group 225.0.0.<cid>; a context manager.
+
+    Datagrams of the session itself are dropped, as libcluon does. Bytes of others that are no frame are
+    counted in `garbage`. Raises SessionError for a cid outside 1 to 254 and where there is no route for multicast.
+    """
+
+    def __init__(self, cid: int, messages: MessageSet | None = None) -> None:
+        if cid not in CIDS:
+            raise SessionError(f"a session's cid is 1 to 254, not {cid}")
+        self.cid = cid
+        self.messages = messages or MessageSet.standard()
+        self.garbage = 0
+        group = (f"225.0.0.{cid}", PORT)
+        try:
+            self._receiver = _receiver(group)
+            self._sender = _sender(group, self._receiver)
+        except OSError as error:
+            raise SessionError(f"the bus {group[0]}:{PORT} cannot be joined: {error.strerror}") from None
+        self._own_address = self._sender.getsockname()
+        self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
+        self._view = memoryview(self._buffer)
+        self._poll = select.poll()
+        self._poll.register(self._receiver, select.POLLIN)
+
+    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> None:
+        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now).
+
+        Raises MessageError, FrameError or SessionError.
+        """
+        now = time.time_ns() // 1000
+        self.send_envelope(
+            Envelope(
+                self.messages.id(message),
+                self.messages.encode(message),
+                now,
+                0,
+                now if sample_time is None else sample_time,
+                sender_stamp,
+            )
+        )
+
+    def send_envelope(self, envelope: Envelope) -> None:
+        """Send an envelope as it is; raises FrameError, and SessionError above 65,507 bytes."""
+        frame = encode_frame(envelope)
+        if len(frame) > MAX_DATAGRAM_BYTES:
+            raise SessionError(
+                f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
+            )
+        try:
+            self._sender.send(frame)
+        except OSError as error:
+            raise SessionError(f"the bus does not take a message: {error.strerror}") from None
+
+    def receive(self, timeout: float | None = 0.0) -> Envelope | None:
+        """The next envelope of another member, with `received` set; None when `timeout` seconds are over.
+
+        `None` waits without end. A signal whose handler returns does not end the wait.
+        """
+        deadline = None if timeout is None else time.monotonic() + timeout
+        for dropped in itertools.count():
+            try:
+                envelope = self._next()
+            except BlockingIOError:
+                if not self._wait(deadline):
+                    return None
+            else:
+                if envelope is not None:
+                    return envelope
+            if dropped > MAX_DROPPED and deadline is not None and time.monotonic() > deadline:
+                return None
+        raise AssertionError
+
+    def fileno(self) -> int:
+        """The file descriptor to select on for reading."""
+        return self._receiver.fileno()
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._receiver.close()
+        self._sender.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _next(self) -> Envelope | None:
+        size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], 64)
+        if address == self._own_address:
+            return None
+        received = time.time_ns() // 1000
+        for _, kind, data in ancillary:
+            if kind == _SO_TIMESTAMPNS and len(data) >= _TIMESPEC.size:
+                seconds, nanoseconds = _TIMESPEC.unpack_from(data)
+                received = seconds * 1_000_000 + nanoseconds // 1000
+        try:
+            return decode_frame(bytes(self._view[:size]))._replace(received=received)
+        except FrameError:
+            self.garbage += 1
+            return None
+
+    def _wait(self, deadline: float | None) -> bool:
+        if deadline is None:
+            return bool(self._poll.poll())
+        left = deadline - time.monotonic()
+        return left > 0 and bool(self._poll.poll(left * 1000))
+
+
+def _sender(group: tuple[str, int], receiver: socket.socket) -> socket.socket:
+    """Connected, so that the address its datagrams carry is known; time to live 1, loop on."""
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        sender.connect(group)
+    except OSError:
+        receiver.close()
+        sender.close()
+        raise
+    return sender
+
+
+def _receiver(group: tuple[str, int]) -> socket.socket:
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        receiver.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        receiver.bind(group)
+        membership = socket.inet_aton(group[0]) + socket.inet_aton("0.0.0.0")  # noqa: S104
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        receiver.setblocking(False)
+    except OSError:
+        receiver.close()
+        raise
+    return receiver
