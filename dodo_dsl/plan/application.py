@@ -36,14 +36,21 @@ def read_application(path: Path) -> tuple[ApplicationSource | None, list[Diagnos
         return None, found
     spans = {name: entry.key for name, entry in services.entries.items()}
     problems = [p for name, entry in services.entries.items() for p in _problems(name, entry.value, entry.key)]
-    if not any(_takes_cid(entry.value) for entry in services.entries.values()):
-        message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so each test runs with the one built in"
-        first = next(iter(spans.values()))
-        problems.append(Diagnostic(first, "application-cid", message, "add --cid=111 to its command", "warning"))
+    if not has_errors(problems):
+        problems.extend(_without_cid(services))
     found = [*found, *problems]
     if has_errors(found):
         return None, found
     return ApplicationSource(path.resolve(), plain(node), spans), found
+
+
+def _without_cid(services: Mapping) -> list[Diagnostic]:
+    """A warning when no service can be told which CID to use."""
+    if any(_takes_cid(entry.value) for entry in services.entries.values()):
+        return []
+    first = next(iter(services.entries.values())).key
+    message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so each test runs with the one built in"
+    return [Diagnostic(first, "application-cid", message, "add --cid=111 to its command", "warning")]
 
 
 def _problems(name: str, node: Node, key: Span) -> list[Diagnostic]:

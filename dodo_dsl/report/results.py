@@ -40,4 +40,5 @@ def load(path: Path) -> list[Outcome]:
 
 
 def _outcome(test: dict[str, Any]) -> Outcome:
-    return Outcome(**{k: tuple(v) if isinstance(v, list) else v for k, v in test.items()})
+    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in test.items()}
+    return Outcome(**values)

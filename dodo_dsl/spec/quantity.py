@@ -57,7 +57,7 @@ def convert(value: object, unit: str) -> Decimal:
     if not match:
         raise QuantityError(f"'{text}' is not a quantity in {unit}", _example("1", unit))
     if match["unit"] is None:
-        raise QuantityError(f"'{text}' has no unit, expected one of {unit}", _example(text.strip(), unit))
+        raise QuantityError(f"'{text}' has no unit, expected a {_DIMENSION[unit]} in {unit}", _example(text, unit))
     written = match["unit"]
     if written not in _DIMENSION:
         siblings = _FACTORS[_DIMENSION[unit]]

@@ -1,0 +1,44 @@
+# The developer's front door. `make demo` and `make test` set up what they need.
+DODO := .venv/bin/dodo
+
+.PHONY: help demo test lint bench format goldens clean
+
+help:
+	@echo "make demo     set up, then run the shipped tests with the example application"
+	@echo "make test     set up, then every check: format, lint, types, imports, tests"
+	@echo "make bench    measure, beside a peer in the same run"
+	@echo "make format   format the sources"
+	@echo "make goldens  write the expected output of the compiler's tests again"
+	@echo "make clean    remove what was built"
+
+demo:
+	@scripts/setup
+	$(DODO) compile
+	$(DODO) run
+
+lint:
+	@scripts/setup dev
+	.venv/bin/ruff format --check .
+	.venv/bin/ruff check .
+	.venv/bin/mypy
+	PYTHONPATH=. .venv/bin/lint-imports
+
+test: lint
+	@scripts/install-compose
+	.venv/bin/pytest
+
+bench:
+	@scripts/setup dev
+	@for script in benchmarks/bench_*.py; do .venv/bin/python $$script || exit 1; done
+
+format:
+	@scripts/setup dev
+	.venv/bin/ruff check --fix .
+	.venv/bin/ruff format .
+
+goldens:
+	@scripts/setup dev
+	.venv/bin/pytest -q tests/compiler --update-goldens
+
+clean:
+	rm -rf .venv build dist generated dodo-report .pytest_cache .mypy_cache .ruff_cache .hypothesis

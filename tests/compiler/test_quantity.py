@@ -1,0 +1,72 @@
+"""Quantities convert decimally, and say what is wrong with the others."""
+
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.spec.quantity import UNITS, QuantityError, convert, decimal_text
+
+CASES = [
+    ("10 Hz", "Hz", "10"),
+    ("9.5 cm", "m", "0.095"),
+    ("9.5cm", "m", "0.095"),
+    ("48.8 deg", "deg", "48.8"),
+    ("180 deg", "rad", "3.14159265358979"),
+    ("3.14159265358979323846 rad", "deg", "180"),
+    ("36 km/h", "m/s", "10"),
+    ("1.5 min", "s", "90"),
+    ("-1e-3 m", "m", "-0.001"),
+    ("100 ms", "s", "0.1"),
+    ("50 %", "1", "0.5"),
+    ("0.1 m", "mm", "100"),
+]
+
+
+@pytest.mark.parametrize(("written", "unit", "expected"), CASES)
+def test_converts(written: str, unit: str, expected: str) -> None:
+    assert decimal_text(convert(written, unit)) == expected
+
+
+REFUSED = [
+    (10, "Hz", "'10' has no unit, expected a frequency in Hz"),
+    ("10", "Hz", "'10' has no unit, expected a frequency in Hz"),
+    ("10 cm", "Hz", "'10 cm' is a length, expected a frequency in Hz"),
+    ("10 hz", "Hz", "unknown unit 'hz'"),
+    ("ten Hz", "Hz", "'ten Hz' is not a quantity in Hz"),
+    ("1 2 m", "m", "'1 2 m' is not a quantity in m"),
+    ("", "m", "'' is not a quantity in m"),
+    (True, "m", "expected a quantity in m"),
+    ([1], "m", "expected a quantity in m"),
+    ("nan m", "m", "'nan m' is not a quantity in m"),
+    ("1" * 41 + " m", "m", f"'{'1' * 41} m' is not a quantity in m"),
+]
+
+
+@pytest.mark.parametrize(("written", "unit", "message"), REFUSED)
+def test_refuses(written: object, unit: str, message: str) -> None:
+    with pytest.raises(QuantityError) as error:
+        convert(written, unit)
+    assert str(error.value) == message
+
+
+@given(st.decimals(-1_000_000, 1_000_000, places=6), st.sampled_from(UNITS))
+def test_own_unit_is_exact(number: Decimal, unit: str) -> None:
+    assert convert(f"{number:f} {unit}", unit) == number
+
+
+@given(st.text(max_size=30), st.sampled_from(UNITS))
+def test_any_text_converts_or_is_refused(text: str, unit: str) -> None:
+    try:
+        assert convert(text, unit).is_finite()
+    except QuantityError as error:
+        assert str(error)
+
+
+@given(st.decimals(-1000, 1000, places=9))
+def test_text_of_a_number_is_plain(number: Decimal) -> None:
+    text = decimal_text(number)
+    assert Decimal(text) == number
+    assert "e" not in text.lower()
+    assert not (text.endswith("0") and "." in text)

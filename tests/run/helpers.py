@@ -1,0 +1,105 @@
+"""Plans of small scripts: real processes in real sandboxes, without a camera or a car."""
+
+import asyncio
+import textwrap
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Application, ApplicationService, Plan, Service
+from dodo_dsl.run.runner import Job, Runner
+
+READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
+PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'
+FAIL = 'print(\'{"dodo": "verdict", "outcome": "failed", "reason": "hit wall left", "checks": []}\', flush=True)\n'
+WAIT = "import time; time.sleep(600)\n"
+CIDS = range(200, 230)
+
+
+@dataclass
+class Recorded:
+    """A Progress that remembers what it was told."""
+
+    notes: list[str] = field(default_factory=list)
+    phases: list[tuple[str, str]] = field(default_factory=list)
+
+    def __enter__(self) -> "Recorded":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+    def phase(self, slug: str, text: str) -> None:
+        self.phases.append((slug, text))
+
+    def done(self, outcome: Outcome) -> None:
+        self.phases.append((outcome.slug, outcome.outcome))
+
+
+@dataclass
+class Bench:
+    """A folder in which tests are made of scripts and run."""
+
+    folder: Path
+    isolation: str | None = None
+    progress: Recorded = field(default_factory=Recorded)
+
+    def script(self, name: str, text: str) -> tuple[str, ...]:
+        path = self.folder / f"{name}.py"
+        path.write_text(textwrap.dedent(text))
+        return ("python", str(path))
+
+    def plan(
+        self,
+        judge: str = READY + "time.sleep(0.3)\n" + PASS,
+        application: str = WAIT,
+        environment: str = READY + WAIT,
+        slug: str = "test",
+        timeout_s: float = 10.0,
+        command: tuple[str, ...] = ("--cid=111", "--name=video0.argb"),
+    ) -> Plan:
+        """One service a layer; the application is in its own, and takes CID and memory by default."""
+        prefix = "import os, sys, time\n"
+        services = (
+            Service("environment", "camera", "x", "x", self.script(f"{slug}-camera", prefix + environment)),
+            Service("evaluation", "judge", "x", "x", self.script(f"{slug}-judge", prefix + judge), judge=True),
+        )
+        app = ApplicationService(
+            "app",
+            self.script(f"{slug}-app", prefix + application),
+            command,
+            takes_cid=any("--cid" in w for w in command),
+            takes_memory=any("--name" in w for w in command),
+        )
+        return Plan(
+            name=slug,
+            slug=slug,
+            spec=f"{slug}/{slug}.dodo.yml",
+            description="",
+            level="sil",
+            kind="closed-loop",
+            timeout_s=timeout_s,
+            clock="realtime",
+            isolation="network",
+            seed=0,
+            cid=CIDS[0],
+            subnet="",
+            tag="sil",
+            sandbox_image="x",
+            services=services,
+            application=Application(".", (app,)),
+        )
+
+    def jobs(self, *plans: Plan) -> list[Job]:
+        (self.folder / "compiled").mkdir(exist_ok=True)
+        return [Job(plan, self.folder / "compiled", self.folder / "report" / plan.slug) for plan in plans]
+
+    def run(self, *plans: Plan, parallel: int = 4) -> list[Outcome]:
+        jobs = self.jobs(*plans)
+        return asyncio.run(Runner(self.progress, CIDS, parallel, keep=False, isolation=self.isolation).run(jobs))
+
+    def log(self, plan: Plan, name: str) -> str:
+        return (self.folder / "report" / plan.slug / "logs" / f"{name}.log").read_text()
