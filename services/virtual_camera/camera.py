@@ -1,0 +1,131 @@
+"""Where the camera is and how it maps the world to pixels: poses, the pinhole, its frustum.
+
+Frames of reference: world (z up); body (x forward, y left, z up); camera (x right, y down, z forward).
+Picture coordinates count pixels from the upper left corner and are whole at pixel *centres*: the
+picture spans -0.5 to width - 0.5.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+NEAR = 0.01
+"""Nothing closer to the camera than this is drawn, in m along the optical axis."""
+
+
+def euler_rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """The right-handed rotation Rz(yaw) Ry(pitch) Rx(roll), body to parent, angles in rad."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def quaternion_rotation(x: float, y: float, z: float, w: float) -> Array:
+    """The rotation of a quaternion of any length; ValueError when it has none or is not finite."""
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    if not math.isfinite(length) or length < 1e-6:
+        raise ValueError(f"quaternion ({x}, {y}, {z}, {w}) is no rotation")
+    x, y, z, w = x / length, y / length, z / length, w / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A body in its parent frame: ``position`` (3,) in m, ``rotation`` (3, 3) body to parent."""
+
+    position: Array
+    rotation: Array
+
+    @classmethod
+    def at(cls, x: float, y: float, z: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Self:
+        """From a position in m and right-handed angles in rad (a positive pitch looks down)."""
+        return cls(np.array([x, y, z], dtype=np.float64), euler_rotation(roll, pitch, yaw))
+
+    def carrying(self, mounted: "Pose") -> "Pose":
+        """The pose, in this pose's parent frame, of something mounted on this body."""
+        position = self.position + self.rotation @ mounted.position
+        return Pose(position, self.rotation @ mounted.rotation)
+
+
+class Pinhole:
+    """An ideal camera of square pixels: u = f x/z + (width - 1)/2, v = f y/z + (height - 1)/2."""
+
+    def __init__(self, width: int, height: int, fovy: float) -> None:
+        """Size in pixels, vertical field of view in rad: f = height / 2 / tan(fovy / 2)."""
+        if width < 1 or height < 1:
+            raise ValueError(f"a picture of {width} x {height} pixels cannot be drawn")
+        if not 0.0 < fovy < math.pi:
+            raise ValueError(f"fovy must lie between 0 and 180 degrees, not {math.degrees(fovy):g}")
+        self.width, self.height = width, height
+        self.focal = height / 2 / math.tan(fovy / 2)
+        self.centre = np.array([(width - 1) / 2, (height - 1) / 2])
+        f = self.focal
+        self.matrix = np.array([[f, 0.0, self.centre[0]], [0.0, f, self.centre[1]], [0.0, 0.0, 1.0]])
+        sides = np.array([[f, 0.0, width / 2], [-f, 0.0, width / 2], [0.0, f, height / 2], [0.0, -f, height / 2]])
+        self.sides = sides / np.linalg.norm(sides, axis=1, keepdims=True)
+        """Unit normals, pointing inwards, of the four planes through the camera and the picture's edges."""
+
+    def project(self, points: Array) -> Array:
+        """Picture coordinates (..., 2) of points (..., 3) in the camera frame, all with z > 0."""
+        return np.asarray(points[..., :2] * (self.focal / points[..., 2:]) + self.centre, np.float64)
+
+    def view(self, pose: Pose) -> "View":
+        right, down, forward = -pose.rotation[:, 1], -pose.rotation[:, 2], pose.rotation[:, 0]
+        return View(self, pose.position, np.stack([right, down, forward]))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera at a place: ``position`` (3,) in the world, ``axes`` (3, 3) world to camera frame."""
+
+    camera: Pinhole
+    position: Array
+    axes: Array
+
+    def to_camera(self, points: Array) -> Array:
+        """Camera coordinates (..., 3) of world points (..., 3)."""
+        return (points - self.position) @ self.axes.T
+
+    def visible_part(self, polygon: Array) -> Array:
+        """What of a convex polygon (k, 3), in the camera frame, lies inside the frustum; maybe empty."""
+        polygon = clip(polygon, np.array([0.0, 0.0, 1.0]), -NEAR)
+        for side in self.camera.sides:
+            polygon = clip(polygon, side, 0.0)
+        return polygon
+
+
+def clip(polygon: Array, normal: Array, offset: float) -> Array:
+    """The part of a convex polygon (k, d) where ``normal . p + offset >= 0`` (Sutherland and Hodgman)."""
+    if not len(polygon):
+        return polygon
+    distances: list[float] = (polygon @ normal + offset).tolist()
+    if min(distances) >= 0.0:
+        return polygon
+    if max(distances) < 0.0:
+        return polygon[:0]
+    kept: list[list[float]] = []
+    last, was = polygon[-1].tolist(), distances[-1]
+    for point, now in zip(polygon.tolist(), distances, strict=True):
+        if (was >= 0.0) != (now >= 0.0):
+            t = was / (was - now)
+            kept.append([a + t * (b - a) for a, b in zip(last, point, strict=True)])
+        if now >= 0.0:
+            kept.append(point)
+        last, was = point, now
+    return np.array(kept)

@@ -1,0 +1,80 @@
+"""A map loaded for drawing: shapes and where they stand, flat faces, colours of sky and ground."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from services.virtual_camera.camera import Array
+from services.virtual_camera.faces import Covering, Face, TextureMap, box_faces
+from services.virtual_camera.mapfile import BlockEntry, ModelEntry, Vector3, read_map
+from services.virtual_camera.meshes import load_obj
+from services.virtual_camera.raster import Colour
+from services.virtual_camera.shape import Shape, make_shape
+from services.virtual_camera.textures import Texture, default_ground, load_picture
+
+SKY: Colour = (206.0, 190.0, 176.0, 255.0)
+GROUND: Colour = (112.0, 114.0, 116.0, 255.0)
+_GROUND_REACH = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """Copies of one shape: ``positions`` (n, 3) in m, ``turns`` (n,) in rad counter-clockwise about z."""
+
+    shape: Shape
+    colour: Array
+    """Blue, green, red from 0 to 255."""
+    positions: Array
+    turns: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All that can be seen, in the world frame; ``sky`` and ``ground`` are what is behind the faces."""
+
+    crowds: tuple[Crowd, ...]
+    faces: tuple[Face, ...]
+    sky: Colour = SKY
+    ground: Colour = GROUND
+
+
+def _bgr(colour: Vector3) -> Array:
+    return np.array(colour[::-1]) * 255.0
+
+
+def _crowd(entry: ModelEntry) -> Crowd:
+    paint = entry.paint
+    colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
+    positions = np.array([instance.position for instance in entry.instances])
+    turns = np.array([math.pi - instance.angle for instance in entry.instances])
+    return Crowd(make_shape(*load_obj(entry.file)), colour, positions, turns)
+
+
+def _cover(entry: BlockEntry) -> Colour | Covering:
+    if not isinstance(entry.paint, Path):
+        return (*_bgr(entry.paint).tolist(), 255.0)
+    tile = entry.tile
+    repeats = math.ceil(max(entry.dimension) / min(tile)) if tile else 1
+    return Covering(Texture(load_picture(entry.paint), repeats), tile)
+
+
+def _default_floor() -> Face:
+    """What a map without blocks stands on: a large patterned square at z = 0."""
+    r = _GROUND_REACH
+    points = np.array([[-r, -r, 0.0], [r, -r, 0.0], [r, r, 0.0], [-r, r, 0.0]])
+    lie = TextureMap(Texture(default_ground()), np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    return Face(points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
+
+
+def _block_faces(entry: BlockEntry) -> list[Face]:
+    cover = _cover(entry)
+    return [face for i in entry.instances for face in box_faces(entry.dimension, i, cover)]
+
+
+def load_scene(path: Path) -> Scene:
+    """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
+    entries = read_map(path)
+    faces = [face for block in entries.blocks for face in _block_faces(block)]
+    return Scene(tuple(map(_crowd, entries.models)), tuple(faces or [_default_floor()]))
