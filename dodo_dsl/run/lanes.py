@@ -10,6 +10,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from dodo_dsl.run.process import Lane
 PROBE_S = 0.3
 LANE = re.compile(r"dodo-[0-9a-f]{8}-")
 _PORT = 12175
+_KILL_S = 2.0
 
 
 def namespaces_refusal() -> str:
@@ -69,6 +71,8 @@ async def host_lane(
     finally:
         for held_lease in reversed(held):
             held_lease.leave() if keep else held_lease.release()
+        if not keep:
+            remove_memories(name)
 
 
 def listen(cid: int, seconds: float = PROBE_S) -> str:
@@ -105,21 +109,26 @@ def reap() -> list[str]:
 
 def _kill_lane(lane: str) -> int:
     """Ends the processes whose environment names the lane."""
-    mark, killed = f"DODO_LANE={lane}\0".encode(), 0
+    mark = f"DODO_LANE={lane}\0".encode()
+    killed: list[Path] = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
             with contextlib.suppress(OSError):
                 if mark in (entry / "environ").read_bytes() + b"\0":
                     os.kill(int(entry.name), signal.SIGKILL)
-                    killed += 1
-    return killed
+                    killed.append(entry)
+    deadline = time.monotonic() + _KILL_S
+    while any((entry / "exe").exists() for entry in killed) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return len(killed)
 
 
 def remove_memories(prefix: str) -> int:
-    """Removes shared memories by the prefix of their token files, with their semaphores."""
-    from dodo_dsl.opendlv.memory import remove
+    """Removes shared memories by the prefix of their names, with their semaphores; says how many there were."""
+    from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
 
     tokens = [p for p in Path("/tmp").glob(f"{prefix}*") if p.is_file() and not p.is_symlink()]
     for token in tokens:
-        remove(token.name)
+        with contextlib.suppress(SharedMemoryError):
+            SharedMemory.create(token.name, 1).close()  # a creator removes what a dead one left
     return len(tokens)

@@ -33,6 +33,11 @@ class Output:
     def tail(self) -> list[str]:
         return [line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in self._tail]
 
+    def hand_over(self) -> tuple[int, int]:
+        """Stops reading; the descriptors of the pipe and of the log are for whoever goes on."""
+        asyncio.get_running_loop().remove_reader(self._reader)
+        return self._reader, self._log.fileno()
+
     def close(self) -> None:
         if not self.done.is_set():
             self._finish()

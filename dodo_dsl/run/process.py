@@ -72,11 +72,14 @@ class ProcessBackend:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
         self._channel, self._up = ours, loop.create_future()
-        with theirs:
+        self.report.mkdir(parents=True, exist_ok=True)
+        with theirs, (self.report / "sandbox.log").open("wb") as stderr:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), self.isolation],
                 pass_fds=(theirs.fileno(), *self.lane.descriptors),
                 stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=stderr,
                 start_new_session=True,
                 env={**os.environ, "PYTHONPATH": _package_path(), "DODO_LANE": self.lane.name},
             )
@@ -217,6 +220,9 @@ class ProcessBackend:
         self._channel.close()
         for output in self._outputs.values():
             output.close()
+        log = self.report / "sandbox.log"
+        if log.stat().st_size == 0:
+            log.unlink()
         return []
 
     @staticmethod
@@ -229,7 +235,8 @@ class ProcessBackend:
 
     def _kept(self) -> list[str]:
         assert self._process is not None
-        self._send({"do": "keep"})
+        outputs = [output.hand_over() for output in self._outputs.values() if not output.done.is_set()]
+        self._send({"do": "keep"}, (*(reader for reader, _ in outputs), *(log for _, log in outputs)))
         pid = self._process.pid
         look = f"ps -s {pid} -f" if self.isolation == "host" else f"nsenter -t {pid} -n -i -m bash"
         memory = f", shared memory '{self.lane.memory_prefix}*'" if self.lane.memory_prefix else ""

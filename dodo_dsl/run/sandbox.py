@@ -4,7 +4,7 @@ It is process 1 of namespaces of its own (``network``), or their parent on the h
 over a socket; when that closes, whatever closed it, the sandbox ends everything that it started, and itself.
 
     runner to sandbox   {"do": "start", "id", "argv", "env", "cwd"} with the output's descriptor; {"do": "close"};
-                        {"do": "send", "cid", "data"}; {"do": "keep"}
+                        {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why}; {"unstartable": id, "why"}; {"exited": id, "code"}
 """
 
@@ -24,6 +24,7 @@ from typing import Any
 from dodo_dsl.run import namespaces
 
 MAX_MESSAGE = 1 << 17
+MAX_DESCRIPTORS = 250
 GRACE_S = 3.0
 _PORT = 12175
 
@@ -37,6 +38,7 @@ class Sandbox:
         self.children: dict[str, subprocess.Popen[bytes]] = {}
         self.keep = False
         self.ended = False
+        self.pumps: dict[int, int] = {}
         self.wakeup, writer = os.pipe()
         os.set_blocking(self.wakeup, False)
         os.set_blocking(writer, False)
@@ -57,10 +59,12 @@ class Sandbox:
         """Serves the runner until it closes the channel, then ends every process."""
         sources: list[socket.socket | int] = [self.channel, self.wakeup]
         while not self.ended:
-            readable, _, _ = select.select(sources, [], [])
+            readable, _, _ = select.select([*sources, *self.pumps], [], [])
             if self.wakeup in readable:
                 self._drain_wakeup()
             self._reap()
+            for output in self.pumps.keys() & set(readable):
+                self._pump(output)
             if self.channel in readable and not self._serve():
                 if not self.keep:
                     break
@@ -74,7 +78,7 @@ class Sandbox:
     def _serve(self) -> bool:
         """Carries out one message; False when the runner has gone."""
         try:
-            data, descriptors, _, _ = socket.recv_fds(self.channel, MAX_MESSAGE, 4)
+            data, descriptors, _, _ = socket.recv_fds(self.channel, MAX_MESSAGE, MAX_DESCRIPTORS)
         except OSError:
             return False
         if not data:
@@ -106,8 +110,20 @@ class Sandbox:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
             sender.sendto(bytes.fromhex(data), (f"225.0.0.{cid}", _PORT))
 
-    def _do_keep(self, _descriptors: list[int]) -> None:
+    def _do_keep(self, descriptors: list[int]) -> None:
+        """Stays when the runner goes, and writes the services' output into their logs in its place."""
         self.keep = True
+        copies = [os.dup(descriptor) for descriptor in descriptors]
+        half = len(copies) // 2
+        self.pumps = dict(zip(copies[:half], copies[half:], strict=True))
+
+    def _pump(self, output: int) -> None:
+        data = os.read(output, 1 << 16)
+        if data:
+            os.write(self.pumps[output], data)
+        else:
+            os.close(output)
+            os.close(self.pumps.pop(output))
 
     def _do_close(self, _descriptors: list[int]) -> None:
         self.ended = True

@@ -45,7 +45,7 @@ def locate(paths: Iterable[Path], registries: Sequence[Path]) -> tuple[list[Loca
             known = [r for r in roots if path.is_relative_to(r)]
             specs = list(_specs_below(path, known[0] if known else path))
         else:
-            specs = [Location(path, _root_of(path, roots))] if path.name.endswith(SUFFIX) else []
+            specs = [Location(path, _root_of(path, roots))] if path.is_file() and path.name.endswith(SUFFIX) else []
         found.update((s.path, s) for s in specs)
         if not specs and path not in roots:
             empty.append(path)

@@ -93,7 +93,7 @@ REFUSED = {
     "a: 1\n": "application-file",
     "- a\n": "application-file",
     "services: {a: 3}\n": "application-file",
-    "services: {a: {command: \"--cid=1 'open\"}}\n": "application-file",
+    'services: {a: {command: "--cid=1 \'open"}}\n': "application-file",
     "services: {a: {command: --cid=1, x-dodo-process: python x.py}}\n": "application-file",
     "services: {sandbox: {command: --cid=1}}\n": "application-file",
     "services: {a: {image: x}}\n": "application-cid",
@@ -111,6 +111,10 @@ def test_refused(tmp_path: Path, text: str) -> None:
 def test_flags_in_words() -> None:
     words = ("--cid", "111", "--cid=3", "--name=/video0.argb", "--name.i420=video0.i420", "--named=x", "cid=4")
     assert argv.with_cid(words, 150) == ("--cid", "150", "--cid=150", *words[3:])
-    assert argv.with_memory_prefix(words, "p-")[3:] == ("--name=/p-video0.argb", "--name.i420=p-video0.i420", *words[5:])
+    assert argv.with_memory_prefix(words, "p-")[3:] == (
+        "--name=/p-video0.argb",
+        "--name.i420=p-video0.i420",
+        *words[5:],
+    )
     shell = ("sh", "-c", "run --cid=111 --verbose")
     assert argv.with_cid(shell, 150) == ("sh", "-c", "run --cid=150 --verbose")

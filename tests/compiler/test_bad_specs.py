@@ -31,4 +31,4 @@ def test_diagnostics(case: str, monkeypatch: pytest.MonkeyPatch, update_goldens:
 
 
 def test_every_expectation_has_its_spec() -> None:
-    assert CASES == sorted(p.stem for p in FOLDER.glob("*.out"))
+    assert sorted(p.stem for p in FOLDER.glob("*.out")) == CASES

@@ -14,9 +14,8 @@ from tests.run.helpers import FAIL, PASS, READY, WAIT, Bench
 @pytest.fixture(params=["network", "host"])
 def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    if request.param == "network":
-        if why := namespaces_refusal():
-            pytest.skip(f"no namespaces here: {why}")
+    if request.param == "network" and (why := namespaces_refusal()):
+        pytest.skip(f"no namespaces here: {why}")
     return Bench(tmp_path, request.param)
 
 

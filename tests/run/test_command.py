@@ -1,0 +1,229 @@
+"""``dodo run`` as users meet it: a real command on compiled tests of small scripts."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import jsonschema
+import pytest
+
+from dodo_dsl import data
+from dodo_dsl.plan.model import Plan, to_json
+from tests.run.helpers import FAIL, PASS, READY, WAIT, Bench
+
+ROOT = Path(__file__).parents[2]
+
+
+class Desk:
+    """Compiled tests, a report folder and a lease folder of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.bench = Bench(folder)
+        self.environment = {**os.environ, "DODO_LEASES": str(folder / "leases")}
+
+    def compiled(self, plan: Plan) -> Path:
+        target = self.folder / "generated" / plan.slug
+        target.mkdir(parents=True)
+        (target / "test.json").write_text(to_json(plan))
+        return target
+
+    def start(self, plan: Plan, *flags: str, report: str = "report") -> "subprocess.Popen[str]":
+        words = ["run", "--compiled", str(self.compiled(plan)), "--report", str(self.folder / report), *flags]
+        return subprocess.Popen(
+            [sys.executable, "-m", "dodo_dsl", *words],
+            cwd=self.folder,
+            env={**self.environment, "PYTHONPATH": str(ROOT)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def results(self, report: str = "report") -> list[dict[str, object]]:
+        document = json.loads((self.folder / report / "results.json").read_text())
+        jsonschema.validate(document, json.loads((data.schemas() / "results.schema.json").read_text()))
+        return list(document["tests"])
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    return Desk(tmp_path)
+
+
+def wait_for(process: "subprocess.Popen[str]", text: str) -> str:
+    """Reads the command's output up to a line that holds ``text``."""
+    assert process.stdout is not None
+    seen = ""
+    for line in process.stdout:
+        seen += line
+        if text in line:
+            return seen
+    raise AssertionError(f"it ended without '{text}':\n{seen}")
+
+
+def processes_with(mark: str) -> list[str]:
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            text = path.read_bytes()
+        except OSError:
+            continue
+        if mark.encode() in text:
+            found.append(path.parent.name)
+    return found
+
+
+def gone(mark: str, seconds: float = 8.0) -> bool:
+    deadline = time.monotonic() + seconds
+    while processes_with(mark):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def marks(desk: Desk) -> str:
+    """What the command lines of all services of a desk hold, and nothing else's does."""
+    return str(desk.folder / "test-")
+
+
+def test_passes_with_exit_code_0(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan())
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, out
+    assert "PASSED  test  it drove (set-up " in out
+    assert "1 passed, 0 failed, 0 in error" in out
+    (test,) = desk.results()
+    assert test["outcome"] == "passed"
+    assert [s["name"] for s in test["services"]] == ["camera", "judge", "app"]  # type: ignore[attr-defined]
+    assert (desk.folder / "report" / "test" / "logs" / "application.app.log").is_file()
+
+
+def test_fails_with_exit_code_1_and_a_junit_failure(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan(judge=READY + FAIL))
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 1, out
+    case = ElementTree.parse(desk.folder / "report" / "junit.xml").find(".//testcase")
+    assert case is not None
+    assert (case.get("classname"), case.get("name"), case.get("file")) == ("sil", "test", "test/test.dodo.yml")
+    failure = case.find("failure")
+    assert failure is not None
+    assert failure.get("message") == "hit wall left"
+    assert (desk.folder / "report" / "metrics.txt").read_text().endswith("# EOF\n")
+    assert "hit wall left" in (desk.folder / "report" / "index.html").read_text()
+
+
+def test_error_has_exit_code_3_and_is_a_junit_error(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan(judge=READY))
+    process.communicate(timeout=30)
+    assert process.returncode == 3
+    case = ElementTree.parse(desk.folder / "report" / "junit.xml").find(".//testcase")
+    assert case is not None
+    assert case.find("error") is not None
+
+
+@pytest.mark.parametrize("isolation", ["network", "host"])
+def test_interrupt_takes_everything_down_and_still_reports(desk: Desk, isolation: str) -> None:
+    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", isolation)
+    wait_for(process, "running")
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 130, out
+    assert "Traceback" not in out
+    (test,) = desk.results()
+    assert (test["outcome"], test["reason"]) == ("error", "the run was interrupted")
+    assert gone(marks(desk))
+
+
+@pytest.mark.parametrize("isolation", ["network", "host"])
+def test_killed_runner_leaves_nothing(desk: Desk, isolation: str) -> None:
+    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", isolation)
+    wait_for(process, "running")
+    process.kill()
+    process.communicate(timeout=30)
+    assert gone(marks(desk))
+
+
+def test_next_run_removes_what_a_killed_sandbox_left_on_the_host(desk: Desk) -> None:
+    """Runner and sandbox both killed: only the lease's record says what was there."""
+    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", "host")
+    wait_for(process, "running")
+    sandboxes = [pid for pid in processes_with("dodo_dsl.run.sandbox") if parent(pid) == process.pid]
+    assert len(sandboxes) == 1
+    os.kill(int(sandboxes[0]), signal.SIGSTOP)
+    process.kill()
+    os.kill(int(sandboxes[0]), signal.SIGKILL)
+    process.communicate(timeout=30)
+    assert processes_with(marks(desk))
+    second = desk.start(desk.bench.plan(slug="second"), report="second")
+    out, _ = second.communicate(timeout=30)
+    assert second.returncode == 0, out
+    assert "removed what a killed run left: test: 3 processes" in out
+    assert gone(marks(desk))
+
+
+def parent(pid: str) -> int:
+    return int(Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()[1])
+
+
+@pytest.mark.parametrize("isolation", ["network", "host"])
+def test_two_runs_at_once(desk: Desk, isolation: str) -> None:
+    plans = [desk.bench.plan(slug=f"test-{n}", judge=READY + "time.sleep(1)\n" + PASS) for n in range(2)]
+    processes = [desk.start(p, "--isolation", isolation, report=p.slug) for p in plans]
+    outs = [p.communicate(timeout=40)[0] for p in processes]
+    assert [p.returncode for p in processes] == [0, 0], outs
+    cids = [desk.results(p.slug)[0]["cid"] for p in plans]
+    if isolation == "host":
+        assert len(set(cids)) == 2
+
+
+def test_foreign_traffic_is_refused_with_its_sender(desk: Desk) -> None:
+    plan = replace(desk.bench.plan(), cid=231)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.connect(("225.0.0.231", 12175))
+        port = stranger.getsockname()[1]
+        process = desk.start(plan, "--isolation", "host")
+        while process.poll() is None:
+            stranger.send(b"\x0d\xa4\x00\x00\x00")
+            time.sleep(0.02)
+    out, _ = process.communicate()
+    assert process.returncode == 3, out
+    (test,) = desk.results()
+    assert test["outcome"] == "error"
+    assert f":{port}; end it" in str(test["reason"])
+
+
+def test_kept_test_stays_until_it_is_taken_down(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan(), "--keep")
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, out
+    assert processes_with(marks(desk))
+    (pid,) = [line.rpartition(" ")[2] for line in out.splitlines() if line.startswith("take it down: kill ")]
+    other = desk.start(desk.bench.plan(slug="other"), report="other")
+    assert other.communicate(timeout=30)[0]
+    assert processes_with(marks(desk)), "the next run takes no kept test down"
+    os.kill(int(pid), signal.SIGTERM)
+    assert gone(marks(desk))
+
+
+def test_usage_errors_are_sentences(desk: Desk) -> None:
+    for words, said in (
+        (["--compiled", "nowhere"], "there is no compiled test at 'nowhere': No such file or directory"),
+        (["no-such-test"], "there is no test 'no-such-test'"),
+        (["--application", "none.yml"], "there is no file 'none.yml', expected the application's compose file"),
+        (["a/b.dodo.yml"], "there is no test at"),
+        (["-j", "0"], "'0' is no whole number of 1 or more"),
+    ):
+        environment = {**desk.environment, "PYTHONPATH": str(ROOT)}
+        command = [sys.executable, "-m", "dodo_dsl", "run", *words]
+        result = subprocess.run(command, cwd=desk.folder, env=environment, capture_output=True, text=True, check=False)
+        assert result.returncode == 2, result
+        assert said in result.stderr
+        assert "Traceback" not in result.stderr
