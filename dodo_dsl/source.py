@@ -262,8 +262,9 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
             "a tab character indents this line",
             "YAML takes spaces only",
         )
-    context = str(getattr(error, "context", "") or "").strip()
-    return Diagnostic(span, "yaml-syntax", f"not YAML: {context + ': ' if context else ''}{problem}")
+    context, begin = getattr(error, "context", None), getattr(error, "context_mark", None)
+    where = f" {context} that begins at line {begin.line + 1}" if context and begin else ""
+    return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}{where}")
 
 
 def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:

@@ -22,7 +22,7 @@ _FACTORS: dict[str, dict[str, Decimal]] = {
     "acceleration": {"m/s2": Decimal(1), "cm/s2": Decimal("0.01")},
     "angular acceleration": {"rad/s2": Decimal(1), "deg/s2": _PI / 180},
     "share": {"1": Decimal(1), "%": Decimal("0.01")},
-    "pixels": {"px": Decimal(1)},
+    "pixel count": {"px": Decimal(1)},
     "mass": {"kg": Decimal(1), "g": Decimal("0.001")},
 }
 _DIMENSION = {unit: dimension for dimension, units in _FACTORS.items() for unit in units}
@@ -41,6 +41,10 @@ class QuantityError(ValueError):
         self.hint = hint
 
 
+def _a(noun: str) -> str:
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
 def _example(number: str, unit: str) -> str:
     return f"write for example '{number} {unit}'"
 
@@ -57,13 +61,13 @@ def convert(value: object, unit: str) -> Decimal:
     if not match:
         raise QuantityError(f"'{text}' is not a quantity in {unit}", _example("1", unit))
     if match["unit"] is None:
-        raise QuantityError(f"'{text}' has no unit, expected a {_DIMENSION[unit]} in {unit}", _example(text, unit))
+        raise QuantityError(f"'{text}' has no unit, expected {_a(_DIMENSION[unit])} in {unit}", _example(text, unit))
     written = match["unit"]
     if written not in _DIMENSION:
         siblings = _FACTORS[_DIMENSION[unit]]
         raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings))
     if _DIMENSION[written] != _DIMENSION[unit]:
-        message = f"'{text}' is a {_DIMENSION[written]}, expected a {_DIMENSION[unit]} in {unit}"
+        message = f"'{text}' is {_a(_DIMENSION[written])}, expected {_a(_DIMENSION[unit])} in {unit}"
         raise QuantityError(message, _example(match["number"], unit))
     return _converted(match["number"], written, unit)
 
