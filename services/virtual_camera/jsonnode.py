@@ -98,9 +98,9 @@ class Node:
 
     def resource(self) -> Path:
         """The file that this names; MapError when it is not there or outside the map's folder."""
-        folder = self.file.parent.resolve()
+        name, folder = self.text(), self.file.parent.resolve()
         try:
-            path = (folder / self.text()).resolve()
+            path = (folder / name).resolve()
         except (ValueError, OSError, RuntimeError):
             self.fail("the path of a file")
         if not path.is_relative_to(folder):

@@ -1,0 +1,86 @@
+"""The virtual camera: follows a vehicle's frames and draws a picture whenever one is due."""
+
+import logging
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from services.virtual_camera.camera import Pose, quaternion_rotation
+from services.virtual_camera.raster import Image
+from services.virtual_camera.render import Renderer
+
+FARTHEST = 1e6
+"""Frames farther than this from the origin, in m, are refused."""
+
+Publish = Callable[[Image, Image, int], None]
+"""Takes a picture as ARGB (height, width, 4) and as I420 (height * 3 / 2, width), and its sample time in us.
+
+Both arrays are drawn over by the next picture.
+"""
+
+
+class Frame(Protocol):
+    """The fields of ``opendlv.sim.Frame``: position in m and attitude of a body in the world."""
+
+    x: float
+    y: float
+    z: float
+    qx: float
+    qy: float
+    qz: float
+    qw: float
+
+
+def body_pose(frame: Frame) -> Pose:
+    """The pose that a frame tells; ValueError when it tells none."""
+    position = np.array([frame.x, frame.y, frame.z], dtype=np.float64)
+    if not (np.abs(position) <= FARTHEST).all():
+        raise ValueError(f"position ({frame.x}, {frame.y}, {frame.z}) is not within {FARTHEST:.0f} m")
+    return Pose(position, quaternion_rotation(frame.qx, frame.qy, frame.qz, frame.qw))
+
+
+def mount(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose:
+    """The camera on the body: offset in m, angles in degrees; a positive pitch looks up, as in OpenDLV."""
+    return Pose.at(x, y, z, math.radians(roll), -math.radians(pitch), math.radians(yaw))
+
+
+def to_i420(argb: Image, out: Image | None = None) -> Image:
+    """B, G, R, A (height, width, 4) as planes Y, U, V (height * 3 / 2, width), BT.601, Y from 16 to 235."""
+    return np.asarray(cv2.cvtColor(argb, cv2.COLOR_BGRA2YUV_I420, dst=out), np.uint8)
+
+
+class VirtualCamera:
+    """Draws from the latest frame; before the first one there is nothing to draw from and no picture."""
+
+    def __init__(self, renderer: Renderer, mounted: Pose, publish: Publish) -> None:
+        """``mounted`` is the camera in the body frame; ValueError when I420 cannot hold the picture."""
+        width, height = renderer.camera.width, renderer.camera.height
+        if width % 2 or height % 2:
+            raise ValueError(f"width and height must be even for I420, and {width} x {height} are not")
+        self._renderer, self._mounted, self._publish = renderer, mounted, publish
+        self._argb = np.empty((height, width, 4), np.uint8)
+        self._i420 = np.empty((height * 3 // 2, width), np.uint8)
+        self._body: Pose | None = None
+        self._log = logging.getLogger(__name__)
+        self.refused = 0
+        """How many frames told no pose; the camera stays where it was."""
+
+    def take_frame(self, frame: Frame, sample_time: int) -> None:
+        """The vehicle is where the frame says; ``sample_time`` in us of test time."""
+        try:
+            self._body = body_pose(frame)
+        except ValueError as error:
+            if not self.refused:
+                self._log.warning("refused the frame of %d us, the first of its kind: %s", sample_time, error)
+            self.refused += 1
+
+    def update(self, now: int) -> None:
+        """Draws and publishes one picture, sampled at ``now`` (us of test time)."""
+        if self._body is None:
+            return
+        self._renderer.render(self._body.carrying(self._mounted), self._argb)
+        to_i420(self._argb, self._i420)
+        self._publish(self._argb, self._i420, now)
