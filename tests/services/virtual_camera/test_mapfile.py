@@ -1,0 +1,157 @@
+import json
+import os
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from services.virtual_camera.jsonnode import MAX_BYTES, MapError, Node
+from services.virtual_camera.mapfile import MAX_BLOCKS, read_map
+
+GOOD_MODEL = {"name": "cube", "file": "cube.obj", "color": [1, 0, 0.5], "instances": [[1, 2, 3, 0.5]]}
+GOOD_BLOCK = {"name": "floor", "dimension": [10, 10, 0.2], "color": [0, 0, 0], "instances": [[0, 0, 0, 0]]}
+
+
+def changed(entry, **changes):
+    return {key: value for key, value in {**entry, **changes}.items() if value is not ...}
+
+
+def test_a_map_is_read_from_its_folder_or_its_file(write_map):
+    folder = write_map({"model": [GOOD_MODEL], "block": [GOOD_BLOCK], "obstacles": "not ours", "overlay": []})
+    for path in (folder, folder / "map.json"):
+        read = read_map(path)
+        (model,), (block,) = read.models, read.blocks
+        assert (model.name, model.file, model.paint) == ("cube", (folder / "cube.obj").resolve(), (1.0, 0.0, 0.5))
+        assert (model.instances[0].position, model.instances[0].angle) == ((1.0, 2.0, 3.0), 0.5)
+        assert (block.dimension, block.tile) == ((10.0, 10.0, 0.2), None)
+
+
+def test_what_stands_nowhere_is_left_out_with_its_files(write_map):
+    ghost = {"name": "kiwi", "file": "absent.obj", "textureFile": "absent.png", "frames": [0]}
+    assert read_map(write_map({"model": [ghost, changed(GOOD_MODEL, instances=[])]})).models == ()
+
+
+def test_a_real_map_is_read(shared_data, tmp_path):
+    content = json.loads(shared_data("map.json").read_text())
+    (tmp_path / "map.json").write_text(json.dumps(content))
+    for name in ("cone.obj", "floor.jpg", "ceiling.jpg", "wall.jpg"):
+        (tmp_path / name).touch()
+    read = read_map(tmp_path)
+    assert [len(m.instances) for m in read.models] == [46, 42, 2]
+    assert [(b.name, b.tile, len(b.instances)) for b in read.blocks] == [
+        ("floor", (1.0, 1.0), 1),
+        ("ceiling", (1.0, 1.0), 1),
+        ("wall", (1.0, 1.0), 4),
+    ]
+
+
+BAD_MODELS = [
+    ({"instances": [[1, 2, 3]]}, r"$.model[0].instances[0]: expected the numbers [x, y, z, angle], found [1, 2, 3]"),
+    ({"instances": [[1, 2, 3, "a"]]}, r'$.model[0].instances[0][3]: expected a number, found "a"'),
+    ({"instances": [[1, 2, 3, True]]}, "$.model[0].instances[0][3]: expected a number, found true"),
+    ({"instances": [[1, 2e9, 3, 0]]}, "$.model[0].instances[0][1]: expected a number between"),
+    ({"instances": {}}, "$.model[0].instances: expected a list, found {}"),
+    ({"color": [1, 2, 3]}, "$.model[0].color: expected the numbers [r, g, b] between 0 and 1, found [1, 2, 3]"),
+    ({"color": "red"}, '$.model[0].color: expected the numbers [r, g, b], found "red"'),
+    ({"color": ...}, "$.model[0]: 'color' or 'textureFile' is missing"),
+    ({"file": ...}, "$.model[0]: 'file' is missing"),
+    ({"file": 3}, "$.model[0].file: expected some text, found 3"),
+    ({"file": "cone.obj"}, "$.model[0].file: expected a file in "),
+    ({"file": "../cube.obj"}, "$.model[0].file: expected a file inside the map's folder"),
+    ({"file": "/etc/passwd"}, "$.model[0].file: expected a file inside the map's folder"),
+    ({"file": "a\0b"}, "$.model[0].file: expected "),
+    ({"textureFile": "no.png"}, "$.model[0].textureFile: expected a file in "),
+    ({"name": ...}, "$.model[0]: 'name' is missing"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), BAD_MODELS)
+def test_a_bad_model_is_told_with_its_place(write_map, change, message):
+    folder = write_map({"model": [changed(GOOD_MODEL, **change)]})
+    with pytest.raises(MapError, match=re.escape(f"{folder / 'map.json'}: {message}")):
+        read_map(folder)
+
+
+BAD_BLOCKS = [
+    ({"dimension": [1, 0, 1]}, "$.block[0].dimension: expected the numbers [x, y, z], all greater than 0"),
+    ({"dimension": ...}, "$.block[0]: 'dimension' is missing"),
+    ({"textureSize": [1]}, "$.block[0].textureSize: expected the numbers [width, height], found [1]"),
+    ({"color": ...}, "$.block[0]: 'color' or 'textureFile' is missing"),
+    ({"instances": [[0, 0, 0, 0]] * (MAX_BLOCKS + 1)}, "501 instances of blocks are more than the 500"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), BAD_BLOCKS)
+def test_a_bad_block_is_told_with_its_place(write_map, change, message):
+    folder = write_map({"block": [changed(GOOD_BLOCK, **change)]})
+    with pytest.raises(MapError, match=re.escape(message)):
+        read_map(folder)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", r"map\.json:1:2: this is not JSON"),
+        ("[]", r"map\.json: \$: expected an object, found \[\]"),
+        ('{"model": 1}', r"\$\.model: expected a list, found 1"),
+        ('{"model": [null]}', r"\$\.model\[0\]: expected an object, found null"),
+        ('{"model": [{"instances": [[NaN, 0, 0, 0]]}]}', r"instances\[0\]\[0\]: expected a number between"),
+        ("[" * 100_000, "nested too deeply"),
+    ],
+)
+def test_what_is_no_map_is_told(write_map, text, message):
+    with pytest.raises(MapError, match=message):
+        read_map(write_map(text))
+
+
+def test_too_many_instances_are_refused(write_map):
+    folder = write_map({"model": [changed(GOOD_MODEL, instances=[[0, 0, 0, 0]] * 100_001)]})
+    with pytest.raises(MapError, match="100001 instances of models are more than the 100000"):
+        read_map(folder)
+
+
+def test_absent_odd_and_huge_files_are_refused(tmp_path):
+    with pytest.raises(MapError, match=r"map\.json: there is no such file"):
+        read_map(tmp_path)
+    os.mkfifo(tmp_path / "map.json")
+    with pytest.raises(MapError, match="not a regular file"):
+        read_map(tmp_path)
+    (tmp_path / "huge.json").touch()
+    os.truncate(tmp_path / "huge.json", MAX_BYTES + 1)
+    with pytest.raises(MapError, match="67108865 bytes, more than the 67108864"):
+        read_map(tmp_path / "huge.json")
+    (tmp_path / "latin.json").write_bytes(b'{"name": "\xe5"}')
+    with pytest.raises(MapError, match="byte 10 is not UTF-8"):
+        read_map(tmp_path / "latin.json")
+
+
+def test_a_link_that_leads_out_of_the_folder_is_refused(write_map):
+    folder = write_map({"model": [changed(GOOD_MODEL, file="link.obj")]})
+    (folder / "link.obj").symlink_to("/etc/passwd")
+    with pytest.raises(MapError, match="inside the map's folder"):
+        read_map(folder)
+
+
+values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text("ab./\0é", max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from([*GOOD_BLOCK, "file"]), inner),
+    max_leaves=12,
+)
+
+
+@settings(deadline=None)
+@given(st.dictionaries(st.sampled_from(["model", "block"]), st.lists(values, max_size=2)))
+def test_whatever_stands_in_a_map_is_read_or_refused(tmp_path_factory, content):
+    folder = tmp_path_factory.getbasetemp() / "any"
+    folder.mkdir(exist_ok=True)
+    (folder / "map.json").write_text(json.dumps(content))
+    try:
+        read_map(folder)
+    except MapError as error:
+        assert str(folder / "map.json") in str(error)
+
+
+def test_long_values_are_shortened_in_messages(tmp_path):
+    with pytest.raises(MapError, match=r"found \[0, 0, .{0,60}\.\.\.$"):
+        Node(tmp_path, "$", [0] * 1000).text()

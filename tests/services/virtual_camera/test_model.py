@@ -1,0 +1,98 @@
+import logging
+import math
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+
+from services.virtual_camera.camera import Pose
+from services.virtual_camera.model import VirtualCamera, mount, to_i420
+from services.virtual_camera.render import Renderer
+from services.virtual_camera.scene import load_scene
+
+
+def frame(x=0.0, y=0.0, z=0.0, yaw=0.0, **changes):
+    fields = {"x": x, "y": y, "z": z, "qx": 0.0, "qy": 0.0, "qz": math.sin(yaw / 2), "qw": math.cos(yaw / 2)}
+    return SimpleNamespace(**{**fields, **changes})
+
+
+class Pictures(list):
+    """Keeps what is published."""
+
+    def __call__(self, argb, i420, sample_time):
+        self.append((argb.copy(), i420.copy(), sample_time))
+
+
+@pytest.fixture
+def renderer(cube_at):
+    return Renderer(load_scene(cube_at([3, 0.2, 0, 0.3])), 64, 48, 1.0)
+
+
+@pytest.fixture
+def pictures():
+    return Pictures()
+
+
+def test_without_a_frame_there_is_no_picture(renderer, pictures):
+    VirtualCamera(renderer, mount(0, 0, 0.1, 0, 0, 0), pictures).update(1)
+    assert pictures == []
+
+
+def test_a_picture_shows_the_latest_frame_and_bears_the_time_of_the_update(renderer, pictures):
+    camera = VirtualCamera(renderer, mount(0.1, -0.05, 0.3, 2.0, -5.0, 10.0), pictures)
+    camera.take_frame(frame(9, 9), 5)
+    camera.take_frame(frame(1.0, 0.5, 0.0, 0.4), 7)
+    camera.update(1_000_000)
+    camera.update(1_100_000)
+    expected = renderer.render(
+        Pose.at(
+            1 + 0.1 * math.cos(0.4) + 0.05 * math.sin(0.4), 0.5 + 0.1 * math.sin(0.4) - 0.05 * math.cos(0.4), 0.3,
+            math.radians(2.0), math.radians(5.0), 0.4 + math.radians(10.0),
+        )
+    )  # fmt: skip
+    assert [time for _, _, time in pictures] == [1_000_000, 1_100_000]
+    assert all(np.array_equal(argb, expected) for argb, _, _ in pictures)
+
+
+def test_a_positive_pitch_looks_up():
+    assert (mount(0, 0, 0, 0, 10, 0).rotation @ [1, 0, 0])[2] == pytest.approx(math.sin(math.radians(10)))
+
+
+def test_the_i420_picture_is_the_argb_picture(renderer, pictures):
+    camera = VirtualCamera(renderer, mount(0, 0, 0.5, 0, 0, 0), pictures)
+    camera.take_frame(frame(), 0)
+    camera.update(0)
+    argb, i420, _ = pictures[0]
+    assert i420.shape == (72, 64)
+    assert np.array_equal(i420, cv2.cvtColor(argb, cv2.COLOR_BGRA2YUV_I420))
+    back = cv2.cvtColor(i420, cv2.COLOR_YUV2BGR_I420)
+    assert np.abs(back.astype(int) - argb[..., :3]).mean() < 4
+
+
+def test_i420_follows_bt601():
+    colours = np.array([[255, 255, 255], [0, 0, 0], [0, 0, 255], [0, 255, 0], [255, 0, 0]], np.uint8)
+    for blue, green, red in colours.astype(float):
+        planes = to_i420(np.full((2, 2, 4), (blue, green, red, 255), np.uint8)).ravel()
+        luma = 16 + (65.481 * red + 128.553 * green + 24.966 * blue) / 255
+        u = 128 + (-37.797 * red - 74.203 * green + 112.0 * blue) / 255
+        v = 128 + (112.0 * red - 93.786 * green - 18.214 * blue) / 255
+        assert planes == pytest.approx([luma] * 4 + [u, v], abs=1)
+
+
+@pytest.mark.parametrize("size", [(63, 48), (64, 47)])
+def test_odd_sizes_are_refused(cube_at, size):
+    renderer = Renderer(load_scene(cube_at([3, 0, 0, 0])), *size, 1.0)
+    with pytest.raises(ValueError, match=f"must be even for I420, and {size[0]} x {size[1]} are not"):
+        VirtualCamera(renderer, mount(0, 0, 0, 0, 0, 0), Pictures())
+
+
+@pytest.mark.parametrize("bad", [{"qw": 0.0}, {"x": math.nan}, {"y": math.inf}, {"z": 2e6}, {"qx": math.nan}])
+def test_a_frame_without_a_pose_is_refused_counted_and_told_once(renderer, pictures, caplog, bad):
+    camera = VirtualCamera(renderer, mount(0, 0, 0.1, 0, 0, 0), pictures)
+    camera.take_frame(frame(), 0)
+    with caplog.at_level(logging.WARNING):
+        for time in (1, 2):
+            camera.take_frame(frame(**bad), time)
+    camera.update(3)
+    assert (camera.refused, len(caplog.records), len(pictures)) == (2, 1, 1)
