@@ -1,0 +1,145 @@
+"""The maps of the registry: as their generator makes them, drivable, and good to look at."""
+
+import importlib.util
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from dodo_dsl import data
+from services.virtual_camera.camera import Pose
+from services.virtual_camera.render import Renderer
+from services.virtual_camera.scene import load_scene
+
+MAPS = data.registry() / "maps"
+NAMES = ["left-curve", "straight"]
+
+
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory):
+    spec = importlib.util.spec_from_file_location("make_maps", MAPS / "make_maps.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    folder = tmp_path_factory.mktemp("maps")
+    module.make(folder)
+    return folder
+
+
+def content(name: str) -> dict:
+    return json.loads((MAPS / name / "map.json").read_text())
+
+
+def cones(name: str, colour: str) -> np.ndarray:
+    (model,) = (m for m in content(name)["model"] if m["name"] == f"cone_{colour}")
+    return np.array(model["instances"])[:, :2]
+
+
+def obstacle(name: str, which: str) -> list[list[float]]:
+    (found,) = (o for o in content(name)["obstacles"] if o["name"] == which)
+    return found["lines"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_map_is_what_its_generator_makes(generated, name):
+    files = {p.name for p in (MAPS / name).iterdir()}
+    assert files == {p.name for p in (generated / name).iterdir()}
+    for file in files - {"floor.png"}:
+        assert (MAPS / name / file).read_bytes() == (generated / name / file).read_bytes()
+    ours, new = (cv2.imread(str(f / name / "floor.png"), cv2.IMREAD_UNCHANGED) for f in (MAPS, generated))
+    assert np.array_equal(ours, new)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_map_is_small(name):
+    assert sum(p.stat().st_size for p in (MAPS / name).iterdir()) < 60_000
+
+
+def test_all_maps_are_tested():
+    assert sorted(p.name for p in MAPS.iterdir() if p.is_dir() and p.name != "__pycache__") == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_cones_follow_each_other_closely_and_walls_run_through_them(name):
+    for colour, side in (("yellow", "left"), ("blue", "right")):
+        places = cones(name, colour)
+        gaps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        assert 0.2 < gaps.min() < gaps.max() < 0.31
+        wall = np.array(obstacle(name, side))
+        assert np.array_equal(wall[:, :2], places[:-1])
+        assert np.array_equal(wall[:, 2:], places[1:])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_lane_is_half_a_metre_wide_and_begins_behind_the_start(name):
+    yellow, blue = cones(name, "yellow"), cones(name, "blue")
+    assert yellow[0] == pytest.approx([-0.25, -0.3])
+    assert blue[0] == pytest.approx([0.25, -0.3])
+    across = np.linalg.norm(yellow[:, None] - blue[None], axis=2).min(axis=1)
+    assert across == pytest.approx(np.full(len(yellow), 0.5), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "finish", "ends"), [("straight", (0, 3), (0, 4)), ("left-curve", (-2, 2.5), (-3, 2.5))]
+)
+def test_the_finish_lies_where_the_track_ends_with_red_cones_beside_it(name, finish, ends):
+    ((x1, y1, x2, y2),) = obstacle(name, "finish")
+    assert ((x1 + x2) / 2, (y1 + y2) / 2) == pytest.approx(finish)
+    assert math.hypot(x2 - x1, y2 - y1) == pytest.approx(0.5)
+    red = cones(name, "red")
+    assert red.mean(axis=0) == pytest.approx(finish)
+    assert np.linalg.norm(red[0] - red[1]) == pytest.approx(0.66)
+    last = (cones(name, "yellow")[-1] + cones(name, "blue")[-1]) / 2
+    assert last == pytest.approx(ends)
+
+
+def hues(image: np.ndarray, low: int, high: int) -> tuple[int, float]:
+    """How many pixels have a saturated colour of these hues (0 to 179), and their mean column."""
+    hsv = cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2HSV)
+    found = (hsv[..., 0] >= low) & (hsv[..., 0] <= high) & (hsv[..., 1] > 150) & (hsv[..., 2] > 60)
+    return int(found.sum()), float(np.flatnonzero(found.any(axis=0)).mean()) if found.any() else math.nan
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_from_the_start_a_camera_sees_yellow_on_its_left_and_blue_on_its_right(name):
+    renderer = Renderer(load_scene(MAPS / name), 640, 480, math.radians(48.8))
+    image = renderer.render(Pose.at(0, 0, 0.095, yaw=math.pi / 2))
+    yellow, blue = hues(image, 20, 35), hues(image, 105, 125)
+    assert 300 < yellow[0] < 6000
+    assert 300 < blue[0] < 6000
+    assert yellow[1] < 320 < blue[1] or name == "left-curve"
+    floor, sky = image[300:, :, :3].astype(float), image[:200, :, :3]
+    assert floor[..., 0].std() > 3
+    assert np.ptp(sky.reshape(-1, 3), axis=0).max() == 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_cones_are_seen_all_along_the_lane(name):
+    """Halfway between each pair of cones, looking along the lane, both colours show until past the finish."""
+    renderer = Renderer(load_scene(MAPS / name), 320, 240, math.radians(48.8))
+    yellow, blue = cones(name, "yellow"), cones(name, "blue")
+    nearest = blue[np.linalg.norm(yellow[:, None] - blue[None], axis=2).argmin(axis=1)]
+    middle = (yellow + nearest) / 2
+    finish = 5 if name == "straight" else 4
+    for here, there in pairwise(middle[: -finish + 1]):
+        yaw = math.atan2(there[1] - here[1], there[0] - here[0])
+        image = renderer.render(Pose.at(here[0], here[1], 0.095, yaw=yaw))
+        assert hues(image, 20, 35)[0] > 20
+        assert hues(image, 105, 125)[0] > 20
+
+
+def test_the_cone_is_closed_and_of_the_size_of_the_real_one():
+    crowd = load_scene(MAPS / "straight").crowds[0]
+    low, high = crowd.shape.vertices.min(axis=0), crowd.shape.vertices.max(axis=0)
+    assert (high - low).tolist() == pytest.approx([0.024, 0.024, 0.034])
+    assert len(crowd.shape.faces) < 60
+    outwards = np.einsum("fi,fi->f", crowd.shape.normals, crowd.shape.centres - crowd.shape.middle)
+    assert (outwards > 0).mean() > 0.7
+
+
+def test_no_file_of_a_map_names_a_place_on_a_machine():
+    for path in MAPS.rglob("*.json"):
+        assert not any(Path(m["file"]).is_absolute() for m in json.loads(path.read_text())["model"])
