@@ -1,0 +1,144 @@
+"""Find the cones in the frames of the car's camera and tell the bus about them.
+
+    python perception.py --cid=111 --name=video0.argb --width=640 --height=480 --verbose
+
+Reads shared memory, 4 bytes a pixel (blue, green, red, alpha). Sends for each cone, with the frame's time
+stamp as sample time and the frame's number as sampleId: DetectionType (1 yellow, 2 blue), DetectionProperty
+(`yellow`, `blue`) and DetectionBoundingBox (fractions of the image). When all cones of a frame have been sent,
+also when there are none, an ImageReadingShm with the same sampleId says that the frame is complete.
+"""
+
+import argparse
+import contextlib
+import itertools
+import math
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from cv2.typing import MatLike, Rect
+
+from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.session import Session
+
+TYPES = {"yellow": 1, "blue": 2}
+HSV_RANGES = {"yellow": ((20, 110, 40), (35, 255, 255)), "blue": ((105, 110, 25), (130, 255, 255))}
+HORIZON = 0.45  # no cone stands higher in the image
+SMALLEST = 12  # pixels; less than this is noise
+ASKS, LISTENS = 1, 2  # sender stamps of perception's question to steering and of the answer
+PATIENCE = 0.1  # seconds between questions and between looks for the camera
+
+
+class Cone(NamedTuple):
+    """A cone's colour and box: upper left corner and size as fractions of the image."""
+
+    colour: str
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+def find_cones(image: MatLike) -> list[Cone]:
+    """The cones in an image of blue, green, red (and alpha), the nearest of each colour first."""
+    height, width = image.shape[:2]
+    top = int(HORIZON * height)
+    hsv = cv2.cvtColor(np.ascontiguousarray(image[top:, :, :3]), cv2.COLOR_BGR2HSV)
+    return [
+        Cone(colour, x / width, (top + y) / height, w / width, h / height)
+        for colour, (low, high) in HSV_RANGES.items()
+        for x, y, w, h in _boxes(cv2.inRange(hsv, low, high))
+    ]
+
+
+def _boxes(mask: MatLike) -> list[Rect]:
+    """Boxes (x, y, width, height in pixels) of the patches in a mask, the lowest in the image first."""
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    boxes = [cv2.boundingRect(contour) for contour in contours]
+    boxes = [box for box in boxes if box[2] * box[3] >= SMALLEST]
+    return sorted(boxes, key=lambda box: -(box[1] + box[3]))
+
+
+def announce(session: Session, cones: list[Cone], frame: int, sample_time: int, source: argparse.Namespace) -> None:
+    """Send what was found in a frame, and that this was all."""
+    logic = "opendlv.logic.perception."
+    kind, property_, box = (
+        session.messages.type(logic + name) for name in ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
+    )
+    for number, cone in enumerate(cones):
+        key = {"sampleId": frame, "detectionId": number}
+        session.send(kind(**key, type=TYPES[cone.colour]), sample_time)
+        session.send(property_(**key, property=cone.colour), sample_time)
+        session.send(box(**key, x=cone.x, y=cone.y, width=cone.width, height=cone.height), sample_time)
+    done = session.messages.type("opendlv.proxy.ImageReadingShm")
+    size = {"width": source.width, "height": source.height}
+    session.send(done(format="argb", location=source.name, sampleId=frame, **size), sample_time)
+
+
+def await_steering(session: Session) -> None:
+    """Ask until steering answers that it listens, so that it misses no frame."""
+    print("perception: waiting for steering", flush=True)
+    status = session.messages.type("opendlv.system.SystemStatusMessage")
+    asked = -math.inf
+    while True:
+        if time.monotonic() - asked > PATIENCE:
+            asked = time.monotonic()
+            session.send(status(description="perception asks"), sender_stamp=ASKS)
+        envelope = session.receive(PATIENCE)
+        if envelope and (envelope.data_type, envelope.sender_stamp) == (session.messages.id(status), LISTENS):
+            return
+
+
+def attach(name: str) -> SharedMemory:
+    """The camera's memory; waits for as long as it is not there."""
+    print(f"perception: looking for {name}", flush=True)
+    while True:
+        with contextlib.suppress(SharedMemoryError):
+            return SharedMemory.attach(name)
+        time.sleep(PATIENCE)
+
+
+def watch(memory: SharedMemory, session: Session, numbers: Iterator[int], flags: argparse.Namespace) -> None:
+    """Handle each frame that the camera notifies of; raises SharedMemoryError when the camera is gone."""
+    pixels = np.frombuffer(memory.buffer, np.uint8).reshape(flags.height, flags.width, 4)
+    while True:
+        if not memory.wait():
+            continue
+        with memory.lock():
+            image, sample_time = pixels.copy(), memory.sample_time()
+        frame, cones = next(numbers), find_cones(image)
+        announce(session, cones, frame, sample_time, flags)
+        if flags.verbose:
+            print(f"frame {frame}: {len(cones)} cones", flush=True)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Find cones in the frames of a camera.")
+    parser.add_argument("--cid", type=int, required=True, help="the bus, 1 to 254")
+    parser.add_argument("--name", default="video0.argb", help="the camera's shared memory")
+    parser.add_argument("--width", type=int, required=True, help="of the image, in pixels")
+    parser.add_argument("--height", type=int, required=True)
+    parser.add_argument("--await-steering", action="store_true", help="begin when steering.py listens")
+    parser.add_argument("--verbose", action="store_true", help="print what is found")
+    flags = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+
+    numbers, size = itertools.count(), flags.width * flags.height * 4
+    with Session(flags.cid) as session:
+        if flags.await_steering:
+            await_steering(session)
+        while True:
+            with attach(flags.name) as memory, contextlib.suppress(SharedMemoryError):
+                if memory.size != size:
+                    print(f"perception: {flags.name} has {memory.size} bytes, not {size}", file=sys.stderr)
+                    return 2
+                watch(memory, session, numbers, flags)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
