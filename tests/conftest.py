@@ -1,5 +1,12 @@
 """Options and fixtures that all tests share."""
 
+import contextlib
+import os
+import random
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
 import pytest
 
 
@@ -10,3 +17,29 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture
 def update_goldens(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--update-goldens"))
+
+
+@pytest.fixture
+def shared_data() -> Callable[[str], Path]:
+    """Path of real data by file name; it is no part of the project, and the test skips where it is absent."""
+    root = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("DODO_SHARED_DATA") or root)
+
+    def path(name: str) -> Path:
+        if not (folder / name).is_file():
+            pytest.skip(f"real data is absent: {name} (DODO_SHARED_DATA names its folder)")
+        return folder / name
+
+    return path
+
+
+@pytest.fixture
+def cid() -> Iterator[int]:
+    """A session number that no other test on this machine uses at the same time."""
+    lease = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    for number in random.sample(range(128, 255), 127):
+        with contextlib.suppress(OSError):
+            lease.bind(f"\0dodo-test-cid-{number}")  # an abstract name dies with its holder
+            break
+    yield number
+    lease.close()
