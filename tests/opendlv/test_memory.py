@@ -1,0 +1,179 @@
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dodo_dsl.opendlv import tokenfile
+from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
+from tests.opendlv.conftest import Peer
+
+SIZE = 64 * 48 * 4
+TIME = 1_715_000_000_123_456
+
+
+def until_waiting(memory: SharedMemory, readers: int) -> None:
+    deadline = time.monotonic() + 10.0
+    while memory.readers_waiting() < readers:
+        assert time.monotonic() < deadline, "nobody waits"
+        time.sleep(0.001)
+
+
+def write(memory: SharedMemory, byte: int, time_us: int) -> None:
+    with memory.lock():
+        np.frombuffer(memory.buffer, np.uint8)[:] = byte
+        memory.stamp(time_us)
+    memory.notify_all()
+
+
+def test_libcluon_reads_each_frame_once(peer: Peer, memory_name: str) -> None:
+    with SharedMemory.create(memory_name, SIZE) as memory:
+        assert peer.ask("attach", name=memory_name) == {"valid": True}
+        peer.order("wait", name=memory_name, frames=50)
+        for frame in range(50):
+            until_waiting(memory, 1)
+            write(memory, frame, TIME + frame)
+            assert peer.answer() == {"byte": frame, "same": True, "size": SIZE, "time": TIME + frame}
+        peer.ask("close", name=memory_name)
+
+
+def test_frames_of_libcluon_are_read(peer: Peer, memory_name: str) -> None:
+    assert peer.ask("create", name=memory_name, size=SIZE) == {"valid": True}
+    with SharedMemory.attach(memory_name) as memory:
+        assert memory.size == SIZE
+        reader = threading.Thread(target=memory.wait, args=(10.0,))
+        reader.start()
+        until_waiting(memory, 1)
+        peer.ask("fill", name=memory_name, byte=9, time=TIME)
+        reader.join(10.0)
+        assert not reader.is_alive()
+        with memory.lock():
+            assert set(memory.buffer) == {9}
+            assert memory.sample_time() == TIME
+        peer.ask("close", name=memory_name)
+        with pytest.raises(SharedMemoryError, match="was removed by its creator"):
+            memory.wait(1.0)
+
+
+def test_two_names_of_one_memory(memory_name: str) -> None:
+    with SharedMemory.create(f"/{memory_name}", SIZE) as writer, SharedMemory.attach(f"/tmp/{memory_name}") as reader:
+        writer.buffer[3] = 7
+        assert reader.buffer[3] == 7
+
+
+def test_waiting_ends_with_the_timeout_or_a_signal(memory_name: str) -> None:
+    with SharedMemory.create(memory_name, 1) as memory:
+        assert memory.wait(0.0) is False
+        assert memory.wait(0.02) is False
+        old = signal.signal(signal.SIGALRM, lambda *_: None)
+        signal.setitimer(signal.ITIMER_REAL, 0.02)
+        assert memory.wait(None) is False
+        signal.signal(signal.SIGALRM, old)
+
+
+def _die_while_locked(name: str) -> None:
+    memory = SharedMemory.attach(name)
+    memory.lock().__enter__()
+    os._exit(0)
+
+
+def test_a_dead_holder_of_the_lock_holds_it_no_more(memory_name: str) -> None:
+    with SharedMemory.create(memory_name, 1) as memory:
+        process = multiprocessing.get_context("spawn").Process(target=_die_while_locked, args=(memory_name,))
+        process.start()
+        process.join(20.0)
+        assert process.exitcode == 0
+        with memory.lock(timeout=5.0):
+            memory.stamp(-1)
+            assert memory.sample_time() == -1
+
+
+def test_a_lock_held_by_another_is_an_error_in_the_end(memory_name: str) -> None:
+    with (
+        SharedMemory.create(memory_name, 1) as memory,
+        SharedMemory.attach(memory_name) as other,
+        other.lock(),
+        pytest.raises(SharedMemoryError, match=r"was locked by another for 0\.05 s"),
+        memory.lock(timeout=0.05),
+    ):
+        pass
+
+
+def test_stamps_need_the_lock(memory_name: str) -> None:
+    with SharedMemory.create(memory_name, 1) as memory:
+        for use in (lambda: memory.stamp(1), memory.sample_time):
+            with pytest.raises(SharedMemoryError, match="must be locked"):
+                use()
+
+
+def _create_and_die(name: str) -> None:
+    SharedMemory.create(name, 10)
+    os._exit(0)
+
+
+def test_what_a_dead_creator_left_is_replaced(memory_name: str) -> None:
+    process = multiprocessing.get_context("spawn").Process(target=_create_and_die, args=(memory_name,))
+    process.start()
+    process.join(20.0)
+    with SharedMemory.attach(memory_name) as left:
+        assert left.size == 10
+    with SharedMemory.create(memory_name, 20) as memory:
+        assert memory.size == 20 and set(memory.buffer) == {0}
+
+
+def test_memory_of_a_living_creator_is_not_taken(memory_name: str) -> None:
+    with (
+        SharedMemory.create(memory_name, 10),
+        pytest.raises(SharedMemoryError, match=f"process {os.getpid()} uses it"),
+    ):
+        SharedMemory.create(memory_name, 10)
+
+
+def test_colliding_keys_are_avoided(memory_name: str) -> None:
+    path, twin = Path("/tmp", memory_name), Path("/tmp", f"{memory_name}.twin")
+    twin.touch()
+    os.link(twin, path)  # the same inode gives the same keys, as two inodes 65536 apart would
+    try:
+        assert tokenfile.collides(path)
+        with SharedMemory.create(memory_name, 10) as memory:
+            assert not tokenfile.collides(path)
+            memory.buffer[0] = 1
+            with SharedMemory.attach(memory_name) as reader:
+                assert reader.buffer[0] == 1
+    finally:
+        twin.unlink()
+
+
+def test_arrays_stay_valid_after_the_end(memory_name: str) -> None:
+    with SharedMemory.create(memory_name, 10) as memory:
+        array = np.frombuffer(memory.buffer, np.uint8)
+        array[:] = 3
+    del memory
+    assert array.sum() == 30
+
+
+def test_memory_that_is_not_there(memory_name: str) -> None:
+    with pytest.raises(SharedMemoryError, match=f"`{memory_name}` does not exist: /tmp/{memory_name}"):
+        SharedMemory.attach(memory_name)
+    token = Path("/tmp", memory_name)
+    token.touch()
+    with pytest.raises(SharedMemoryError, match="has no content"):
+        SharedMemory.attach(memory_name)
+    token.unlink()
+
+
+@pytest.mark.parametrize(("name", "size"), [("", 1), ("/", 1), ("a\0b", 1), ("x" * 300, 1), ("x", 0), ("x", 2**32)])
+def test_names_and_sizes_that_cannot_be(name: str, size: int) -> None:
+    with pytest.raises(SharedMemoryError):
+        SharedMemory.create(name, size)
+
+
+def test_posix_mode_is_refused(memory_name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLUON_SHAREDMEMORY_POSIX", "1")
+    for use in (SharedMemory.attach, lambda name: SharedMemory.create(name, 1)):
+        with pytest.raises(SharedMemoryError, match="only SysV shared memory is supported"):
+            use(memory_name)

@@ -1,0 +1,102 @@
+import socket
+import time
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import MAX_DATAGRAM_BYTES, PORT, Session, SessionError
+from tests.opendlv.conftest import Peer
+
+STANDARD = MessageSet.standard()
+STEERING = STANDARD.type("opendlv.proxy.GroundSteeringRequest")
+IMAGE = STANDARD.type("opendlv.proxy.ImageReading")
+SIZE_OF_EMPTY_IMAGE_FRAME = 60  # bytes, an upper bound
+
+
+def now() -> int:
+    return time.time_ns() // 1000
+
+
+def test_libcluon_receives_what_is_sent(cid: int, peer: Peer) -> None:
+    before = now()
+    with Session(cid) as session:
+        session.send(STEERING(groundSteering=-0.25), sample_time=1_715_000_000_123_456, sender_stamp=7)
+        session.send(STEERING())
+        sampled, plain = peer.answer(), peer.answer()
+    assert (sampled["id"], sampled["payload"], sampled["stamp"]) == (1090, "0d000080be", 7)
+    assert sampled["sampled"] == 1_715_000_000_123_456
+    assert before <= sampled["sent"] <= sampled["received"] <= now()
+    assert plain["sampled"] == plain["sent"]
+
+
+def test_what_libcluon_sends_is_received(cid: int, peer: Peer) -> None:
+    before = now()
+    with Session(cid) as session:
+        peer.order("send", id=1090, payload="0d000080be", sent=5_000_001, sampled=-1_000_001, stamp=2**32 - 1)
+        envelope = session.receive(10.0)
+    assert envelope is not None
+    assert envelope == Envelope(1090, bytes.fromhex("0d000080be"), 5_000_001, envelope.received, -1_000_001, 2**32 - 1)
+    assert before <= envelope.received <= now()
+    assert session.messages.decode(1090, envelope.payload).groundSteering == -0.25
+
+
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.integers(0, 2**31 - 1),
+    st.binary(max_size=300),
+    st.integers(0, 2**31 * 1_000_000 - 1),
+    st.integers(0, 2**32 - 1),
+)
+def test_any_envelope_passes_libcluon(cid: int, peer: Peer, id_: int, payload: bytes, time: int, stamp: int) -> None:
+    with Session(cid) as session:
+        session.send_envelope(Envelope(id_, payload, time, 0, time // 2, stamp))
+        heard = peer.answer()
+        assert heard["sent"] == time
+        peer.order("send", **{key: heard[key] for key in ("id", "payload", "sent", "sampled", "stamp")})
+        envelope = session.receive(10.0)
+        assert envelope is not None
+        assert envelope._replace(received=0) == Envelope(id_, payload, time, 0, time // 2, stamp)
+
+
+def test_own_messages_are_dropped_and_others_kept_in_order(cid: int) -> None:
+    with Session(cid) as one, Session(cid) as other:
+        for stamp in range(50):
+            one.send(STEERING(), sender_stamp=stamp)
+            other.send(STEERING(), sender_stamp=1000 + stamp)
+        heard = [one.receive(5.0) for _ in range(50)]
+        assert [envelope.sender_stamp for envelope in heard if envelope] == list(range(1000, 1050))
+        assert one.receive(0.0) is None
+
+
+def test_garbage_is_counted(cid: int) -> None:
+    with Session(cid) as session, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for data in (b"", b"hello", b"\x0d\xa4\x05\x00\x00\xff", b"\x0d\xa4\x02\x00\x00\x08\x02"):
+            stranger.sendto(data, (f"225.0.0.{cid}", PORT))
+        envelope = session.receive(5.0)
+        assert envelope is not None and envelope.data_type == 1
+        assert session.garbage == 3
+
+
+def test_the_largest_datagram_passes_and_a_larger_one_is_refused(cid: int) -> None:
+    with Session(cid) as one, Session(cid) as other:
+        one.send(IMAGE(data=bytes(MAX_DATAGRAM_BYTES - SIZE_OF_EMPTY_IMAGE_FRAME)))
+        envelope = other.receive(5.0)
+        assert envelope is not None and len(envelope.payload) > 65_000
+        with pytest.raises(SessionError, match=r"message 1055 needs 655\d\d bytes of 65507 in a datagram"):
+            one.send(IMAGE(data=bytes(MAX_DATAGRAM_BYTES)))
+
+
+def test_waiting_ends_with_the_timeout(cid: int) -> None:
+    with Session(cid) as session:
+        start = time.monotonic()
+        assert session.receive(0.05) is None
+        assert time.monotonic() - start >= 0.05
+
+
+@pytest.mark.parametrize("cid_", [0, 255, -1])
+def test_numbers_outside_the_range_are_refused(cid_: int) -> None:
+    with pytest.raises(SessionError, match=f"cid is 1 to 254, not {cid_}"):
+        Session(cid_)
