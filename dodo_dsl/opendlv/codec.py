@@ -35,7 +35,7 @@ def decode(layout: Layout, payload: bytes) -> Any:
             message = layout.type.FromString(wire.keep_first(payload, layout.shape))
             message.DiscardUnknownFields()
         _check_decoded(message, layout)
-    except (DecodeError, wire.WireError, UnicodeDecodeError) as error:
+    except (DecodeError, wire.WireError) as error:
         raise MessageError(f"the payload is no {layout.definition.name}: {error}") from None
     return message
 
@@ -49,9 +49,10 @@ def _check_ranges(message: Message, layout: Layout) -> None:
 
 
 def _check_decoded(message: Message, layout: Layout) -> None:
-    """Strings must be UTF-8 (protobuf tells on access); large integers lose their upper bits as in C++."""
+    """Strings must be UTF-8 (others are bytes in protobuf); large integers lose their upper bits as in C++."""
     for field in layout.texts:
-        getattr(message, field)
+        if not isinstance(getattr(message, field), str):
+            raise wire.WireError(f"`{field}` is no UTF-8 text")
     for field, type_ in layout.narrow:
         value = getattr(message, field)
         if value not in integer_range(type_):

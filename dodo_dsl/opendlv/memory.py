@@ -83,12 +83,16 @@ class SharedMemory:
         return os.fstat(self._segment.token).st_mtime_ns // 1000
 
     def notify_all(self) -> None:
-        """Wake all processes that wait now."""
-        try:
-            self._segment.condition.value = 0
-            self._segment.condition.value = 1
-        except sysv_ipc.Error:
-            raise self._removed() from None
+        """Wake all processes that wait now, each once.
+
+        It happens under the lock: a quick reader would else come back while the condition is still 0 and read the
+        same content again. Raises SharedMemoryError as `lock` does.
+        """
+        if self._locked:
+            self._wake()
+            return
+        with self.lock():
+            self._wake()
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait for a notification: False when `timeout` seconds are over or a signal came.
@@ -112,7 +116,7 @@ class SharedMemory:
         self.buffer = memoryview(b"")
         if self._owner:
             with suppress(SharedMemoryError):
-                self.notify_all()
+                self._wake()
             self._segment.remove()
         self._segment.close()
 
@@ -123,6 +127,13 @@ class SharedMemory:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _wake(self) -> None:
+        try:
+            self._segment.condition.value = 0
+            self._segment.condition.value = 1
+        except sysv_ipc.Error:
+            raise self._removed() from None
 
     def _operate(self, semaphore: sysv_ipc.Semaphore, value: int, timeout: float | None) -> Result:
         try:

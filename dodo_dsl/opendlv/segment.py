@@ -83,7 +83,9 @@ class Segment:
 
 
 def _made(status: os.stat_result, size: int) -> tuple[sysv_ipc.SharedMemory, sysv_ipc.Semaphore, sysv_ipc.Semaphore]:
-    memory = sysv_ipc.SharedMemory(tokenfile.key(status, MEMORY), sysv_ipc.IPC_CREX, mode=MODE, size=size)
+    memory = sysv_ipc.SharedMemory(
+        tokenfile.key(status, MEMORY), sysv_ipc.IPC_CREX, mode=MODE, size=size, init_character=b"\0"
+    )
     made = [memory]
     try:
         for project in (MUTEX, CONDITION):
