@@ -1,0 +1,67 @@
+"""A vehicle as a rectangle on the ground, and what it covers on its way. Metres and rad, world frame."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import shapely
+
+TURN = math.radians(5)  # within a turn of this size a hull is as good as the area driven over
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the centre of the vehicle is, and its heading counter-clockwise from the x axis."""
+
+    x: float
+    y: float
+    heading: float
+
+
+@dataclass(frozen=True)
+class Box:
+    """Outline of the vehicle: `length` along its heading, `width` across, both about the centre."""
+
+    length: float
+    width: float
+
+
+def heading_of(qx: float, qy: float, qz: float, qw: float) -> float | None:
+    """Heading in rad of an attitude quaternion of any length; None when it is zero or not finite."""
+    length = math.hypot(qx, qy, qz, qw)
+    if not math.isfinite(length) or length == 0.0:
+        return None
+    return math.atan2(2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
+
+
+def outline(pose: Pose, box: Box) -> shapely.Polygon:
+    """The rectangle that the vehicle covers at a pose."""
+    return shapely.Polygon(corners(pose, box))
+
+
+def corners(pose: Pose, box: Box) -> list[tuple[float, float]]:
+    """The four corners, counter-clockwise from the front left."""
+    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+    along, across = box.length / 2, box.width / 2
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    return [
+        (pose.x + f * along * cos - s * across * sin, pose.y + f * along * sin + s * across * cos) for f, s in signs
+    ]
+
+
+def swept(start: Pose, end: Pose, box: Box) -> shapely.Geometry:
+    """The area that the vehicle covers from one pose to the next.
+
+    It moves straight and turns evenly the shorter way round, in parts of at most five degrees; each part is
+    the convex hull of its two rectangles, which is exact for a vehicle that does not turn.
+    """
+    change = math.remainder(end.heading - start.heading, math.tau)
+    parts = max(1, math.ceil(abs(change) / TURN))
+    ways = [index / parts for index in range(parts + 1)]
+    rings = [corners(_between(start, end, change, way), box) for way in ways]
+    hulls = [shapely.MultiPoint(a + b).convex_hull for a, b in pairwise(rings)]
+    return hulls[0] if parts == 1 else shapely.union_all(hulls)
+
+
+def _between(start: Pose, end: Pose, change: float, way: float) -> Pose:
+    return Pose(start.x + way * (end.x - start.x), start.y + way * (end.y - start.y), start.heading + way * change)

@@ -1,0 +1,93 @@
+import math
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import affinity
+
+from services.collision.geometry import Box, Pose, heading_of, outline, swept
+
+KIWI = Box(0.36, 0.16)
+places = st.floats(-2, 2)
+poses = st.builds(Pose, places, places, st.floats(-math.pi, math.pi))
+lines = st.tuples(places, places, places, places).filter(lambda xy: xy[:2] != xy[2:])
+
+
+def dense(start: Pose, end: Pose, parts: int = 300) -> list[shapely.Polygon]:
+    """Brute force: the rectangle at many poses on the way, turned and moved by shapely itself."""
+    change = math.remainder(end.heading - start.heading, math.tau)
+    shapes = []
+    for index in range(parts + 1):
+        way = index / parts
+        shape = shapely.box(-0.18, -0.08, 0.18, 0.08)
+        shape = affinity.rotate(shape, start.heading + way * change, origin=(0, 0), use_radians=True)
+        shapes.append(affinity.translate(shape, start.x + way * (end.x - start.x), start.y + way * (end.y - start.y)))
+    return shapes
+
+
+def test_the_rectangle_lies_along_the_heading() -> None:
+    assert outline(Pose(1, 2, 0), KIWI).bounds == pytest.approx((0.82, 1.92, 1.18, 2.08))
+    assert outline(Pose(1, 2, math.pi / 2), KIWI).bounds == pytest.approx((0.92, 1.82, 1.08, 2.18))
+
+
+@given(poses)
+def test_the_rectangle_is_the_one_that_shapely_turns(pose: Pose) -> None:
+    assert outline(pose, KIWI).symmetric_difference(dense(pose, pose, 1)[0]).area < 1e-12
+
+
+@settings(deadline=None)
+@given(poses, poses, lines)
+def test_the_way_touches_what_any_pose_on_it_touches(
+    start: Pose, end: Pose, line: tuple[float, float, float, float]
+) -> None:
+    obstacle = shapely.LineString([line[:2], line[2:]])
+    area = swept(start, end, KIWI)
+    shapely.prepare(obstacle)
+    brute = shapely.LineString([line[:2], line[2:]])
+    shapes = dense(start, end)
+    if any(brute.intersects(shape) for shape in shapes):
+        assert obstacle.distance(area) < 1e-3
+    assert obstacle.intersects(area) == brute.intersects(area)
+    if obstacle.intersects(area):
+        assert min(brute.distance(shape) for shape in shapes) < 0.03
+
+
+@given(places, places, places, places, st.floats(-math.pi, math.pi), lines)
+def test_a_way_without_a_turn_is_exact(
+    x1: float, y1: float, x2: float, y2: float, heading: float, line: tuple[float, float, float, float]
+) -> None:
+    start, end = Pose(x1, y1, heading), Pose(x2, y2, heading)
+    area = swept(start, end, KIWI)
+    brute = shapely.union_all([a.union(b).convex_hull for a, b in [(dense(start, end, 1))]])
+    assert area.symmetric_difference(brute).area < 1e-9
+
+
+def test_a_fast_vehicle_does_not_jump_over_a_line() -> None:
+    line = shapely.LineString([(5, -1), (5, 1)])
+    assert not line.intersects(outline(Pose(0, 0, 0), KIWI)) and not line.intersects(outline(Pose(10, 0, 0), KIWI))
+    assert line.intersects(swept(Pose(0, 0, 0), Pose(10, 0, 0), KIWI))
+
+
+def test_a_turn_goes_the_shorter_way_round() -> None:
+    area = swept(Pose(0, 0, math.radians(175)), Pose(0, 0, math.radians(-175)), KIWI)
+    assert area.bounds[3] == pytest.approx(outline(Pose(0, 0, math.radians(175)), KIWI).bounds[3])
+
+
+@given(st.floats(-math.pi + 1e-6, math.pi), st.floats(0.01, 100))
+def test_heading_of_a_quaternion_of_any_length(heading: float, length: float) -> None:
+    qz, qw = length * math.sin(heading / 2), length * math.cos(heading / 2)
+    found = heading_of(0, 0, qz, qw)
+    assert found is not None
+    assert math.remainder(found - heading, math.tau) == pytest.approx(0, abs=1e-9)
+
+
+def test_heading_of_a_pitched_body_is_where_its_nose_points_on_the_ground() -> None:
+    yaw, pitch = 0.8, 0.5
+    cy, sy, cp, sp = math.cos(yaw / 2), math.sin(yaw / 2), math.cos(pitch / 2), math.sin(pitch / 2)
+    assert heading_of(-sp * sy, sp * cy, cp * sy, cp * cy) == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize("q", [(0, 0, 0, 0), (math.nan, 0, 0, 1), (0, 0, math.inf, 1)])
+def test_no_heading_without_an_attitude(q: tuple[float, float, float, float]) -> None:
+    assert heading_of(*q) is None

@@ -1,0 +1,282 @@
+import math
+from collections.abc import Iterable
+
+import pytest
+import shapely
+import shapely.affinity
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.base import Verdict
+from services.collision.geometry import Box, Pose
+from services.collision.model import REQUESTS, Judge, Track, UnjudgeableError
+
+SECOND = 1_000_000
+BEGIN = 7_000 * SECOND
+
+
+def line(*numbers: float) -> shapely.MultiLineString:
+    return shapely.MultiLineString([[numbers[:2], numbers[2:]]])
+
+
+LANE = Track(
+    walls={"left": line(-1, 0.2, 5, 0.2), "right": line(-1, -0.2, 5, -0.2)},
+    goal={"finish": line(3, -0.2, 3, 0.2)},
+    max_time=40.0,
+)
+
+
+def judge(track: Track = LANE, requests: Iterable[str] = REQUESTS) -> Judge:
+    """A judge whose test has begun and who has heard the application."""
+    it = Judge(track, Box(0.36, 0.16))
+    it.update(BEGIN - SECOND)
+    it.begin(BEGIN)
+    for name in requests:
+        it.request(name)
+    return it
+
+
+def drive(it: Judge, *poses: tuple[float, float, float, float]) -> None:
+    """Show poses, each a time in seconds from the begin, x, y and a heading in degrees."""
+    for time, x, y, heading in poses:
+        it.look(Pose(x, y, math.radians(heading)), BEGIN + round(time * SECOND))
+
+
+def decided(it: Judge) -> Verdict:
+    assert it.verdict is not None
+    return it.verdict
+
+
+def values(it: Judge) -> dict[str, float | None]:
+    return {check.name: check.value for check in decided(it).checks}
+
+
+def oks(it: Judge) -> dict[str, bool]:
+    return {check.name: check.ok for check in decided(it).checks}
+
+
+def test_the_goal_reached_is_a_pass() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (1, 1, 0, 0), (3.406, 2.81, 0.05, 0))
+    assert it.verdict is None
+    drive(it, (3.414, 2.83, 0.05, 0))
+    assert (decided(it).outcome, decided(it).reason) == ("passed", "reached finish after 3.41 s")
+    assert values(it) == {
+        "time-to-goal": pytest.approx(3.414),
+        "wall-margin": pytest.approx(0.07),
+        "distance": pytest.approx(1 + math.hypot(1.81, 0.05) + 0.02),
+        "max-speed": pytest.approx(2.5),
+    }
+    assert all(oks(it).values())
+
+
+def test_a_wall_touched_is_a_failure() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (1.842, 0.214, 0.121, 0))
+    assert (decided(it).outcome, decided(it).reason) == (
+        "failed",
+        "hit wall left after 1.84 s at x = 0.21 m, y = 0.12 m",
+    )
+    assert values(it)["time-to-goal"] is None and values(it)["wall-margin"] == 0.0
+    assert oks(it) == {"time-to-goal": False, "wall-margin": False, "distance": True, "max-speed": True}
+
+
+def test_touching_is_hitting() -> None:
+    track = Track({"left": line(-1, 0.08, 1, 0.08)}, {}, 1.0)
+    it = judge(track)
+    drive(it, (0, 0, -0.5, 0), (1, 0, 0, 0))
+    assert decided(it).reason == "hit wall left after 1.00 s at x = 0.00 m, y = 0.00 m"
+
+
+def test_no_place_is_written_as_minus_zero() -> None:
+    it = judge()
+    drive(it, (0, 0.5, 0, 0), (1, -0.001, -0.19, 0))
+    assert decided(it).reason == "hit wall right after 1.00 s at x = 0.00 m, y = -0.19 m"
+
+
+def test_wall_and_goal_in_one_frame_is_a_failure() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (2, 3.5, 0.15, 0))
+    assert (decided(it).outcome, decided(it).reason[:13]) == ("failed", "hit wall left")
+
+
+def test_a_fast_vehicle_does_not_jump_over_the_goal() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (0.1, 10, 0, 0))
+    assert decided(it).reason == "reached finish after 0.10 s"
+
+
+def test_the_first_verdict_stands() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (1, 3, 0, 0), (2, 3, 1, 0))
+    it.end(BEGIN + 2 * SECOND)
+    it.update(BEGIN + 100 * SECOND)
+    assert decided(it).outcome == "passed"
+
+
+def test_out_of_time_says_where_and_how_far() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (39, 2, 0.05, 0))
+    it.update(BEGIN + 40 * SECOND)
+    assert it.verdict is None
+    it.update(BEGIN + 40 * SECOND + 10_000)
+    assert (decided(it).outcome, decided(it).reason) == (
+        "failed",
+        "did not reach finish within 40.00 s: the vehicle is at x = 2.00 m, y = 0.05 m, 0.82 m from it",
+    )
+    assert values(it)["time-to-goal"] is None
+    assert oks(it) == {"time-to-goal": False, "wall-margin": True, "distance": True, "max-speed": True}
+
+
+def test_a_goal_reached_too_late_is_not_reached() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (39, 2, 0, 0), (40.01, 3, 0, 0))
+    assert decided(it).outcome == "failed"
+
+
+@pytest.mark.parametrize(
+    ("heard", "aside"),
+    [
+        ([REQUESTS[0]], "; the application sent no PedalPositionRequest"),
+        ([REQUESTS[1]], "; the application sent no GroundSteeringRequest"),
+    ],
+)
+def test_one_kind_of_request_missing_is_said(heard: list[str], aside: str) -> None:
+    it = judge(requests=heard)
+    drive(it, (0, 0, 0, 0))
+    it.update(BEGIN + 41 * SECOND)
+    assert decided(it).reason == (
+        f"did not reach finish within 40.00 s: the vehicle is at x = 0.00 m, y = 0.00 m, 2.82 m from it{aside}"
+    )
+
+
+def test_a_silent_application_fails() -> None:
+    it = judge(requests=[])
+    drive(it, (0, 0, 0, 0))
+    it.update(BEGIN + 41 * SECOND)
+    assert (decided(it).outcome, decided(it).reason) == (
+        "failed",
+        "the application sent no GroundSteeringRequest and no PedalPositionRequest within 40.00 s",
+    )
+
+
+def test_without_a_pose_there_is_no_verdict() -> None:
+    it = judge()
+    with pytest.raises(UnjudgeableError, match=r"^no opendlv.sim.Frame of the vehicle came within 40.00 s$"):
+        it.update(BEGIN + 41 * SECOND)
+    with pytest.raises(UnjudgeableError, match=r"before the input ended after 2.00 s$"):
+        it.end(BEGIN + 2 * SECOND)
+    assert it.verdict is None
+
+
+@pytest.mark.parametrize(
+    ("pose", "what"),
+    [((0, 0.0, 0.15, 0), "wall left"), ((0, 3.0, 0.0, 0), "goal finish")],
+)
+def test_a_start_on_an_obstacle_is_the_fault_of_the_test(pose: tuple[float, float, float, float], what: str) -> None:
+    with pytest.raises(UnjudgeableError, match=f"the vehicle stands on {what} from the start, at x = "):
+        drive(judge(), pose)
+
+
+def test_the_end_of_the_input_brings_the_verdict() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (2, 1, 0, 0))
+    it.update(BEGIN + 2 * SECOND)
+    it.end(BEGIN + 2 * SECOND)
+    assert decided(it).reason == (
+        "did not reach finish before the input ended after 2.00 s: "
+        "the vehicle is at x = 1.00 m, y = 0.00 m, 1.82 m from it"
+    )
+
+
+def test_without_a_goal_staying_clear_is_enough() -> None:
+    track = Track(LANE.walls, {}, 2.0)
+    for last in (lambda it: it.update(BEGIN + 3 * SECOND), lambda it: it.end(BEGIN + SECOND)):
+        it = judge(track)
+        drive(it, (0, 0, 0, 0), (1, 1, 0, 0))
+        it.update(BEGIN + SECOND)
+        last(it)
+        assert decided(it).outcome == "passed"
+        assert list(values(it)) == ["wall-margin", "distance", "max-speed"]
+    assert decided(it).reason == "stayed clear of left and right until the input ended after 1.00 s"
+
+
+def test_without_a_goal_a_silent_application_fails() -> None:
+    it = judge(Track(LANE.walls, {}, 2.0), requests=[])
+    drive(it, (0, 0, 0, 0))
+    it.end(BEGIN + 2 * SECOND)
+    assert decided(it).reason.startswith("the application sent no GroundSteeringRequest and no PedalPosition")
+
+
+def test_without_walls_no_margin_is_checked() -> None:
+    it = judge(Track({}, LANE.goal, 2.0))
+    drive(it, (0, 0, 0, 0), (1, 3, 0, 0))
+    assert list(values(it)) == ["time-to-goal", "distance", "max-speed"]
+
+
+def test_time_zero_is_the_first_request_when_it_comes_before_the_begin() -> None:
+    it = Judge(LANE, Box(0.36, 0.16))
+    it.update(BEGIN)
+    it.look(Pose(0, 0, 0), BEGIN)
+    it.update(BEGIN + 5 * SECOND)
+    it.request(REQUESTS[0])
+    it.begin(BEGIN + 6 * SECOND)
+    it.look(Pose(3, 0, 0), BEGIN + 8 * SECOND)
+    assert decided(it).reason == "reached finish after 3.00 s"
+
+
+def test_time_zero_is_the_update_after_a_request_when_none_was_before() -> None:
+    it = Judge(LANE, Box(0.36, 0.16))
+    it.request(REQUESTS[0])
+    it.look(Pose(0, 0, 0), BEGIN)
+    it.update(BEGIN + SECOND)
+    it.look(Pose(3, 0, 0), BEGIN + 4 * SECOND)
+    assert decided(it).reason == "reached finish after 3.00 s"
+
+
+def test_time_zero_is_the_first_update_when_neither_comes() -> None:
+    it = Judge(LANE, Box(0.36, 0.16))
+    it.update(BEGIN)
+    it.look(Pose(0, 0, 0), BEGIN + 2 * SECOND)
+    it.look(Pose(3, 0, 0), BEGIN + 4 * SECOND)
+    assert decided(it).reason == "reached finish after 4.00 s"
+
+
+def test_the_begin_forgets_what_was_before() -> None:
+    it = Judge(LANE, Box(0.36, 0.16))
+    it.update(BEGIN - 9 * SECOND)
+    drive(it, (-9, 2, 0.1, 0), (-5, 0, 0, 0))
+    it.begin(BEGIN)
+    drive(it, (-0.001, 0, 0, 0), (1, 0.5, 0, 0), (9, 3, 0, 0))
+    assert values(it)["distance"] == pytest.approx(3)
+    assert values(it)["wall-margin"] == pytest.approx(0.12)
+    assert values(it)["max-speed"] == pytest.approx(0.5 / 1.001)
+
+
+def test_poses_that_are_not_newer_are_ignored() -> None:
+    it = judge()
+    drive(it, (0, 0, 0, 0), (2, 1, 0, 0), (1, 9, 0, 0), (2, 9, 0, 0))
+    assert it.verdict is None
+
+
+@given(st.lists(st.tuples(st.floats(-0.5, 4), st.floats(-0.3, 0.3), st.floats(-180, 180)), min_size=1, max_size=8))
+def test_no_vehicle_passes_that_was_seen_on_a_wall(poses: list[tuple[float, float, float]]) -> None:
+    it = judge()
+    shown = [(0.0, 0.0, 0.0, 0.0), *((index + 1.0, *pose) for index, pose in enumerate(poses))]
+    drive(it, *shown)
+    it.end(BEGIN + 2 * SECOND)
+    touching = []
+    for _, x, y, heading in shown:
+        shape = shapely.affinity.rotate(shapely.box(-0.18, -0.08, 0.18, 0.08), heading, origin=(0, 0))
+        shape = shapely.affinity.translate(shape, x, y)
+        touching.append(
+            "wall" if any(shape.intersects(wall) for wall in LANE.walls.values())
+            else "goal" if shape.intersects(LANE.goal["finish"]) else None
+        )  # fmt: skip
+    first = next((kind for kind in touching if kind), None)
+    if first == "wall":
+        assert decided(it).outcome == "failed" or decided(it).reason.startswith("reached")
+    if decided(it).outcome == "passed":
+        assert "wall" not in touching[: int(values(it)["time-to-goal"] or 0) + 1]
+    if decided(it).reason.startswith("did not reach"):
+        assert first is None
