@@ -19,14 +19,8 @@ def on_the_circle(begin: Pose, yaw: float, time: float) -> tuple[float, float, f
     """Exact pose after `time` seconds of CIRCLE: the body turns about a centre that it holds to its left."""
     (vx, vy, _), rate = CIRCLE.velocity, CIRCLE.rates[2]
     angle = yaw + rate * time
-    x = (
-        begin.position[0]
-        + (vx * (math.sin(angle) - math.sin(yaw)) + vy * (math.cos(angle) - math.cos(yaw))) / rate
-    )
-    y = (
-        begin.position[1]
-        + (vx * (math.cos(yaw) - math.cos(angle)) + vy * (math.sin(angle) - math.sin(yaw))) / rate
-    )
+    x = begin.position[0] + (vx * (math.sin(angle) - math.sin(yaw)) + vy * (math.cos(angle) - math.cos(yaw))) / rate
+    y = begin.position[1] + (vx * (math.cos(yaw) - math.cos(angle)) + vy * (math.sin(angle) - math.sin(yaw))) / rate
     return x, y, angle
 
 
@@ -104,9 +98,7 @@ def test_a_twist_of_another_clock_holds_from_the_last_update() -> None:
     st.lists(st.tuples(st.integers(0, 100), st.floats(-2, 2), st.floats(-5, 5)), max_size=12),
     st.lists(st.integers(1, 100), max_size=12),
 )
-def test_when_updates_fall_makes_no_difference(
-    twists: list[tuple[int, float, float]], updates: list[int]
-) -> None:
+def test_when_updates_fall_makes_no_difference(twists: list[tuple[int, float, float]], updates: list[int]) -> None:
     once, often = Integrator(start()), Integrator(start())
     once.update(0)
     often.update(0)
