@@ -1,0 +1,125 @@
+"""The example application in a closed loop with the camera, the car and the judge: test time only, no sockets."""
+
+import importlib.util
+import math
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from services.base import Verdict
+from services.collision.geometry import Box, Pose
+from services.collision.model import Judge, Track
+from services.collision.obstacles import load, pick
+from services.dynamic_model.model import Vehicle
+from services.integrator.model import Integrator, Twist
+from services.integrator.model import Pose as Attitude
+from services.integrator.rotation import quaternion
+from services.virtual_camera.camera import Pose as CameraPose
+from services.virtual_camera.render import Renderer
+from services.virtual_camera.scene import load_scene
+
+ROOT = Path(__file__).parents[2]
+MAPS = ROOT / "tests_registry" / "maps"
+FRAME, STEP = 100_000, 10_000  # us: camera at 10 Hz, action layer at 100 Hz
+STARTS = [(0.0, 0.0), (-0.05, -8.0), (-0.05, 8.0), (0.05, -8.0), (0.05, 8.0)]  # m to the right, deg to the left
+
+
+def program(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / "kiwi" / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+perception, steering = program("perception"), program("steering")
+
+
+@cache
+def renderer(name: str) -> Renderer:
+    return Renderer(load_scene(MAPS / name), 640, 480, math.radians(48.8))
+
+
+@dataclass
+class Loop:
+    """One drive; `delay` is how long the application takes for a frame (us, a multiple of STEP)."""
+
+    map: str
+    right: float = 0.0
+    yaw: float = 0.0
+    reverse: bool = False
+    delay: int = 0
+
+    def run(self) -> Verdict:
+        obstacles = load(MAPS / self.map)
+        walls = pick(obstacles, ["left", "right"], "walls", MAPS)
+        judge = Judge(Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), Box(0.36, 0.16))
+        heading = math.radians(90 + self.yaw)
+        car, body = Vehicle(100), Integrator(Attitude((self.right, 0.0, 0.0), quaternion(0, 0, heading)))
+        driver, answers = steering.Driver(self.reverse), []
+        now = 0
+        judge.begin(now)
+        while judge.verdict is None:
+            for due, (angle, pedal) in answers:
+                if due == now:
+                    car.steer(angle)
+                    car.press(pedal)
+            motion = car.update(now)
+            body.feed(Twist((motion.vx, motion.vy, 0.0), (0.0, 0.0, motion.yaw_rate)), now)
+            pose = plane(body.update(now))
+            judge.look(pose, now)
+            judge.update(now)
+            if now % FRAME == 0:
+                answers.append((now + self.delay + STEP, self.answer(driver, pose)))
+                for name in ("GroundSteeringRequest", "PedalPositionRequest"):
+                    judge.request(name)
+            now += STEP
+        return judge.verdict
+
+    def answer(self, driver: Any, pose: Pose) -> tuple[float, float]:
+        eye = CameraPose.at(pose.x, pose.y, 0.095, 0.0, 0.0, pose.heading)
+        places: dict[str, list[Any]] = {"yellow": [], "blue": []}
+        for cone in perception.find_cones(renderer(self.map).render(eye)):
+            place = steering.on_the_ground(cone.x, cone.y, cone.width, cone.height)
+            if place is not None:
+                places[cone.colour].append(place)
+        result: tuple[float, float] = driver.drive(places["yellow"], places["blue"])
+        return result
+
+
+def plane(pose: Attitude) -> Pose:
+    x, y, _ = pose.position
+    return Pose(x, y, 2 * math.atan2(pose.attitude[2], pose.attitude[3]))
+
+
+def margin(verdict: Verdict) -> float:
+    value = {check.name: check.value for check in verdict.checks}["wall-margin"]
+    assert value is not None
+    return value
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["straight", "left-curve"])
+@pytest.mark.parametrize(("right", "yaw"), STARTS)
+def test_the_car_reaches_the_finish_with_room_to_spare(name: str, right: float, yaw: float) -> None:
+    verdict = Loop(name, right, yaw).run()
+    assert verdict.outcome == "passed", verdict.reason
+    assert margin(verdict) > 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["straight", "left-curve"])
+def test_a_slow_application_still_reaches_it(name: str) -> None:
+    verdict = Loop(name, 0.02, 4.0, delay=80_000).run()
+    assert verdict.outcome == "passed", verdict.reason
+
+
+@pytest.mark.parametrize(("right", "yaw"), [(0.02, 4.0), *STARTS[1:]])
+def test_reversed_steering_hits_a_wall(right: float, yaw: float) -> None:
+    verdict = Loop("straight", right, yaw, reverse=True).run()
+    assert verdict.outcome == "failed"
+    assert verdict.reason.startswith("hit wall ")
