@@ -68,3 +68,29 @@ def join(vertices: Array, triangles: Indices) -> tuple[list[Loop], Array]:
         owner.update(dict.fromkeys(_edges(loop), one))
     kept = sorted(loops)
     return [loops[i] for i in kept], normals[kept]
+
+
+def convex_parts(vertices: Array, triangles: Indices) -> list[Indices]:
+    """The vertices of each set of triangles that meet at convex edges only, as a cone and its base plate do.
+
+    An edge is convex where the other triangle's far corner does not lie before the plane of the first.
+    """
+    normals = triangle_normals(vertices, triangles)
+    size = float(np.ptp(vertices, axis=0).max())
+    part = list(range(len(triangles)))
+    owner = {edge: i for i, triangle in enumerate(triangles.tolist()) for edge in _edges(triangle)}
+    for (a, b), one in owner.items():
+        other = owner.get((b, a))
+        if other is not None and other > one:
+            far = vertices[triangles[other].sum() - a - b] - vertices[a]
+            if normals[one] @ far <= 1e-4 * size:
+                part[_root(part, other)] = _root(part, one)
+    roots = np.array([_root(part, i) for i in range(len(part))])
+    return [np.unique(triangles[roots == root]) for root in np.unique(roots)]
+
+
+def _root(part: list[int], i: int) -> int:
+    while part[i] != i:
+        part[i] = part[part[i]]
+        i = part[i]
+    return i

@@ -85,12 +85,12 @@ def _orders(group: Group) -> list[list[int]]:
 
 
 def silhouettes(group: Group) -> list[list[Piece]]:
-    """Each copy as one piece, its outline's convex hull, in the mean colour of what shows."""
+    """Each copy as the convex hulls of its outlines, in the mean colour of what shows."""
     seen = np.maximum(_facing(group), 0.0) * group.shape.areas + 1e-12
     colours = _paint(group, (seen * _shades(group)).sum(axis=1) / seen.sum(axis=1))
-    points = _in_camera(group, _thinned(group)[:, group.shape.outline])
-    outlines = fixed(group.view.camera.project(points))
-    return [[(cv2.convexHull(o), c)] for o, c in zip(outlines, colours, strict=True)]
+    corners = fixed(group.view.camera.project(_in_camera(group, _thinned(group))))
+    hulls = [[cv2.convexHull(each[part]) for part in group.shape.outlines] for each in corners]
+    return [[(hull, colour) for hull in parts] for parts, colour in zip(hulls, colours, strict=True)]
 
 
 def whole(group: Group) -> list[list[Piece]]:

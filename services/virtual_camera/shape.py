@@ -6,9 +6,10 @@ import numpy as np
 
 from services.virtual_camera.camera import Array
 from services.virtual_camera.meshes import Indices
-from services.virtual_camera.polygons import MAX_CORNERS, Loop, join
+from services.virtual_camera.polygons import MAX_CORNERS, Loop, convex_parts, join
 
 _MANY_CORNERS = 64
+_MANY_PARTS = 6
 _DIRECTIONS = 128
 _LONGEST_MITRE = 3.0
 
@@ -19,8 +20,9 @@ class Shape:
 
     ``vertices`` (V, 3); ``mitres`` (V, 3): how far each vertex moves when all faces move inwards by 1;
     ``faces`` (F, 8) vertex numbers, counter-clockwise from outside, the last one repeated;
-    ``normals`` and ``centres`` (F, 3), ``areas`` (F,); ``outline``: the vertices that make the silhouette;
-    ``middle`` and ``radius`` of a sphere around all; ``thickness``: faces move inwards by no more.
+    ``normals`` and ``centres`` (F, 3), ``areas`` (F,); ``outlines``: sets of vertices whose
+    convex hulls make the silhouette; ``middle`` and ``radius`` of a sphere around all;
+    ``thickness``: faces move inwards by no more.
     """
 
     vertices: Array
@@ -29,7 +31,7 @@ class Shape:
     normals: Array
     centres: Array
     areas: Array
-    outline: Indices
+    outlines: tuple[Indices, ...]
     middle: Array
     radius: float
     thickness: float
@@ -64,10 +66,19 @@ def _sphere_directions(count: int) -> Array:
     return np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
 
 
-def _outline(vertices: Array) -> Indices:
-    if len(vertices) <= _MANY_CORNERS:
-        return np.arange(len(vertices))
-    return np.unique(np.argmax(_sphere_directions(_DIRECTIONS) @ vertices.T, axis=1))
+def _outermost(vertices: Array, part: Indices) -> Indices:
+    """The vertices of a part that are the farthest ones in some direction."""
+    if len(part) <= _MANY_CORNERS:
+        return part
+    farthest = np.argmax(_sphere_directions(_DIRECTIONS) @ vertices[part].T, axis=1)
+    return np.asarray(part[np.unique(farthest)], np.intp)
+
+
+def _outlines(vertices: Array, triangles: Indices) -> tuple[Indices, ...]:
+    parts = convex_parts(vertices, triangles)
+    if len(parts) > _MANY_PARTS:
+        parts = [np.arange(len(vertices))]
+    return tuple(_outermost(vertices, part) for part in parts)
 
 
 def make_shape(vertices: Array, triangles: Indices) -> Shape:
@@ -85,7 +96,7 @@ def make_shape(vertices: Array, triangles: Indices) -> Shape:
         normals=normals,
         centres=np.array([centre for centre, _ in measured]),
         areas=np.array([area for _, area in measured]),
-        outline=_outline(vertices - middle),
+        outlines=_outlines(vertices, triangles),
         middle=middle,
         radius=float(np.linalg.norm(vertices - middle, axis=1).max()),
         thickness=float((high - low).min()) / 4,

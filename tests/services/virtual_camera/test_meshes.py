@@ -5,7 +5,7 @@ import pytest
 
 from services.virtual_camera.jsonnode import MapError
 from services.virtual_camera.meshes import is_closed, load_obj, oriented, volume
-from services.virtual_camera.polygons import join
+from services.virtual_camera.polygons import convex_parts, join
 from services.virtual_camera.shape import make_shape
 
 
@@ -83,6 +83,26 @@ def test_joined_polygons_cover_what_the_triangles_did(obj):
     assert float(shape.areas[shape.normals[:, 2] > 0.9].sum()) == pytest.approx(cap)
     assert float(shape.areas.sum()) == pytest.approx(2 * cap + 2.0 * 16 * math.sin(math.pi / 16))
     assert np.linalg.norm(normals, axis=1) == pytest.approx(np.ones(len(loops)))
+
+
+def stepped(radii, heights) -> str:
+    """A tower of rings of sixteen corners."""
+    turns = [2 * math.pi * i / 16 for i in range(16)]
+    lines = [f"v {r * math.cos(t)} {r * math.sin(t)} {z}" for r, z in zip(radii, heights, strict=True) for t in turns]
+    for ring in range(len(radii) - 1):
+        lines += [
+            f"f {ring * 16 + i + 1} {ring * 16 + (i + 1) % 16 + 1} {ring * 16 + (i + 1) % 16 + 17} {ring * 16 + i + 17}"
+            for i in range(16)
+        ]
+    top = 16 * (len(radii) - 1)
+    lines += ["f " + " ".join(map(str, range(16, 0, -1))), "f " + " ".join(str(top + i + 1) for i in range(16))]
+    return "\n".join(lines)
+
+
+def test_a_cone_on_a_plate_has_two_convex_parts_and_a_box_one(obj, cube_obj):
+    assert [len(part) for part in convex_parts(*load_obj(obj(cube_obj)))] == [8]
+    parts = convex_parts(*load_obj(obj(stepped([4, 4, 3, 1], [0, 1, 1, 9]))))
+    assert sorted(len(part) for part in parts) == [32, 48]
 
 
 BAD = [

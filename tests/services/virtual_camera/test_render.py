@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl import data
 from services.virtual_camera.camera import Pose
 from services.virtual_camera.render import Renderer
 from services.virtual_camera.scene import load_scene
@@ -72,6 +73,19 @@ def test_small_and_far_boxes_keep_their_size(cube_at):
         seen += ((image[..., 2] > 100) & (image[..., 0] < 50)).sum()
         told += (FOCAL * 0.1 / distance) ** 2
     assert seen == pytest.approx(told, rel=0.15)
+
+
+def test_silhouettes_cover_what_all_the_faces_would():
+    """Far cones in a small picture, drawn as silhouettes, and in one of four times the size, face by face."""
+    scene = load_scene(data.registry() / "maps" / "straight")
+    small, large = (Renderer(scene, 480 * k, 360 * k, 0.5) for k in (1, 4))
+    covered = []
+    for x in np.linspace(-2.5, -2.1, 9):
+        pose = Pose.at(float(x), 1.4, 0.4, pitch=0.25)
+        covered.append([(r.render(pose)[..., 0] < 30).sum() for r in (small, large)])
+    few, many = np.sum(covered, axis=0)
+    assert few > 500
+    assert few == pytest.approx(many / 16, rel=0.08)
 
 
 def test_left_of_the_car_is_left_in_the_picture(cube_at):
