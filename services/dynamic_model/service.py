@@ -1,7 +1,6 @@
 """The single-track model on the bus."""
 
 import logging
-from collections.abc import Iterator
 from typing import Any
 
 from services.base import Context, Output, Service
@@ -22,9 +21,9 @@ class DynamicModel(Service):
         self._state = context.messages.type("opendlv.sim.KinematicState")
         self._frame_id = context.flags["frame-id"]
 
-    def update(self, now: int) -> Iterator[Output]:
+    def update(self, now: int) -> tuple[Output]:
         motion = self.vehicle.update(now)
-        yield Output(self._state(vx=motion.vx, vy=motion.vy, yawRate=motion.yaw_rate), self._frame_id)
+        return (Output(self._state(vx=motion.vx, vy=motion.vy, yawRate=motion.yaw_rate), self._frame_id),)
 
     def _steer(self, message: Any, _sample_time: int) -> None:
         if not self.vehicle.steer(message.groundSteering):

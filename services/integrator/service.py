@@ -2,7 +2,6 @@
 
 import logging
 import math
-from collections.abc import Iterator
 from typing import Any
 
 from services.base import Context, Flags, Output, Service
@@ -22,11 +21,11 @@ class Integration(Service):
         self._frame_id = context.flags["frame-id"]
         self.inputs = {("opendlv.sim.KinematicState", self._frame_id): self._feed}
 
-    def update(self, now: int) -> Iterator[Output]:
+    def update(self, now: int) -> tuple[Output]:
         pose = self.body.update(now)
         x, y, z = pose.position
         qx, qy, qz, qw = pose.attitude
-        yield Output(self._frame(x=x, y=y, z=z, qx=qx, qy=qy, qz=qz, qw=qw), self._frame_id)
+        return (Output(self._frame(x=x, y=y, z=z, qx=qx, qy=qy, qz=qz, qw=qw), self._frame_id),)
 
     def _feed(self, state: Any, sample_time: int) -> None:
         twist = Twist((state.vx, state.vy, state.vz), (state.rollRate, state.pitchRate, state.yawRate))

@@ -29,9 +29,7 @@ def drive(vehicle: Vehicle, seconds: float, period: int = 10_000, start: int = 0
     return vehicle.motion
 
 
-@pytest.mark.parametrize(
-    ("pedal", "speed"), [(0.14, 0.91), (1.0, 0.91), (-0.9, -1.125), (-5.0, -1.125), (0.0, 0.0)]
-)
+@pytest.mark.parametrize(("pedal", "speed"), [(0.14, 0.91), (1.0, 0.91), (-0.9, -1.125), (-5.0, -1.125), (0.0, 0.0)])
 def test_steady_speed(pedal: float, speed: float) -> None:
     vehicle = Vehicle(freq=100)
     vehicle.press(pedal)
@@ -87,9 +85,7 @@ def test_steady_turn_agrees_with_the_linear_single_track_model() -> None:
     base = FRONT + REAR
     balance = REAR * CORNERING_REAR - FRONT * CORNERING_FRONT
     gradient = MASS * balance / (base * CORNERING_FRONT * CORNERING_REAR)
-    assert motion.yaw_rate == pytest.approx(
-        motion.vx * wheel_angle(0.1) / (base + gradient * motion.vx**2), rel=1e-9
-    )
+    assert motion.yaw_rate == pytest.approx(motion.vx * wheel_angle(0.1) / (base + gradient * motion.vx**2), rel=1e-9)
     assert INERTIA > 0 and motion.yaw_rate > 0
 
 

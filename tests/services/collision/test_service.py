@@ -1,0 +1,147 @@
+import json
+import math
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base import Context, Flags
+from services.collision.service import Collision
+from tests.services.process import PATIENCE, launch, running, say
+
+FRAME = "opendlv.sim.Frame"
+LANE = {
+    "obstacles": [
+        {"name": "left", "lines": [[-1, 0.2, 5, 0.2]]},
+        {"name": "right", "lines": [[-1, -0.2, 5, -0.2]]},
+        {"name": "finish", "lines": [3, -0.2, 3, 0.2]},
+    ]
+}
+START = 1_700_000_000_000_000
+
+
+@pytest.fixture
+def lane(tmp_path: Path) -> Iterator[Path]:
+    (tmp_path / "map.json").write_text(json.dumps(LANE))
+    yield tmp_path
+
+
+def service(lane: Path, **changes: Any) -> Collision:
+    flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
+    return Collision(
+        Context("collision", Flags({**flags, "map-path": str(lane), "frame-id": 2, **changes}), MessageSet.standard())
+    )
+
+
+def frame(x: float, y: float, heading: float = 0.0) -> Any:
+    return MessageSet.standard().type(FRAME)(x=x, y=y, qz=math.sin(heading / 2), qw=math.cos(heading / 2))
+
+
+def test_frames_of_its_vehicle_bring_the_verdict(lane: Path) -> None:
+    judge = service(lane)
+    assert set(judge.inputs) == {
+        (FRAME, 2),
+        ("opendlv.proxy.GroundSteeringRequest", None),
+        ("opendlv.proxy.PedalPositionRequest", None),
+    }
+    judge.begin(START)
+    look = judge.inputs[FRAME, 2]
+    look(frame(0, 0), START)
+    assert judge.verdict is None
+    look(frame(0.5, 0.05, math.pi / 2), START + 500_000)
+    assert judge.verdict is not None
+    assert judge.verdict.reason == "hit wall left after 0.50 s at x = 0.50 m, y = 0.05 m"
+
+
+def test_requests_are_heard_and_time_runs_out_in_updates(lane: Path) -> None:
+    judge = service(lane)
+    judge.begin(START)
+    judge.inputs[FRAME, 2](frame(0, 0), START)
+    judge.inputs["opendlv.proxy.GroundSteeringRequest", None](None, 0)
+    judge.update(START + 41_000_000)
+    assert judge.verdict is not None
+    assert judge.verdict.reason.endswith("; the application sent no PedalPositionRequest")
+
+
+def test_a_frame_without_an_attitude_is_no_sample(lane: Path, caplog: pytest.LogCaptureFixture) -> None:
+    judge = service(lane)
+    judge.begin(START)
+    for _ in range(2):
+        judge.inputs[FRAME, 2](MessageSet.standard().type(FRAME)(x=1), START)
+    judge.inputs[FRAME, 2](frame(math.nan, 0), START)
+    assert judge.rejected == 3 and len(caplog.records) == 1
+    with pytest.raises(Exception, match=r"no opendlv.sim.Frame of the vehicle came before the input ended"):
+        judge.end_of_input(START + 1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"goal": None, "walls": []}, "there is nothing to judge by: give --goal, --walls or both"),
+        ({"goal": "left"}, "--goal=left is one of the --walls too"),
+        ({"goal": "finnish"}, "has no obstacle 'finnish'; did you mean 'finish'?"),
+    ],
+)
+def test_flags_that_make_no_track_are_refused(lane: Path, changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"{re.escape(message)}$"):
+        service(lane, **changes)
+
+
+def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    output, errors = process.communicate(timeout=PATIENCE)
+    return process.returncode, output, errors
+
+
+def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
+    flags = (f"--cid={cid}", f"--map-path={lane}", "--goal=finish", "--walls=left,right")
+    with Session(cid) as session, running("collision", lane, *flags) as process:
+        say(session, "dodo.TestBegin", sample_time=START)
+        say(session, "opendlv.proxy.PedalPositionRequest", position=0.1)
+        say(session, FRAME, sample_time=START + 10_000, qw=1.0)
+        say(session, FRAME, sample_time=START + 2_010_000, x=2.9, y=0.05, qw=1.0)
+        code, output, errors = finished(process)
+    assert (code, errors) == (0, "")
+    verdict = json.loads(output)
+    assert (verdict["dodo"], verdict["outcome"], verdict["reason"]) == (
+        "verdict",
+        "passed",
+        "reached finish after 2.01 s",
+    )
+    checks = {check["name"]: check for check in verdict["checks"]}
+    assert checks["time-to-goal"] == {
+        "name": "time-to-goal", "value": 2.01, "limit": {"max": 60}, "unit": "s", "ok": True
+    }  # fmt: skip
+    assert checks["wall-margin"]["value"] == pytest.approx(0.07, abs=1e-6)
+
+
+def test_the_end_of_the_input_of_a_silent_application(lane: Path, cid: int) -> None:
+    flags = (f"--cid={cid}", f"--map-path={lane}", "--goal=finish")
+    with Session(cid) as session, running("collision", lane, *flags) as process:
+        say(session, "dodo.TestBegin")
+        say(session, FRAME, qw=1.0)
+        say(session, "dodo.EndOfInput", source="recording")
+        code, output, _ = finished(process)
+    verdict = json.loads(output)
+    assert (code, verdict["outcome"]) == (0, "failed")
+    assert verdict["reason"].startswith(
+        "the application sent no GroundSteeringRequest and no PedalPositionRequest before the input ended after 0."
+    )
+
+
+def test_no_frame_is_an_error_and_no_verdict(lane: Path, cid: int) -> None:
+    with running("collision", lane, f"--cid={cid}", f"--map-path={lane}", "--walls=left", "--max-time=0.05") as process:
+        code, output, errors = finished(process)
+    assert (code, output) == (1, "")
+    assert "no opendlv.sim.Frame of the vehicle came within 0.05 s" in errors
+
+
+def test_a_wrong_name_ends_it_before_it_is_ready(lane: Path, cid: int) -> None:
+    process = launch("collision", lane, f"--cid={cid}", f"--map-path={lane}", "--goal=finnish")
+    code, output, errors = finished(process)
+    assert (code, output) == (2, "")
+    assert errors.endswith(f"--goal: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?\n")

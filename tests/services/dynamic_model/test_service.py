@@ -1,0 +1,56 @@
+import logging
+import math
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base import Context, Flags, Output
+from services.dynamic_model.service import DynamicModel
+from tests.services.process import hear, running, say
+
+STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
+
+
+def service(frame_id: int = 3) -> DynamicModel:
+    return DynamicModel(Context("dynamic-model", Flags({"freq": 100.0, "frame-id": frame_id}), MessageSet.standard()))
+
+
+def test_requests_move_the_body_that_its_output_tells() -> None:
+    model, messages = service(), MessageSet.standard()
+    assert model.period == 10_000
+    model.inputs[PEDAL, None](messages.type(PEDAL)(position=0.1), 0)
+    model.inputs[STEERING, None](messages.type(STEERING)(groundSteering=0.1), 0)
+    for now in range(0, 3_000_001, 10_000):
+        (output,) = model.update(now)
+    assert isinstance(output, Output)
+    state = output.message
+    assert (state.DESCRIPTOR.full_name, output.sender_stamp) == ("opendlv.sim.KinematicState", 3)
+    motion = model.vehicle.motion
+    assert [state.vx, state.vy, state.yawRate] == pytest.approx([motion.vx, motion.vy, motion.yaw_rate])
+    assert [state.vz, state.rollRate, state.pitchRate] == [0, 0, 0]
+    assert state.vx > 0.6 and state.yawRate > 0.1
+
+
+def test_what_is_no_number_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
+    model, messages = service(), MessageSet.standard()
+    with caplog.at_level(logging.WARNING):
+        model.inputs[PEDAL, None](messages.type(PEDAL)(position=math.nan), 0)
+        model.inputs[STEERING, None](messages.type(STEERING)(groundSteering=math.inf), 0)
+    assert [record.getMessage() for record in caplog.records] == [
+        "a PedalPositionRequest of nan is ignored, as all that are not finite will be"
+    ]
+    assert model.vehicle.rejected == 2
+
+
+def test_on_the_bus(cid: int, tmp_path: Path) -> None:
+    with Session(cid) as session, running("dynamic_model", tmp_path, f"--cid={cid}", "--frame-id=7"):
+        first, state = hear(session, "opendlv.sim.KinematicState", 7)
+        assert state.vx == 0
+        say(session, PEDAL, sender_stamp=42, position=-0.5)
+        while state.vx == 0:
+            envelope, state = hear(session, "opendlv.sim.KinematicState", 7)
+        assert state.vx < 0
+        assert envelope.sample_time > first.sample_time
+        assert (envelope.sample_time - first.sample_time) % 10_000 == 0
