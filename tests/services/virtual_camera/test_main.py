@@ -1,0 +1,102 @@
+import hashlib
+import json
+import math
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dodo_dsl import data
+from dodo_dsl.opendlv.messages import MessageSet
+from services.virtual_camera.camera import Pose
+from services.virtual_camera.model import to_i420
+from services.virtual_camera.render import Renderer
+from services.virtual_camera.scene import load_scene
+
+FOLDER = data.services() / "virtual_camera"
+STRAIGHT = data.registry() / "maps" / "straight"
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts the service with flags; whatever still runs at the end is killed."""
+    processes = []
+
+    def run(*flags):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "services.virtual_camera", *flags],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            cwd=FOLDER.parents[1],
+            env={**os.environ, "DODO_READY_FILE": str(tmp_path / "ready")},
+            text=True,
+        )
+        processes.append(process)
+        return process
+
+    yield run
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def test_libcluon_gets_the_pictures_of_the_frames_it_sends(start, cid):
+    pytest.importorskip("pycluon")
+    names = [f"dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420")]
+    camera = start(
+        f"--cid={cid}", f"--map-path={STRAIGHT}", "--width=320", "--height=240", "--freq=20", "--z=0.095",
+        "--x=0.1", "--frame-id=7", f"--name.argb={names[0]}", f"--name.i420={names[1]}",
+    )  # fmt: skip
+    assert select.select([camera.stdout], [], [], 20)[0]
+    assert json.loads(camera.stdout.readline()) == {"dodo": "ready"}
+    messages = MessageSet.standard()
+    frame = messages.type("opendlv.sim.Frame")(x=0.0, y=1.5, z=0.0, qx=0.0, qy=0.0, qz=0.6, qw=0.8)
+    begun = time.time()
+    viewer = [sys.executable, str(Path(__file__).with_name("libcluon_viewer.py"))]
+    output = subprocess.run(
+        [*viewer, str(cid), "7", messages.encode(frame).hex(), *names], stdout=subprocess.PIPE, timeout=20, check=True
+    ).stdout
+    seen = json.loads(output)
+    yaw = 2 * math.atan2(frame.qz, frame.qw)
+    renderer = Renderer(load_scene(STRAIGHT), 320, 240, math.radians(48.8))
+    expected = renderer.render(Pose.at(0.1 * math.cos(yaw), 1.5 + 0.1 * math.sin(yaw), 0.095, yaw=yaw))
+    for memory, picture in zip(seen, (expected, to_i420(expected)), strict=True):
+        assert (memory["size"], memory["sha256"]) == (picture.nbytes, hashlib.sha256(picture).hexdigest())
+        assert begun - 1 < memory["time"] / 1e6 < time.time() + 1
+    camera.send_signal(signal.SIGTERM)
+    assert camera.wait(10) == 0
+    assert not any(Path("/tmp", name).exists() for name in names)
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["--map-path=/nowhere"], r"/nowhere: there is no such file"),
+        ([f"--map-path={STRAIGHT}", "--height=241"], r"width and height must be even for I420, and 640 x 241 are not"),
+        ([], r"--map-path is missing"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line_and_ends_with_2(start, cid, flags, message):
+    names = [f"--name.{kind}=dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420")]
+    process = start(f"--cid={cid}", *names, *flags)
+    _, errors = process.communicate(timeout=20)
+    assert (process.returncode, len(errors.splitlines())) == (2, 1)
+    assert errors.startswith("virtual-camera: ")
+    assert re.search(message, errors)
+
+
+def test_the_readme_explains_each_flag_and_its_example_has_known_ones():
+    readme = (FOLDER / "README.md").read_text()
+    parameters = yaml.safe_load((FOLDER / "service.yml").read_text())["parameters"]
+    for name in parameters:
+        assert f"`--{name}`" in readme
+    (example,) = (line for line in readme.splitlines() if line.strip().startswith("python -m services.virtual_camera"))
+    used = re.findall(r"--([a-z][a-z0-9.-]*)=", example)
+    assert {"cid", "map-path"} <= set(used) <= {"cid", *parameters}
