@@ -1,8 +1,9 @@
 """What all services share: flags from the manifest, the loop with its injected clock, readiness, verdicts."""
 
-from services.base.clock import Clock, RealTimeClock
+from services.base.clock import Clock, Inbox, RealTimeClock
 from services.base.flags import Flags, FlagsError
-from services.base.service import Context, Handler, Output, Service, run
+from services.base.process import run
+from services.base.service import Context, Handler, Output, Service, period_of
 from services.base.verdict import Check, Verdict
 
 __all__ = [
@@ -12,9 +13,11 @@ __all__ = [
     "Flags",
     "FlagsError",
     "Handler",
+    "Inbox",
     "Output",
     "RealTimeClock",
     "Service",
     "Verdict",
+    "period_of",
     "run",
 ]

@@ -5,22 +5,40 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
+from dodo_dsl.opendlv.envelope import Envelope
+
 MICROSECONDS = 1_000_000
 LATEST = MICROSECONDS
 _SLICE = 0.1
 _MAX_DRAINED = 1000
 
-Deliver = Callable[[float], bool]
-"""Hands the service one message that comes within so many seconds; False when none came."""
+_log = logging.getLogger(__name__)
+
+
+class Inbox(Protocol):
+    """What others sent. A clock takes every envelope and hands on those that the service is to see."""
+
+    def receive(self, timeout: float) -> Envelope | None:
+        """The next envelope that comes within so many seconds."""
+        ...
+
+    def handle(self, envelope: Envelope) -> None:
+        """Let the service have it."""
+        ...
 
 
 class Clock(Protocol):
     """Test time, in microseconds since the epoch."""
 
-    def now(self) -> int: ...
+    def now(self) -> int:
+        """The time of the test."""
+        ...
 
-    def steps(self, period: int, deliver: Deliver, stopped: Callable[[], bool]) -> Iterator[int]:
-        """The instants at which a service is due, one each ``period`` microseconds; messages come in between."""
+    def steps(self, period: int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+        """The instants at which a service is due, one each ``period`` microseconds; messages come in between.
+
+        Ends soon after ``stopped``, which a message or a signal can make true.
+        """
         ...
 
 
@@ -37,24 +55,35 @@ class RealTimeClock:
     def now(self) -> int:
         return time.monotonic_ns() // 1000 + self._offset
 
-    def steps(self, period: int, deliver: Deliver, stopped: Callable[[], bool]) -> Iterator[int]:
+    def steps(self, period: int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         due = self.now()
         while True:
-            while (left := due - self.now()) > 0 and not stopped():
-                deliver(min(left / MICROSECONDS, _SLICE))
-            for _ in range(_MAX_DRAINED):
-                if stopped() or not deliver(0.0):
-                    break
+            self._wait(due, inbox, stopped)
             if stopped():
                 return
             yield due
             due += period
             due += self._skipped(due, period)
 
+    def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
+        """Deliver until the instant has come, and then what else is there already."""
+        while (left := due - self.now()) > 0 and not stopped():
+            _deliver(inbox, min(left / MICROSECONDS, _SLICE))
+        for _ in range(_MAX_DRAINED):
+            if stopped() or not _deliver(inbox, 0.0):
+                break
+
     def _skipped(self, due: int, period: int) -> int:
         late = self.now() - due
         if late <= LATEST:
             return 0
         steps = late // period
-        logging.getLogger(__name__).warning("%.1f s late: %d steps are skipped", late / MICROSECONDS, steps)
+        _log.warning("%.1f s late: %d steps are skipped", late / MICROSECONDS, steps)
         return steps * period
+
+
+def _deliver(inbox: Inbox, timeout: float) -> bool:
+    envelope = inbox.receive(timeout)
+    if envelope is not None:
+        inbox.handle(envelope)
+    return envelope is not None

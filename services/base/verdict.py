@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,16 @@ class Check:
     unit: str = ""
     ok: bool = True
 
+    def as_json(self) -> dict[str, Any]:
+        """The check as it stands in the verdict line; numbers may come from numpy."""
+        return {
+            "name": self.name,
+            "value": _number(self.value),
+            "limit": {key: _number(bound) for key, bound in self.limit.items() if math.isfinite(bound)},
+            "unit": self.unit,
+            "ok": bool(self.ok),
+        }
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -27,16 +37,13 @@ class Verdict:
     checks: tuple[Check, ...] = ()
 
     def line(self) -> str:
-        """The verdict line of design section 6, without its line break."""
-        checks = [
-            {
-                "name": check.name,
-                "value": check.value if check.value is not None and math.isfinite(check.value) else None,
-                "limit": {k: v for k, v in check.limit.items() if math.isfinite(v)},
-                "unit": check.unit,
-                "ok": check.ok,
-            }
-            for check in self.checks
-        ]
+        """The verdict line of design section 6, without its line break; ASCII, whatever the locale."""
+        checks = [check.as_json() for check in self.checks]
         message = {"dodo": "verdict", "outcome": self.outcome, "reason": self.reason, "checks": checks}
-        return json.dumps(message, ensure_ascii=False, allow_nan=False)
+        return json.dumps(message, allow_nan=False)
+
+
+def _number(value: float | None) -> float | None:
+    if value is None or not math.isfinite(value):
+        return None
+    return value if isinstance(value, int) else float(value)

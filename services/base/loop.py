@@ -1,0 +1,81 @@
+"""The one loop of all services: deliver, update, send, until there is a verdict, an end or a signal."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.codec import MessageError
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
+from services.base.clock import Clock
+from services.base.service import IDLE_PERIOD, Handler, Output, Service
+
+TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass
+class Loop:
+    """Runs a service on a session by a clock; ``sender_stamp`` is that of outputs without one.
+
+    ``name`` stands in the EndOfInput of a source. Raises what the model raises, and SessionError.
+    """
+
+    name: str
+    service: Service
+    session: Session
+    clock: Clock
+    sender_stamp: int
+    _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        ids = self.session.messages.id
+        for (name, stamp), handler in self.service.inputs.items():
+            self._handlers.setdefault(ids(name), []).append((stamp, handler))
+        self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        """Until the service is done, or ``stopped`` by a signal."""
+        service = self.service
+
+        def over() -> bool:
+            return stopped() or service.verdict is not None
+
+        for now in self.clock.steps(service.period or IDLE_PERIOD, self, over):
+            if service.period is not None:
+                for output in service.update(now):
+                    self._send(output, now)
+            if service.finished:
+                break
+        if service.finished and service.verdict is None:
+            self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
+        if self.session.garbage:
+            _log.debug("%d datagrams held no message", self.session.garbage)
+
+    def receive(self, timeout: float) -> Envelope | None:
+        """For the clock: the next envelope within ``timeout`` seconds."""
+        return self.session.receive(timeout)
+
+    def handle(self, envelope: Envelope) -> None:
+        """For the clock: let the service have an envelope; what cannot be decoded is logged and left."""
+        if self.service.observe is not None:
+            self.service.observe(envelope)
+        if envelope.data_type == self._begin:
+            self.service.begin(envelope.sample_time)
+        elif envelope.data_type == self._end:
+            self.service.end_of_input(self.clock.now())
+        for stamp, handler in self._handlers.get(envelope.data_type, ()):
+            if stamp is None or stamp == envelope.sender_stamp:
+                try:
+                    message = self.session.messages.decode(envelope.data_type, envelope.payload)
+                except MessageError as error:
+                    _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
+                    return
+                handler(message, envelope.sample_time)
+
+    def _send(self, output: Message | Output, now: int) -> None:
+        message, stamp = output if isinstance(output, Output) else (output, self.sender_stamp)
+        self.session.send(message, now, stamp)

@@ -1,0 +1,98 @@
+"""A service as a process: flags, log, signals, readiness, and its exit code."""
+
+import logging
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import FrameType
+
+from dodo_dsl.opendlv.session import Session
+from services.base.clock import Clock, RealTimeClock
+from services.base.flags import Flags, FlagsError, parse
+from services.base.loop import Loop
+from services.base.manifest import load_manifest
+from services.base.service import Build, Context
+from services.base.usage import help_text
+
+READY = '{"dodo": "ready"}'
+DONE, BROKEN, USAGE = 0, 1, 2
+
+
+def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
+    """A service from its command line to its exit code: 0 done or told to stop, 1 broken, 2 wrong flags.
+
+    ``folder`` holds the manifest; ``build`` raises ValueError or OSError for flags that cannot be met.
+    """
+    words = sys.argv[1:] if argv is None else argv
+    manifest = load_manifest(folder)
+    if "--help" in words:
+        sys.stdout.write(help_text(manifest))
+        return DONE
+    name = manifest["name"]
+    try:
+        flags = parse(manifest, words)
+    except FlagsError as error:
+        sys.stderr.write(f"{name}: {error}\n")
+        return USAGE
+    level = logging.DEBUG if flags["verbose"] else logging.INFO
+    logging.basicConfig(stream=sys.stderr, level=level, format=f"{name}: %(levelname)s: %(message)s")
+    with _signals() as stop:
+        return _serve(name, build, flags, clock, stop)
+
+
+class _Stop:
+    asked = False
+
+    def __call__(self) -> bool:
+        return self.asked
+
+    def ask(self, _number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+
+
+@contextmanager
+def _signals() -> Iterator[_Stop]:
+    stop = _Stop()
+    old = {number: signal.signal(number, stop.ask) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield stop
+    finally:
+        for number, handler in old.items():
+            signal.signal(number, handler)
+
+
+def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _Stop) -> int:
+    role = os.environ.get("DODO_SERVICE") or name
+    ready = Path(os.environ.get("DODO_READY_FILE") or f"/tmp/dodo-ready-{role}")
+    code = USAGE
+    try:
+        ready.unlink(missing_ok=True)  # of one that was killed
+        with ExitStack() as resources:
+            session = resources.enter_context(Session(flags["cid"]))
+            service = build(Context(name, flags, session.messages, resources))
+            code = BROKEN
+            loop = Loop(role, service, session, clock or RealTimeClock(), flags["id"])
+            resources.enter_context(_readiness(ready))
+            loop.run(stop)
+            if service.verdict is not None:
+                print(service.verdict.line(), flush=True)
+    except Exception as error:
+        expected = code == USAGE and isinstance(error, ValueError | OSError)
+        text = " ".join(str(error).split())
+        logging.critical("%s", text if expected else f"{type(error).__name__}: {text}", exc_info=bool(flags["verbose"]))
+        return code if expected else BROKEN
+    return DONE
+
+
+@contextmanager
+def _readiness(file: Path) -> Iterator[None]:
+    """Say that the service is ready; the ready file is there as long as it is."""
+    file.touch()
+    try:
+        print(READY, flush=True)
+        yield
+    finally:
+        file.unlink(missing_ok=True)
