@@ -1,0 +1,65 @@
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+PATIENCE = 20.0
+
+
+class Process:
+    """A service as a process; every reading of its output has a limit in time."""
+
+    def __init__(self, argv: list[str], environment: dict[str, str]) -> None:
+        self.process = subprocess.Popen(
+            argv,
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def line(self) -> Any:
+        assert self.process.stdout is not None
+        assert select.select([self.process.stdout], [], [], PATIENCE)[0], "the service is silent"
+        return json.loads(self.process.stdout.readline())
+
+    def stop(self) -> None:
+        self.process.send_signal(signal.SIGTERM)
+
+    def end(self) -> tuple[int, str, str]:
+        """Exit code, what is left of standard output, and standard error."""
+        out, err = self.process.communicate(timeout=PATIENCE)
+        return self.process.returncode, out, err
+
+
+Start = Callable[..., Process]
+
+
+@pytest.fixture
+def ready_file(tmp_path: Path) -> Path:
+    return tmp_path / "ready"
+
+
+@pytest.fixture
+def start(cid: int, ready_file: Path) -> Iterator[Start]:
+    """Starts the tiny service on the session of the test."""
+    processes: list[Process] = []
+
+    def start_one(*flags: str, **environment: str) -> Process:
+        argv = [sys.executable, str(Path(__file__).with_name("tiny") / "__main__.py"), f"--cid={cid}", *flags]
+        processes.append(Process(argv, {"DODO_READY_FILE": str(ready_file), **environment}))
+        return processes[-1]
+
+    yield start_one
+    for process in processes:
+        process.process.kill()
+        process.process.communicate()

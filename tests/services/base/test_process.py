@@ -1,0 +1,150 @@
+"""The tiny service as a process on a real bus."""
+
+import shlex
+import subprocess
+import sys
+import uuid
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from tests.services.base.conftest import ROOT, Process, Start
+
+MESSAGES = MessageSet.standard()
+READY = {"dodo": "ready"}
+BEGIN = MESSAGES.type("dodo.TestBegin")
+END = MESSAGES.type("dodo.EndOfInput")
+DISTANCE = MESSAGES.type("opendlv.proxy.DistanceReading")
+PEDAL, ANGLE, VOLTAGE = 1086, 1038, 1037
+
+
+def heard(session: Session, data_type: int) -> Envelope:
+    while True:
+        envelope = session.receive(20.0)
+        assert envelope is not None, f"no message {data_type}"
+        if envelope.data_type == data_type:
+            return envelope
+
+
+def test_ready_means_that_session_and_memory_are_there(start: Start, ready_file: Path) -> None:
+    name = f"dodo-test-{uuid.uuid4().hex}"
+    ready_file.touch()  # left by one that was killed
+    service = start("--role=echo", f"--name={name}")
+    assert service.line() == READY
+    assert ready_file.exists()
+    with SharedMemory.attach(name) as memory:
+        assert memory.size == 100
+    service.stop()
+    assert service.end() == (0, "", "")
+    assert not ready_file.exists()
+    assert not Path("/tmp", name).exists()
+
+
+def test_steps_are_even_and_stamped_with_test_time(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        start("--role=echo", "--freq=100", "--id=5")
+        pedals = [heard(session, PEDAL) for _ in range(5)]
+    assert {envelope.sender_stamp for envelope in pedals} == {5}
+    times = [envelope.sample_time for envelope in pedals]
+    assert all(later > earlier and (later - earlier) % 10_000 == 0 for earlier, later in pairwise(times))
+    assert all(envelope.sample_time <= envelope.sent for envelope in pedals)
+
+
+def test_messages_come_with_their_sample_time_and_from_the_right_sender(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        assert start("--role=echo", "--freq=20").line() == READY
+        session.send_envelope(Envelope(1039, b"\x0d\x00", 0, 0, 0, 2))  # malformed, to be left
+        session.send(BEGIN(), sample_time=1_000)
+        session.send(DISTANCE(distance=0.5), sample_time=64, sender_stamp=2)
+        session.send(DISTANCE(distance=9.0), sample_time=32, sender_stamp=3)
+        while (pedal := MESSAGES.decode(PEDAL, heard(session, PEDAL).payload).position) == 0.0:
+            pass
+        angle = heard(session, ANGLE)
+    assert pedal == 0.5
+    assert angle.sender_stamp == 7
+    assert MESSAGES.decode(ANGLE, angle.payload).angle == 1_064
+
+
+def test_a_message_decides(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        service = start("--role=judge")
+        assert service.line() == READY
+        session.send(DISTANCE(distance=0.5))
+        session.send(DISTANCE(distance=1.5))
+        session.send(END())
+        assert service.line() == {
+            "dodo": "verdict",
+            "outcome": "failed",
+            "reason": "too far",
+            "checks": [{"name": "distance", "value": 1.5, "limit": {"max": 1.0}, "unit": "m", "ok": False}],
+        }
+    assert service.end() == (0, "", "")
+
+
+def test_a_source_that_runs_out_ends_the_judge(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        judge = start("--role=judge", "--verbose")
+        assert judge.line() == READY
+        source = start("--role=source", DODO_SERVICE="beacons", DODO_READY_FILE="")
+        voltages = [MESSAGES.decode(VOLTAGE, heard(session, VOLTAGE).payload).voltage for _ in range(3)]
+        assert voltages == [1.0, 2.0, 3.0]
+        assert MESSAGES.decode(2901, heard(session, 2901).payload).source == "beacons"
+    assert source.end() == (0, '{"dodo": "ready"}\n', "")
+    assert judge.line()["checks"] == [{"name": "distance", "value": None, "limit": {}, "unit": "", "ok": True}]
+    code, out, err = judge.end()
+    assert (code, out) == (0, "")
+    assert "DEBUG: the end has come" in err
+
+
+@pytest.mark.parametrize("flags", [[], ["--verbose"]])
+def test_a_model_that_fails(start: Start, ready_file: Path, flags: list[str]) -> None:
+    code, out, err = start("--role=broken", *flags).end()
+    assert (code, out) == (1, '{"dodo": "ready"}\n')
+    assert err.startswith("tiny-service: CRITICAL: ZeroDivisionError: a model went wrong\n")
+    assert ("Traceback" in err) == bool(flags)
+    assert not ready_file.exists()
+
+
+@pytest.mark.parametrize(
+    ("flags", "text"),
+    [
+        (["--role=unbuildable"], "tiny-service: CRITICAL: /no/such/map: cannot be read\n"),
+        (["--role=echo", "--frq=1"], "tiny-service: there is no flag '--frq', did you mean '--freq'?\n"),
+    ],
+)
+def test_flags_that_cannot_be_met(start: Start, ready_file: Path, flags: list[str], text: str) -> None:
+    assert start(*flags).end() == (2, "", text)
+    assert not ready_file.exists()
+
+
+def test_memory_that_another_process_has(start: Start) -> None:
+    name = f"dodo-test-{uuid.uuid4().hex}"
+    with SharedMemory.create(name, 10):
+        code, out, err = start("--role=echo", f"--name={name}").end()
+        assert (code, out) == (2, "")
+        assert f"shared memory `{name}` cannot be made: process" in err
+        assert Path("/tmp", name).exists()
+
+
+def test_the_example_of_the_help_runs(start: Start, ready_file: Path) -> None:
+    text = start("--help").end()
+    assert text[0] == 0
+    title, *_, example = text[1].rstrip("\n").split("\n")
+    assert title == "tiny-service: Does a little of everything that services do."
+    assert "  --freq  (number Hz, 1 to 1000, default 50)" in text[1]
+    command = shlex.split(example.removeprefix("example: "))
+    service = Process([sys.executable, *command[1:]], {"DODO_READY_FILE": str(ready_file)})
+    assert service.line() == READY
+    service.stop()
+    assert service.end()[0] == 0
+
+
+def test_starting_up_is_light() -> None:
+    code = "import sys, services.base; print(sorted({'numpy', 'cv2', 'jsonschema'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
