@@ -19,31 +19,32 @@ def seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
+def compile_all(out: Path) -> None:
+    command = [sys.executable, "-m", "dodo_dsl", "compile", "-o", str(out)]
+    subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+
+
+def config(folder: Path) -> None:
+    subprocess.run([PLUGIN, "config", "-q"], cwd=folder, check=True)
+
+
 def main() -> int:
+    if not PLUGIN.is_file():
+        print("Compose v2 is not installed: no peer to measure against")
+        return 0
+    ours, theirs = [], []
     with tempfile.TemporaryDirectory() as name:
         out = Path(name) / "generated"
-        compile_all = [sys.executable, "-m", "dodo_dsl", "compile", "-o", str(out)]
-        quiet = {"cwd": ROOT, "check": True, "stdout": subprocess.DEVNULL}
-        subprocess.run(compile_all, **quiet)  # type: ignore[call-overload]
+        compile_all(out)
         tests = sorted(p.parent for p in out.glob("*/test.json"))
-        if not PLUGIN.is_file():
-            print("Compose v2 is not installed: no peer to measure against")
-            return 0
-        ours, theirs = [], []
         for _ in range(ROUNDS):
-            ours.append(seconds(lambda: subprocess.run(compile_all, **quiet)))  # type: ignore[call-overload]
-            theirs.append(seconds(lambda: [_config(test) for test in tests]) / len(tests))
-    compiled, peer = statistics.median(ours), statistics.median(theirs)
-    print(
-        f"dodo compile, {len(tests)} tests, cold start: {compiled * 1000:.0f} ms, {compiled / len(tests) * 1000:.0f} ms a test"
-    )
-    print(f"docker compose config -q:                {peer * 1000:.0f} ms a test")
-    print(f"ratio a test:                            {peer / (compiled / len(tests)):.2f}")
+            ours.append(seconds(lambda: compile_all(out)))
+            theirs.append(seconds(lambda: [config(test) for test in tests]) / len(tests))
+    own, peer = statistics.median(ours) / len(tests), statistics.median(theirs)
+    print(f"dodo compile, {len(tests)} tests, cold start: {own * 1000:6.1f} ms a test")
+    print(f"docker compose config -q:          {peer * 1000:6.1f} ms a test")
+    print(f"the peer takes {peer / own:.2f} times as long a test")
     return 0
-
-
-def _config(folder: Path) -> None:
-    subprocess.run([PLUGIN, "config", "-q"], cwd=folder, check=True)
 
 
 if __name__ == "__main__":

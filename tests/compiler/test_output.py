@@ -100,7 +100,8 @@ def test_compose_spec_accepts_every_layer(generated: Path) -> None:
 def compose() -> list[str]:
     if PLUGIN.is_file():
         return [str(PLUGIN)]
-    if shutil.which("docker") and not subprocess.run(["docker", "compose", "version"], capture_output=True).returncode:
+    probe = ["docker", "compose", "version"]
+    if shutil.which("docker") and not subprocess.run(probe, capture_output=True, check=False).returncode:
         return ["docker", "compose"]
     pytest.skip("Compose v2 is not installed")
 

@@ -1,4 +1,4 @@
-"""YAML with positions: values as the core schema has them, places as an editor counts them, bounded on hostile input."""
+"""YAML with positions: values of the core schema, places as an editor counts them, bounded on hostile input."""
 
 import yaml
 from hypothesis import given
