@@ -12,9 +12,12 @@ _TAIL_WIDTH = 300
 
 
 class Output:
-    """The reading end of a pipe. ``writer`` is handed to the service; ``done`` is set at the end of its output."""
+    """The reading end of a pipe. ``writer`` is handed to the service; ``done`` is set at the end of its output.
 
-    def __init__(self, log: Path, on_line: Callable[[bytes], None]) -> None:
+    ``on_line`` is told every line, and says whether it was for the runner and is no log.
+    """
+
+    def __init__(self, log: Path, on_line: Callable[[bytes], bool]) -> None:
         log.parent.mkdir(parents=True, exist_ok=True)
         self._log = log.open("ab", buffering=0)
         self._on_line = on_line
@@ -63,9 +66,8 @@ class Output:
         if self._skipping:
             self._skipping = False
             return
-        if line.strip():
+        if line.strip() and not self._on_line(line):
             self._tail.append(line)
-            self._on_line(line)
 
     def _finish(self) -> None:
         asyncio.get_running_loop().remove_reader(self._reader)

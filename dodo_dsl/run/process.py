@@ -148,10 +148,13 @@ class ProcessBackend:
         return self.plan.application.services if layer == "application" else self.plan.layer(layer)
 
     def _start(self, command: Command) -> None:
-        def on_line(line: bytes) -> None:
-            event = lines.read_line(command.name, command.judge, line)
-            if event is not None and command.layer != "application":
+        def on_line(line: bytes) -> bool:
+            event = None
+            if command.layer != "application":
+                event = lines.read_line(command.name, command.judge, line)
+            if event is not None:
                 self._events.put_nowait(event)
+            return event is not None
 
         output = Output(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
