@@ -61,12 +61,15 @@ def encode_frame(envelope: Envelope) -> bytes:
     return MAGIC + len(body).to_bytes(3, "little") + body
 
 
-def decode_frame(frame: bytes) -> Envelope:
-    """The envelope of a frame; bytes after it are ignored, as libcluon does. Raises FrameError."""
+def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
+    """The envelope of a frame, `received` at a time of its own or the one given. Raises FrameError.
+
+    Bytes after the frame are ignored, as libcluon does.
+    """
     end = HEADER_BYTES + body_length(frame)
     if len(frame) < end:
         raise FrameError(f"the frame has {len(frame)} bytes of {end}")
-    return decode_body(frame[HEADER_BYTES:end])
+    return decode_body(frame[HEADER_BYTES:end], received)
 
 
 def body_length(header: bytes) -> int:
@@ -93,7 +96,7 @@ def encode_body(envelope: Envelope) -> bytes:
     return body
 
 
-def decode_body(body: bytes) -> Envelope:
+def decode_body(body: bytes, received: int | None = None) -> Envelope:
     """The envelope in the bytes after a header; raises FrameError.
 
     Fields come in any order, the first of equal ones counts, absent ones are zero.
@@ -104,12 +107,14 @@ def decode_body(body: bytes) -> Envelope:
             proto = _TYPE.FromString(wire.keep_first(body, _LAYOUT.shape))
     except (DecodeError, wire.WireError) as error:
         raise FrameError(f"the frame holds no envelope: {error}") from None
-    sent, received, sample_time = proto.sent, proto.received, proto.sampleTimeStamp
+    sent, sample_time = proto.sent, proto.sampleTimeStamp
+    if received is None:
+        received = proto.received.seconds * MICROSECONDS + proto.received.microseconds
     return Envelope(
         proto.dataType,
         proto.serializedData,
         sent.seconds * MICROSECONDS + sent.microseconds,
-        received.seconds * MICROSECONDS + received.microseconds,
+        received,
         sample_time.seconds * MICROSECONDS + sample_time.microseconds,
         proto.senderStamp,
     )

@@ -120,13 +120,8 @@ class Session:
         size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], 64)
         if address == self._own_address:
             return None
-        received = time.time_ns() // 1000
-        for _, kind, data in ancillary:
-            if kind == _SO_TIMESTAMPNS and len(data) >= _TIMESPEC.size:
-                seconds, nanoseconds = _TIMESPEC.unpack_from(data)
-                received = seconds * 1_000_000 + nanoseconds // 1000
         try:
-            return decode_frame(bytes(self._view[:size]))._replace(received=received)
+            return decode_frame(bytes(self._view[:size]), _received(ancillary))
         except FrameError:
             self.garbage += 1
             return None
@@ -136,6 +131,15 @@ class Session:
             return bool(self._poll.poll())
         left = deadline - time.monotonic()
         return left > 0 and bool(self._poll.poll(left * 1000))
+
+
+def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
+    """When the kernel took the datagram, else now; microseconds since the epoch."""
+    for _, kind, data in ancillary:
+        if kind == _SO_TIMESTAMPNS and len(data) == _TIMESPEC.size:
+            seconds, nanoseconds = _TIMESPEC.unpack(data)
+            return int(seconds) * 1_000_000 + int(nanoseconds) // 1000
+    return time.time_ns() // 1000
 
 
 def _sender(group: tuple[str, int], receiver: socket.socket) -> socket.socket:
