@@ -1,5 +1,6 @@
 """A session on the bus: UDP multicast as libcluon's OD4Session speaks it, without threads."""
 
+import errno
 import itertools
 import select
 import socket
@@ -18,6 +19,7 @@ MAX_DATAGRAM_BYTES = 65_507
 RECEIVE_BUFFER_BYTES = 26_214_400
 CIDS = range(1, 255)
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
+_NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
 _SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
 _TIMESPEC = struct.Struct("@qq")
 
@@ -44,7 +46,8 @@ class Session:
             self._receiver = _receiver(group)
             self._sender = _sender(group, self._receiver)
         except OSError as error:
-            raise SessionError(f"the bus {group[0]}:{PORT} cannot be joined: {error.strerror}") from None
+            hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
+            raise SessionError(f"the bus {group[0]}:{PORT} cannot be joined: {error.strerror}{hint}") from None
         self._own_address = self._sender.getsockname()
         self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
         self._view = memoryview(self._buffer)

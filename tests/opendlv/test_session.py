@@ -1,11 +1,14 @@
+import shutil
 import socket
+import subprocess
+import sys
 import time
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.session import MAX_DATAGRAM_BYTES, PORT, Session, SessionError
 from tests.opendlv.conftest import Peer
@@ -41,6 +44,27 @@ def test_what_libcluon_sends_is_received(cid: int, peer: Peer) -> None:
     assert envelope == Envelope(1090, bytes.fromhex("0d000080be"), 5_000_001, envelope.received, -1_000_001, 2**32 - 1)
     assert before <= envelope.received <= now()
     assert session.messages.decode(1090, envelope.payload).groundSteering == -0.25
+
+
+def test_frames_are_those_of_libcluon_byte_for_byte(cid: int, peer: Peer) -> None:
+    group = f"225.0.0.{cid}"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((group, PORT))
+        listener.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + bytes(4))
+        listener.settimeout(10.0)
+        for id_, payload, sent, sampled, stamp in [
+            (1090, "0d000080be", 1_715_000_000_123_456, 1_715_000_000_000_000, 0),
+            (0, "", 0, 0, 0),
+            (2**31 - 1, "00" * 200, 2**31 * 1_000_000 - 1, -1, 2**32 - 1),
+            (64, "ff" * 127, 63, -64_000_000, 127),
+            (63, "ff" * 128, 64, -1_999_999, 128),
+        ]:
+            peer.order("send", id=id_, payload=payload, sent=sent, sampled=sampled, stamp=stamp)
+            frame = listener.recv(MAX_DATAGRAM_BYTES)
+            envelope = Envelope(id_, bytes.fromhex(payload), sent, 0, sampled, stamp)
+            assert frame == encode_frame(envelope)
+            assert decode_frame(frame) == envelope
 
 
 @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -100,3 +124,13 @@ def test_waiting_ends_with_the_timeout(cid: int) -> None:
 def test_numbers_outside_the_range_are_refused(cid_: int) -> None:
     with pytest.raises(SessionError, match=f"cid is 1 to 254, not {cid_}"):
         Session(cid_)
+
+
+def test_a_machine_without_a_route_for_multicast() -> None:
+    alone = ["unshare", "--net", "--map-root-user"]
+    if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False, capture_output=True).returncode:
+        pytest.skip("no network namespace can be made here")
+    code = "from dodo_dsl.opendlv.session import Session\ntry: Session(130)\nexcept OSError as error: print(error)"
+    done = subprocess.run([*alone, sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("the bus 225.0.0.130:12175 cannot be joined: ")
+    assert done.stdout.endswith(" (is there a route to 224.0.0.0/4?)\n")
