@@ -1,6 +1,5 @@
 """The judge on the bus."""
 
-import logging
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -22,6 +21,7 @@ class Collision(Service):
     period = PERIOD
 
     def __init__(self, context: Context) -> None:
+        self._log = context.log
         flags = context.flags
         self.judge = Judge(track(flags), Box(flags["length"], flags["width"]))
         self.rejected = 0
@@ -49,7 +49,7 @@ class Collision(Service):
         if heading is None or not math.isfinite(frame.x + frame.y):
             self.rejected += 1
             if self.rejected == 1:
-                logging.warning("a Frame without a place or an attitude is ignored, as all such will be")
+                self._log.warning("a Frame without a place or an attitude is ignored, as all such will be")
             return
         self.judge.look(Pose(frame.x, frame.y, heading), sample_time)
         self.verdict = self.judge.verdict

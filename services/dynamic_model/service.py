@@ -1,10 +1,8 @@
 """The single-track model on the bus."""
 
-import logging
 from typing import Any
 
-from services.base import Context, Output, Service
-from services.base.service import period_of
+from services.base import Context, Output, Service, period_of
 from services.dynamic_model.model import Vehicle
 
 
@@ -12,6 +10,7 @@ class DynamicModel(Service):
     """Takes requests of any sender and says how the body moves, under the sender stamp ``frame-id``."""
 
     def __init__(self, context: Context) -> None:
+        self._log = context.log
         self.period = period_of(context.flags["freq"])
         self.vehicle = Vehicle(context.flags["freq"])
         self.inputs = {
@@ -35,7 +34,7 @@ class DynamicModel(Service):
 
     def _ignored(self, name: str, value: float) -> None:
         if self.vehicle.rejected == 1:
-            logging.warning("a %s of %s is ignored, as all that are not finite will be", name, value)
+            self._log.warning("a %s of %s is ignored, as all that are not finite will be", name, value)
 
 
 def build(context: Context) -> Service:

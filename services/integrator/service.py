@@ -1,11 +1,9 @@
 """The integrator on the bus."""
 
-import logging
 import math
 from typing import Any
 
-from services.base import Context, Flags, Output, Service
-from services.base.service import period_of
+from services.base import Context, Flags, Output, Service, period_of
 from services.integrator.model import Integrator, Pose, Twist
 from services.integrator.rotation import quaternion
 
@@ -14,6 +12,7 @@ class Integration(Service):
     """Takes kinematic states and says where the body is, both under the sender stamp ``frame-id``."""
 
     def __init__(self, context: Context) -> None:
+        self._log = context.log
         self.period = period_of(context.flags["freq"])
         self.body = Integrator(start(context.flags))
         self.rejected = 0
@@ -34,7 +33,7 @@ class Integration(Service):
             return
         self.rejected += 1
         if self.rejected == 1:
-            logging.warning("a KinematicState of %s is ignored, as all that are not finite will be", twist)
+            self._log.warning("a KinematicState of %s is ignored, as all that are not finite will be", twist)
 
 
 def start(flags: Flags) -> Pose:

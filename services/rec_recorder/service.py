@@ -9,6 +9,8 @@ from services.rec_recorder.model import Recording
 class Recorder(Service):
     """Records every envelope that comes, whatever its message."""
 
+    period = None
+
     def __init__(self, recording: Recording) -> None:
         self.observe = recording.write
 
