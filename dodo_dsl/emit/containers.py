@@ -51,5 +51,5 @@ def _volumes(plan: Plan, service: Service) -> tuple[str, ...]:
     if "path" in kinds:
         volumes.append(f"./files:{FILES}:ro")
     if "report" in kinds:
-        volumes.append(f"./report:{REPORT}")
+        volumes.append(f"report:{REPORT}")
     return tuple(volumes)
