@@ -5,6 +5,9 @@ from decimal import Decimal, InvalidOperation, localcontext
 
 from dodo_dsl.diagnostics import did_you_mean
 
+SHARE = "1"
+"""The unit of shares: the one that is not written, 0.5 being 50 %."""
+
 _PI = Decimal("3.14159265358979323846264338328")
 _FACTORS: dict[str, dict[str, Decimal]] = {
     "length": {"m": Decimal(1), "mm": Decimal("0.001"), "cm": Decimal("0.01"), "km": Decimal(1000)},
@@ -21,7 +24,7 @@ _FACTORS: dict[str, dict[str, Decimal]] = {
     "yaw rate": {"rad/s": Decimal(1), "deg/s": _PI / 180},
     "acceleration": {"m/s2": Decimal(1), "cm/s2": Decimal("0.01")},
     "angular acceleration": {"rad/s2": Decimal(1), "deg/s2": _PI / 180},
-    "share": {"1": Decimal(1), "%": Decimal("0.01")},
+    "share": {SHARE: Decimal(1), "%": Decimal("0.01")},
     "pixel count": {"px": Decimal(1)},
     "mass": {"kg": Decimal(1), "g": Decimal("0.001")},
 }
@@ -60,6 +63,8 @@ def convert(value: object, unit: str) -> Decimal:
     match = _QUANTITY.fullmatch(text)
     if not match:
         raise QuantityError(f"'{text}' is not a quantity in {unit}", _example("1", unit))
+    if match["unit"] is None and unit == SHARE:
+        return _converted(match["number"], SHARE, unit)
     if match["unit"] is None:
         raise QuantityError(f"'{text}' has no unit, expected {_a(_DIMENSION[unit])} in {unit}", _example(text, unit))
     written = match["unit"]

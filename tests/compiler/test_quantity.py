@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.spec.quantity import UNITS, QuantityError, convert, decimal_text
+from dodo_dsl.spec.quantity import SHARE, UNITS, QuantityError, convert, decimal_text
 
 CASES = [
     ("10 Hz", "Hz", "10"),
@@ -20,12 +20,13 @@ CASES = [
     ("-1e-3 m", "m", "-0.001"),
     ("100 ms", "s", "0.1"),
     ("50 %", "1", "0.5"),
+    (0.25, "1", "0.25"),
     ("0.1 m", "mm", "100"),
 ]
 
 
 @pytest.mark.parametrize(("written", "unit", "expected"), CASES)
-def test_converts(written: str, unit: str, expected: str) -> None:
+def test_converts(written: object, unit: str, expected: str) -> None:
     assert decimal_text(convert(written, unit)) == expected
 
 
@@ -53,7 +54,8 @@ def test_refuses(written: object, unit: str, message: str) -> None:
 
 @given(st.decimals(-1_000_000, 1_000_000, places=6), st.sampled_from(UNITS))
 def test_own_unit_is_exact(number: Decimal, unit: str) -> None:
-    assert convert(f"{number:f} {unit}", unit) == number
+    written = "" if unit == SHARE else unit
+    assert convert(f"{number:f} {written}", unit) == number
 
 
 @given(st.text(max_size=30), st.sampled_from(UNITS))
