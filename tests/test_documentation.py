@@ -61,9 +61,8 @@ MANIFESTS = sorted(p.parent for p in (ROOT / "services").glob("*/service.yml"))
 @pytest.mark.parametrize("folder", MANIFESTS, ids=lambda p: p.name)
 def test_services_help_ends_with_an_example(folder: Path) -> None:
     manifest = yaml.safe_load((folder / "service.yml").read_text())
-    result = subprocess.run(
-        [sys.executable, "-m", f"services.{folder.name}", "--help"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    command = [sys.executable, "-m", f"services.{folder.name}", "--help"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     for parameter in manifest["parameters"]:
         assert f"--{parameter}" in result.stdout
     assert " ".join(manifest["process"]) in result.stdout.splitlines()[-1]
