@@ -14,10 +14,11 @@ from dodo_dsl.compiler import NoApplication, plan
 from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.write import PLAN_FILE, write
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan, PlanError, from_json
 from dodo_dsl.report.write import Tested, write_report
-from dodo_dsl.run import lanes
-from dodo_dsl.run.runner import Job, Runner, default_backend, default_parallel, reap_folders, work_folder
+from dodo_dsl.run.backends import Backends, Containers, Job, Processes
+from dodo_dsl.run.runner import Runner, default_backend, default_parallel, reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 
 EXAMPLES = """examples:
@@ -59,8 +60,6 @@ def _positive(text: str) -> int:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     reap_folders()
-    for left in lanes.reap():
-        stdout.write(f"removed what a killed run left: {left}\n")
     with work_folder() as folder:
         try:
             jobs, deployment = _prepare(options, folder.path, stdout)
@@ -117,6 +116,8 @@ def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
     checked = selection.select(options.test, options.level, options.application)
     if not checked.specs:
         raise _Usage("there is no test to run")
+    if options.isolation:
+        checked = replace(checked, specs=tuple(replace(s, isolation=options.isolation) for s in checked.specs))
     problems = checked.diagnostics
     if checked.ok:
         try:
@@ -136,17 +137,25 @@ def _runner(
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or default_backend(plans)
-    if backend == "docker":
-        raise _Usage("the docker backend is not part of this version; give application services 'x-dodo-process'")
-    without = sorted({s.name for p in plans for s in p.application.services if not s.process})
-    if without:
-        raise _Usage(f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs")
     if "lockstep" in {options.clock, *(p.clock for p in plans)} and options.clock != "realtime":
         stdout.write("note: lockstep is not part of this version; these tests run in real time\n")
     parallel = min(options.jobs or default_parallel(), len(jobs))
-    stdout.write(f"{len(jobs)} test{'s' * (len(jobs) != 1)}, {parallel} at a time, process backend\n")
+    stdout.write(f"{len(jobs)} test{'s' * (len(jobs) != 1)}, {parallel} at a time, {backend} backend\n")
     shown = progress.choose(stdout, [p.slug for p in plans])
-    return Runner(shown, deployment.cids, parallel, options.keep, options.isolation, (descriptor,))
+    return Runner(shown, _backends(options, backend, plans, deployment, descriptor), parallel, options.keep)
+
+
+def _backends(
+    options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, descriptor: int
+) -> Backends:
+    if backend == "docker":
+        if options.compiled and options.isolation not in (None, plans[0].isolation):
+            raise _Usage(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
+        return Containers(subnets(deployment.subnets))
+    without = sorted({s.name for p in plans for s in p.application.services if not s.process})
+    if without:
+        raise _Usage(f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs")
+    return Processes(deployment.cids, options.isolation, (descriptor,))
 
 
 def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> list[Outcome]:

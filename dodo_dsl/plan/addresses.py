@@ -25,6 +25,11 @@ def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
     return [given[i] for i in range(len(isolations))]
 
 
+def subnets(network: ipaddress.IPv4Network) -> list[str]:
+    """Every /28 of the deployment's network, in order."""
+    return [subnet(index, network) for index in range(1 << (28 - network.prefixlen))]
+
+
 def subnet(index: int, network: ipaddress.IPv4Network) -> str:
     """The ``index``-th /28 of the deployment's network; the range begins anew when it is used up."""
     count = 1 << (28 - network.prefixlen)

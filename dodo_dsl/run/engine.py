@@ -74,13 +74,12 @@ class Engine:
             names = await self.backend.start(layer)
             self.layer_of.update(dict.fromkeys(names, layer))
             self.say(f"waiting for {layer}")
-            await self._until_ready(layer, names)
+            await self._until_ready({name for name, says in names.items() if says})
         self.setup_s = time.monotonic() - start
 
-    async def _until_ready(self, layer: str, names: list[str]) -> None:
-        """Own services say that they are ready; those of the application are when they run."""
+    async def _until_ready(self, waits: set[str]) -> None:
+        """Waits for those that say when they are ready; the others are when they run."""
         deadline = time.monotonic() + READY_PATIENCE_S
-        waits = set() if layer == "application" else set(names)
         while waits - self.ready:
             event = await self._next(deadline)
             if event is None:
@@ -130,13 +129,13 @@ class Engine:
                 self._end("error", f"service '{service}' could not be started: {why}", service)
             case Lost(why):
                 self._end("error", why)
-            case Exited(service, code):
+            case Exited(service, code, out_of_memory):
                 self.exits[service] = code
-                self._take_exit(service, code)
+                self._take_exit(service, code, out_of_memory)
 
-    def _take_exit(self, service: str, code: int) -> None:
+    def _take_exit(self, service: str, code: int, out_of_memory: bool) -> None:
         layer, when = self.layer_of.get(service, "application"), self._when()
-        ended = f"{how_it_ended(code)} {when}"
+        ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}"
         if layer == "application":
             if not self._all_given():
                 self._end("failed", f"application service '{service}' {ended}, before the test was decided", service)

@@ -33,6 +33,7 @@ class Exited:
 
     service: str
     code: int
+    out_of_memory: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,8 @@ class Backend(Protocol):
 
     async def open(self) -> None: ...
 
-    async def start(self, layer: str) -> list[str]:
-        """Starts the services of a layer and returns their names."""
+    async def start(self, layer: str) -> dict[str, bool]:
+        """Starts the services of a layer; returns their names, and whether each will say that it is ready."""
         ...
 
     async def next_event(self) -> Event: ...

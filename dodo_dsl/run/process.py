@@ -7,18 +7,16 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import data
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.plan.argv import CID_VARIABLES, memory_name, with_cid, with_memory_prefix
 from dodo_dsl.plan.model import ApplicationService, Flag, Plan, Service
 from dodo_dsl.run import lines
+from dodo_dsl.run.announce import begin_frame
 from dodo_dsl.run.environment import MissingVariable, base_environment, dotenv, interpolate
 from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Unstartable
 from dodo_dsl.run.output import Output
@@ -133,7 +131,7 @@ class ProcessBackend:
         except OSError as error:
             self._events.put_nowait(Lost(f"the test's sandbox cannot be reached: {error.strerror}"))
 
-    async def start(self, layer: str) -> list[str]:
+    async def start(self, layer: str) -> dict[str, bool]:
         commands = []
         for service in self._services(layer):
             try:
@@ -142,7 +140,7 @@ class ProcessBackend:
                 self._events.put_nowait(Unstartable(service.name, str(error)))
         for command in commands:
             self._start(command)
-        return [command.name for command in commands]
+        return {command.name: layer != "application" for command in commands}
 
     def _services(self, layer: str) -> tuple[Service | ApplicationService, ...]:
         return self.plan.application.services if layer == "application" else self.plan.layer(layer)
@@ -205,11 +203,7 @@ class ProcessBackend:
         return await self._events.get()
 
     async def begin(self) -> None:
-        messages = MessageSet.standard()
-        message = messages.type("dodo.TestBegin")(seed=self.plan.seed)
-        now = time.time_ns() // 1000
-        envelope = Envelope(messages.id(message), messages.encode(message), now, 0, now, 0)
-        self._send({"do": "send", "cid": self.lane.cid, "data": encode_frame(envelope).hex()})
+        self._send({"do": "send", "cid": self.lane.cid, "data": begin_frame(self.plan.seed).hex()})
 
     async def close(self, keep: bool) -> list[str]:
         if self._process is None or self._channel is None:

@@ -1,35 +1,26 @@
-"""Several tests at once: chooses isolation, runs each Plan on its backend, and cleans up whatever happens."""
+"""Several tests at once, each on a backend of its own, and a clean machine whatever happens."""
 
 import asyncio
-import contextlib
 import os
 import secrets
 import shutil
 import signal
 import tempfile
-from collections.abc import AsyncIterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol, Self
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import lanes, leases
+from dodo_dsl.run import leases
+from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.events import BackendError
-from dodo_dsl.run.process import Lane, ProcessBackend
 
 BackendName = Literal["process", "docker"]
 FOLDER_PREFIX = "dodo-run-"
-
-
-@dataclass(frozen=True)
-class Job:
-    """A Plan, the folder that it was compiled into, and the one that takes its logs and pictures."""
-
-    plan: Plan
-    folder: Path
-    report: Path
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Progress(Protocol):
@@ -91,41 +82,27 @@ def reap_folders() -> None:
 
 
 class Runner:
-    """Runs jobs on the process backend, ``parallel`` at a time, in order."""
+    """Runs jobs, ``parallel`` at a time, in order."""
 
-    def __init__(
-        self,
-        progress: Progress,
-        cids: Sequence[int],
-        parallel: int,
-        keep: bool,
-        isolation: str | None = None,
-        descriptors: tuple[int, ...] = (),
-    ) -> None:
+    def __init__(self, progress: Progress, backends: Backends, parallel: int, keep: bool = False) -> None:
         self.progress = progress
-        self.cids = cids
+        self.backends = backends
         self.keep = keep
-        self.isolation = isolation
-        self.descriptors = descriptors
         self.kept: list[str] = []
         self.interrupted = False
         self._places = asyncio.Semaphore(parallel)
 
     async def run(self, jobs: Sequence[Job]) -> list[Outcome]:
-        """The outcomes in the order of the jobs; SIGINT and SIGTERM end all tests with their teardown."""
-        if self.isolation is None and any(job.plan.isolation == "network" for job in jobs):
-            refusal = await asyncio.get_running_loop().run_in_executor(None, lanes.namespaces_refusal)
-            if refusal:
-                self.progress.note(f"no namespaces here ({refusal}): tests share the host, each with leases")
-                self.isolation = "host"
+        """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown."""
+        await self.backends.prepare([job.plan for job in jobs], self.progress.note)
         tasks = [asyncio.ensure_future(self._one(job)) for job in jobs]
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in _SIGNALS:
             loop.add_signal_handler(number, self._interrupt, tasks)
         try:
             return list(await asyncio.gather(*tasks))
         finally:
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in _SIGNALS:
                 loop.remove_signal_handler(number)
 
     def _interrupt(self, tasks: Sequence["asyncio.Task[Outcome]"]) -> None:
@@ -137,48 +114,36 @@ class Runner:
 
     async def _one(self, job: Job) -> Outcome:
         slug = job.plan.slug
+
+        def say(text: str) -> None:
+            self.progress.phase(slug, text)
+
         try:
-            async with self._places, self._lane(job.plan) as (isolation, lane):
-                backend = ProcessBackend(job.plan, job.folder, job.report, isolation, lane)
-                engine = Engine(job.plan, backend, lambda text: self.progress.phase(slug, text))
-                outcome, kept = await engine.run(self.keep)
+            async with self._places, self.backends.open(job, say, self.keep) as backend:
+                outcome, kept = await Engine(job.plan, backend, say).run(self.keep)
                 self.kept.extend(kept)
         except BackendError as error:
-            outcome = _without_answer(job.plan, str(error))
+            outcome = self._without_answer(job.plan, str(error))
         except asyncio.CancelledError:
-            outcome = _without_answer(job.plan, "the run was interrupted before this test began")
+            outcome = self._without_answer(job.plan, "the run was interrupted before this test began")
         self.progress.done(outcome)
         return outcome
 
-    @contextlib.asynccontextmanager
-    async def _lane(self, plan: Plan) -> AsyncIterator[tuple[str, Lane]]:
-        isolation = self.isolation or plan.isolation
-        if isolation == "network":
-            yield isolation, Lane(plan.cid, descriptors=self.descriptors)
-            return
-
-        def say(text: str) -> None:
-            self.progress.phase(plan.slug, text)
-
-        async with lanes.host_lane(plan, self.cids, say, self.keep) as lane:
-            yield isolation, replace(lane, descriptors=(*lane.descriptors, *self.descriptors))
-
-
-def _without_answer(plan: Plan, reason: str) -> Outcome:
-    """The outcome of a test that never began."""
-    return Outcome(
-        name=plan.name,
-        slug=plan.slug,
-        spec=plan.spec,
-        level=plan.level,
-        kind=plan.kind,
-        outcome="error",
-        reason=reason,
-        cid=plan.cid,
-        seed=plan.seed,
-        clock="realtime",
-        backend="process",
-    )
+    def _without_answer(self, plan: Plan, reason: str) -> Outcome:
+        """The outcome of a test that never began."""
+        return Outcome(
+            name=plan.name,
+            slug=plan.slug,
+            spec=plan.spec,
+            level=plan.level,
+            kind=plan.kind,
+            outcome="error",
+            reason=reason,
+            cid=plan.cid,
+            seed=plan.seed,
+            clock="realtime",
+            backend=self.backends.name,
+        )
 
 
 def default_parallel() -> int:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, Service
-from dodo_dsl.run.runner import Job, Runner
+from dodo_dsl.run.backends import Job, Processes
+from dodo_dsl.run.runner import Runner
 
 READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
 PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'
@@ -99,7 +100,8 @@ class Bench:
 
     def run(self, *plans: Plan, parallel: int = 4) -> list[Outcome]:
         jobs = self.jobs(*plans)
-        return asyncio.run(Runner(self.progress, CIDS, parallel, keep=False, isolation=self.isolation).run(jobs))
+        backends = Processes(CIDS, self.isolation, ())
+        return asyncio.run(Runner(self.progress, backends, parallel).run(jobs))
 
     def log(self, plan: Plan, name: str) -> str:
         return (self.folder / "report" / plan.slug / "logs" / f"{name}.log").read_text()

@@ -1,0 +1,133 @@
+"""Where tests run: each kind of backend prepares once for a run, and makes one backend a test."""
+
+import asyncio
+import contextlib
+import secrets
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run import lanes, leases, projects
+from dodo_dsl.run.docker import DockerBackend, other_subnets
+from dodo_dsl.run.events import Backend, BackendError
+from dodo_dsl.run.process import Lane, ProcessBackend
+from dodo_dsl.run.pulls import Pulls
+
+Say = Callable[[str], None]
+_CONNECTIONS = 200
+
+
+@dataclass(frozen=True)
+class Job:
+    """A Plan, the folder that it was compiled into, and the one that takes its logs and pictures."""
+
+    plan: Plan
+    folder: Path
+    report: Path
+
+
+class Backends(Protocol):
+    """Makes backends; ``prepare`` is called once before the first."""
+
+    name: str
+
+    async def prepare(self, plans: Sequence[Plan], note: Say) -> None: ...
+
+    def open(self, job: Job, say: Say, keep: bool) -> AbstractAsyncContextManager[Backend]:
+        """A backend for one test; raises BackendError when there is none to be had."""
+        ...
+
+
+class Processes:
+    """Local processes, each test in namespaces of its own, or on the host in a leased lane."""
+
+    name = "process"
+
+    def __init__(self, cids: Sequence[int], isolation: str | None, descriptors: tuple[int, ...]) -> None:
+        self._cids = cids
+        self._isolation = isolation
+        self._descriptors = descriptors
+
+    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
+        for left in lanes.reap():
+            note(f"removed what a killed run left: {left}")
+        if self._isolation is None and any(plan.isolation == "network" for plan in plans):
+            refusal = await asyncio.to_thread(lanes.namespaces_refusal)
+            if refusal:
+                note(f"no namespaces here ({refusal}): tests share the host, each with leases")
+                self._isolation = "host"
+
+    @contextlib.asynccontextmanager
+    async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
+        plan = job.plan
+        isolation = self._isolation or plan.isolation
+        if isolation == "network":
+            lane = Lane(plan.cid, descriptors=self._descriptors)
+            yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
+            return
+        async with lanes.host_lane(plan, self._cids, say, keep) as leased:
+            lane = replace(leased, descriptors=(*leased.descriptors, *self._descriptors))
+            yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
+
+
+class Containers:
+    """Containers of a Docker engine, each test a compose project of its own."""
+
+    name = "docker"
+
+    def __init__(self, subnets: Sequence[str]) -> None:
+        self._subnets = subnets
+        self._client: Any = None
+        self._pulls: Pulls | None = None
+        self._problem = ""
+
+    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
+        try:
+            self._client = await asyncio.to_thread(_connect)
+        except BackendError as error:
+            self._problem = str(error)
+            return
+        self._pulls = Pulls(self._client)
+        for left in await asyncio.to_thread(projects.reap_projects, self._client):
+            note(f"removed what a killed run left: {left}")
+
+    @contextlib.asynccontextmanager
+    async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
+        if self._client is None or self._pulls is None:
+            raise BackendError(self._problem)
+        plan = job.plan
+        project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
+        lease = leases.try_lease(f"{projects.LEASE_PREFIX}{project}", {"test": plan.slug})
+        assert lease is not None, "a fresh name is free"
+        subnets = other_subnets(plan.subnet, self._subnets)
+        backend = DockerBackend(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say)
+        try:
+            if plan.isolation == "network":
+                yield backend
+            else:
+                async with lanes.host_lane(replace_flags(plan), (plan.cid,), say):
+                    yield backend
+        finally:
+            lease.release()
+
+
+def replace_flags(plan: Plan) -> Plan:
+    """The plan as one whose application takes no flags: compiled files on the host are fixed, so they run alone."""
+    services = tuple(replace(s, takes_cid=False, takes_memory=False) for s in plan.application.services)
+    return replace(plan, application=replace(plan.application, services=services))
+
+
+def _connect() -> Any:
+    """A client of the engine; raises BackendError with what to do when none answers."""
+    import docker
+    from docker.errors import DockerException
+
+    try:
+        client = docker.from_env(max_pool_size=_CONNECTIONS)
+        client.ping()
+    except (DockerException, OSError) as error:
+        raise BackendError(f"no Docker engine answers ({error}); start one, or use --backend process") from error
+    return client

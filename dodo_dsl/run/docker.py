@@ -1,0 +1,283 @@
+"""The docker backend: the compiled files through ``docker compose``, watched by the engine's events."""
+
+import asyncio
+import contextlib
+import json
+import os
+import socket
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.plan.application import SANDBOX
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run import lines
+from dodo_dsl.run.announce import begin_frame
+from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Ready, Unstartable
+from dodo_dsl.run.output import Output
+from dodo_dsl.run.projects import PROJECT_LABEL, SERVICE_LABEL, copy_out, remove_project, stop_project
+from dodo_dsl.run.pulls import Pulls, Say
+
+_PORT = 12175
+_REPORT = "/dodo/report"
+_OVERLAP = "overlaps"
+_TELL = 'printf "%b" "$1" > "/dev/udp/$2/$3"'
+
+
+class DockerBackend:
+    """One test as a compose project of its own; ``subnets`` are tried in turn until the engine takes one."""
+
+    name = "docker"
+
+    def __init__(
+        self,
+        plan: Plan,
+        folder: Path,
+        report: Path,
+        client: Any,
+        pulls: Pulls,
+        project: str,
+        subnets: Iterable[str],
+        say: Say,
+    ) -> None:
+        self.plan = plan
+        self.cid = plan.cid
+        self.folder = folder
+        self.report = report
+        self.project = project
+        self._client = client
+        self._pulls = pulls
+        self._subnets = subnets
+        self._say = say
+        self._queue: asyncio.Queue[Event] = asyncio.Queue()
+        self._loop = asyncio.get_running_loop()
+        self._config: dict[str, Any] = {}
+        self._containers: dict[str, Any] = {}
+        self._outputs: dict[str, Output] = {}
+        self._out_of_memory: set[str] = set()
+        self._events: Any = None
+        self._closing = False
+
+    async def open(self) -> None:
+        code, out, problem = await self._compose("config", "--format", "json")
+        if code:
+            raise BackendError(f"docker compose does not take the compiled test: {problem}")
+        self._config = json.loads(out)["services"]
+        await self._provide_images()
+        await self._create()
+        self._containers = await asyncio.to_thread(self._find_containers)
+        self._events = await asyncio.to_thread(self._client.events, decode=True, filters=self._filters())
+        threading.Thread(target=self._watch, daemon=True).start()
+        if SANDBOX in self._containers:
+            await asyncio.to_thread(self._containers[SANDBOX].start)
+
+    def _filters(self) -> dict[str, Any]:
+        return {"label": f"{PROJECT_LABEL}={self.project}"}
+
+    async def _compose(self, *words: str, subnet: str = "", log: Path | None = None) -> tuple[int, str, str]:
+        """Exit code, standard output and the last line of standard error of a compose command."""
+        environment = {**os.environ, "COMPOSE_PROJECT_NAME": self.project, "COMPOSE_PROGRESS": "plain"}
+        if subnet:
+            environment["DODO_SUBNET"] = subnet
+        process = await asyncio.create_subprocess_exec(
+            "docker", "compose", *words, cwd=self.folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
+        )  # fmt: skip
+        try:
+            out, err = await process.communicate()
+        except asyncio.CancelledError:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+            raise
+        if log is not None:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            log.write_bytes(out + err)
+        said = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
+        return process.returncode or 0, out.decode("utf-8", "replace"), said[-1].strip() if said else ""
+
+    async def _provide_images(self) -> None:
+        application = {s.name for s in self.plan.application.services}
+        built = [name for name, s in self._config.items() if "build" in s]
+        own = {s["image"] for name, s in self._config.items() if name not in application}
+        foreign = {s["image"] for name, s in self._config.items() if name in application and name not in built}
+        for note in await self._pulls.provide(own, foreign, self._say):
+            self._say(note)
+        if built:
+            self._say(f"building {', '.join(built)}")
+            log = self.report / "logs" / "build.log"
+            code, _, problem = await self._compose("build", *built, log=log)
+            if code:
+                raise BackendError(f"the application's images cannot be built: {problem}; {log} has the whole output")
+
+    async def _create(self) -> None:
+        """Network, volumes and containers; a subnet that the engine has in use is left to others."""
+        code, problem = 1, "no subnet is free"
+        for subnet in self._subnets:
+            code, _, problem = await self._compose("create", "--no-build", "--pull", "never", subnet=subnet)
+            if not code or _OVERLAP not in problem:
+                break
+        if code:
+            raise BackendError(f"docker compose cannot create the test: {problem}")
+
+    def _find_containers(self) -> dict[str, Any]:
+        found = self._client.containers.list(all=True, filters=self._filters())
+        return {c.labels[SERVICE_LABEL]: c for c in found}
+
+    def _watch(self) -> None:
+        """The thread of the engine's events."""
+        try:
+            for event in self._events:
+                self._tell(self._heard, event)
+        except Exception as error:  # noqa: BLE001  (whatever ends the stream, the engine is out of sight)
+            why = f"the Docker engine went away: {error}"
+        else:
+            why = "the Docker engine ended its events"
+        if not self._closing:
+            self._tell(self._queue.put_nowait, Lost(why))
+
+    def _tell(self, work: Any, *arguments: Any) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(work, *arguments)
+
+    def _heard(self, event: Mapping[str, Any]) -> None:
+        attributes = event.get("Actor", {}).get("Attributes", {})
+        name, action = attributes.get(SERVICE_LABEL, ""), str(event.get("Action", ""))
+        if self._closing or not name:
+            return
+        if action == "oom":
+            self._out_of_memory.add(name)
+        elif action == "health_status: healthy":
+            self._queue.put_nowait(Ready(name))
+        elif action == "die" and name in self._outputs:
+            task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
+            task.add_done_callback(lambda t: t.exception())
+        elif action == "die":
+            self._queue.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+
+    async def _died(self, name: str, code: int) -> None:
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
+        self._queue.put_nowait(Exited(name, code, name in self._out_of_memory))
+
+    async def start(self, layer: str) -> dict[str, bool]:
+        own = [s.name for s in self.plan.layer(layer)]
+        names = own or [s.name for s in self.plan.application.services if s.name in self._containers]
+        judges = {s.name for s in self.plan.services if s.judge}
+        for name in names:
+            self._outputs[name] = Output(
+                self.report / "logs" / f"{layer}.{name}.log", self._reader(layer, name, judges)
+            )
+        await asyncio.gather(*(self._start(name) for name in self._in_order(names)))
+        is_ours = layer != "application"
+        return {name: is_ours or self._has_healthcheck(name) for name in names}
+
+    def _reader(self, layer: str, name: str, judges: set[str]) -> Any:
+        def on_line(line: bytes) -> bool:
+            event = None if layer == "application" else lines.read_line(name, name in judges, line)
+            if event is not None:
+                self._queue.put_nowait(event)
+            return event is not None
+
+        return on_line
+
+    def _in_order(self, names: list[str]) -> list[str]:
+        """Services that others of the same layer depend on come first."""
+        ordered: list[str] = []
+
+        def add(name: str) -> None:
+            if name in names and name not in ordered:
+                for other in self._config.get(name, {}).get("depends_on") or {}:
+                    add(other)
+                ordered.append(name)
+
+        for name in names:
+            add(name)
+        return ordered
+
+    def _has_healthcheck(self, name: str) -> bool:
+        check = self._config.get(name, {}).get("healthcheck")
+        return bool(check) and not check.get("disable") and check.get("test") != ["NONE"]
+
+    async def _start(self, name: str) -> None:
+        from docker.errors import DockerException
+
+        container, output = self._containers[name], self._outputs[name]
+        try:
+            await asyncio.to_thread(container.start)
+        except DockerException as error:
+            output.release_writer()
+            why = str(getattr(error, "explanation", "") or error)
+            self._queue.put_nowait(Unstartable(name, why))
+            return
+        threading.Thread(target=self._follow, args=(container, output.writer), daemon=True).start()
+
+    @staticmethod
+    def _follow(container: Any, writer: int) -> None:
+        """The thread that copies a container's output into the pipe of its Output."""
+        with contextlib.suppress(Exception):
+            for chunk in container.logs(stream=True, follow=True):
+                os.write(writer, chunk)
+        with contextlib.suppress(OSError):
+            os.close(writer)
+
+    async def next_event(self) -> Event:
+        return await self._queue.get()
+
+    async def begin(self) -> None:
+        frame, group = begin_frame(self.plan.seed), f"225.0.0.{self.cid}"
+        if SANDBOX not in self._containers:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
+                sender.sendto(frame, (group, _PORT))
+            return
+        escaped = "".join(f"\\x{byte:02x}" for byte in frame)
+        await asyncio.to_thread(
+            self._containers[SANDBOX].exec_run, ["bash", "-c", _TELL, "tell", escaped, group, str(_PORT)]
+        )
+
+    async def close(self, keep: bool) -> list[str]:
+        self._closing = True
+        kept = []
+        if keep and self._containers:
+            kept = self._kept()
+        else:
+            await asyncio.to_thread(self._take_down)
+        if self._events is not None:
+            with contextlib.suppress(Exception):
+                self._events.close()
+        for output in self._outputs.values():
+            output.close()
+        return kept
+
+    def _take_down(self) -> None:
+        from docker.errors import DockerException
+
+        with contextlib.suppress(DockerException, OSError):
+            stop_project(self._client, self.project)
+            for container in self._containers.values():
+                if self._records(container):
+                    copy_out(container, f"{_REPORT}/.", self.report)
+            remove_project(self._client, self.project)
+
+    def _records(self, container: Any) -> bool:
+        name = container.labels[SERVICE_LABEL]
+        return any(f.kind == "report" for s in self.plan.services if s.name == name for f in s.flags)
+
+    def _kept(self) -> list[str]:
+        compose = f"docker compose -p {self.project}"
+        return [
+            f"{self.plan.slug} is kept up as compose project {self.project}",
+            f"look inside:  {compose} ps;  {compose} logs camera;  {compose} exec {SANDBOX} bash",
+            f"take it down: {compose} down -v",
+        ]
+
+    def tail(self, service: str) -> list[str]:
+        output = self._outputs.get(service)
+        return output.tail() if output else []
+
+
+def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
+    """The planned subnet, then the rest of the deployment's."""
+    yield first
+    yield from (subnet for subnet in all_subnets if subnet != first)

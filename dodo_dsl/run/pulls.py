@@ -1,0 +1,103 @@
+"""Images before a test's clock starts: DoDo's own are pulled when missing, the application's are resolved anew."""
+
+import asyncio
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from dodo_dsl.run.events import BackendError
+
+Say = Callable[[str], None]
+
+
+class Pulls:
+    """Pulls for all tests of a run: each image once, several at a time."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._tasks: dict[str, asyncio.Task[str]] = {}
+
+    async def provide(self, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
+        """Makes the images local; returns notes on what was taken as it is. Raises BackendError."""
+        waits = [self._once(image, self._own, say) for image in sorted(set(own))]
+        waits += [self._once(image, self._application, say) for image in sorted(set(application))]
+        return [note for note in await asyncio.gather(*waits) if note]
+
+    async def _once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str:
+        if image not in self._tasks:
+            self._tasks[image] = asyncio.ensure_future(asyncio.to_thread(work, image, say))
+        return await asyncio.shield(self._tasks[image])
+
+    def _own(self, image: str, say: Say) -> str:
+        if not self._is_local(image):
+            self._pull(image, say)
+        return ""
+
+    def _application(self, image: str, say: Say) -> str:
+        try:
+            self._pull(image, say)
+        except BackendError as error:
+            if not self._is_local(image):
+                raise
+            return f"{error}; the one on this machine is taken"
+        return ""
+
+    def _is_local(self, image: str) -> bool:
+        from docker.errors import DockerException, ImageNotFound
+
+        try:
+            self._client.api.inspect_image(image)
+        except ImageNotFound:
+            return False
+        except DockerException as error:
+            raise BackendError(f"the Docker engine does not answer about image {image}: {error}") from error
+        return True
+
+    def _pull(self, image: str, say: Say) -> None:
+        from docker.errors import DockerException
+
+        progress = _Progress(image, say)
+        try:
+            for line in self._client.api.pull(*split_reference(image), stream=True, decode=True):
+                progress.take(line)
+        except DockerException as error:
+            raise BackendError(f"image {image} cannot be pulled: {_reason(str(error))}") from error
+
+
+def split_reference(image: str) -> tuple[str, str]:
+    """An image's repository, and its tag (``latest`` by default) or digest."""
+    repository, sign, digest = image.partition("@")
+    if sign:
+        return repository, digest
+    repository, sign, tag = image.rpartition(":")
+    return (repository, tag) if sign and "/" not in tag else (image, "latest")
+
+
+def _reason(text: str) -> str:
+    if any(word in text for word in ("unauthorized", "denied", "no basic auth")):
+        return f"{text}; the registry wants a log-in: docker login"
+    return text
+
+
+class _Progress:
+    """Megabytes of an image's layers, told once a tenth."""
+
+    def __init__(self, image: str, say: Say) -> None:
+        self._image = image
+        self._say = say
+        self._layers: dict[str, tuple[int, int]] = {}
+        self._told = -1
+
+    def take(self, line: dict[str, Any]) -> None:
+        if "error" in line:
+            raise BackendError(f"image {self._image} cannot be pulled: {_reason(str(line['error']))}")
+        detail = line.get("progressDetail") or {}
+        if line.get("status") == "Downloading" and detail.get("total"):
+            self._layers[line["id"]] = (detail["current"], detail["total"])
+            self._tell()
+
+    def _tell(self) -> None:
+        done, total = (sum(part) for part in zip(*self._layers.values(), strict=True))
+        tenth = 10 * done // max(total, 1)
+        if tenth > self._told:
+            self._told = tenth
+            self._say(f"pulling {self._image}: {done / 1e6:.0f} of {total / 1e6:.0f} MB")
