@@ -86,7 +86,7 @@ class Containers:
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
         try:
-            self._client = await asyncio.to_thread(_connect)
+            self._client = await asyncio.to_thread(connect)
         except BackendError as error:
             self._problem = str(error)
             return
@@ -120,7 +120,7 @@ def replace_flags(plan: Plan) -> Plan:
     return replace(plan, application=replace(plan.application, services=services))
 
 
-def _connect() -> Any:
+def connect() -> Any:
     """A client of the engine; raises BackendError with what to do when none answers."""
     import docker
     from docker.errors import DockerException

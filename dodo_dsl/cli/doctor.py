@@ -1,0 +1,39 @@
+"""dodo doctor: what this machine can run, what it lacks, what was left behind."""
+
+import argparse
+import dataclasses
+import json
+from typing import TextIO
+
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.run import health
+from dodo_dsl.run.runner import reap_folders
+
+EXAMPLES = """examples:
+  dodo doctor              every finding, and what to do about it
+  dodo doctor --clean      remove what killed runs left: processes, shared memory, containers, networks, volumes
+  dodo doctor --json       for programs
+"""
+_SIGNS = {"ok": "ok     ", "warning": "warning", "problem": "PROBLEM"}
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--clean", action="store_true", help="remove what killed runs left, and nothing else")
+    parser.add_argument("--json", action="store_true", help="as JSON")
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if options.clean:
+        reap_folders()
+        for line in health.clean():
+            stderr.write(f"removed: {line}\n")
+    findings = health.examine()
+    if options.json:
+        stdout.write(json.dumps([dataclasses.asdict(f) for f in findings], indent=2) + "\n")
+    else:
+        width = max(len(f.name) for f in findings)
+        for finding in findings:
+            stdout.write(f"{_SIGNS[finding.state]}  {finding.name:<{width}}  {finding.text}\n")
+            if finding.advice:
+                stdout.write(f"{'':7}  {'':<{width}}  -> {finding.advice}\n")
+    return Exit.PROBLEMS if any(f.state == "problem" for f in findings) else Exit.OK
