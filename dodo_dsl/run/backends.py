@@ -100,7 +100,7 @@ class Containers:
             raise BackendError(self._problem)
         plan = job.plan
         project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
-        lease = leases.try_lease(f"{projects.LEASE_PREFIX}{project}", {"test": plan.slug})
+        lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"
         subnets = other_subnets(plan.subnet, self._subnets)
         backend = DockerBackend(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say)

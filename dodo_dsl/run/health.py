@@ -137,9 +137,7 @@ def _output(*command: str) -> str:
 
 
 def _left_behind() -> Iterator[Finding]:
-    left = [
-        f"test {about.get('test', '?')}" for prefix in ("cid-", projects.LEASE_PREFIX) for about in _orphans(prefix)
-    ]
+    left = [f"test {about.get('test', '?')}" for prefix in ("cid-", leases.PROJECT) for about in _orphans(prefix)]
     if left:
         yield Finding("left behind", "warning", f"by killed runs: {', '.join(left)}", "dodo doctor --clean")
     else:

@@ -97,6 +97,7 @@ def listen(cid: int, seconds: float = PROBE_S) -> str:
 def reap() -> list[str]:
     """Removes what killed runs left on the host: processes and shared memory of leases that nobody holds."""
     removed = []
+    leases.forget_dead()
     for lease, about in leases.orphans("cid-"):
         lane = str(about.get("lane", ""))
         if LANE.fullmatch(lane):

@@ -18,6 +18,9 @@ from typing import Any
 
 FOLDER_VARIABLE = "DODO_LEASES"
 DEFAULT_PATIENCE_S = 600.0
+RUN, PROJECT = "run-", "docker-"
+ONCE = (RUN, PROJECT)
+"""Leases of random names: nobody ever waits for one, so their lock files need not stay."""
 _RETRY_S = 0.2
 
 
@@ -47,9 +50,10 @@ class Lease:
     record: Path
 
     def release(self) -> None:
-        """Gives up this process's hold, and the record with it when no other process holds on."""
-        with contextlib.suppress(FileNotFoundError):
-            self.record.unlink()
+        """Gives up this process's hold and the record; the lock file goes too where its name never comes again."""
+        self.record.unlink(missing_ok=True)
+        if self.name.startswith(ONCE):
+            _lock_file(self.name).unlink(missing_ok=True)
         os.close(self.descriptor)
 
     def leave(self) -> None:
@@ -57,8 +61,12 @@ class Lease:
         os.close(self.descriptor)
 
 
+def _lock_file(name: str) -> Path:
+    return folder() / f"{name}.lock"
+
+
 def _open(name: str) -> int:
-    descriptor = os.open(folder() / f"{name}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    descriptor = os.open(_lock_file(name), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
     with contextlib.suppress(PermissionError):
         os.fchmod(descriptor, 0o666)
     return descriptor
@@ -128,3 +136,11 @@ def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
                 os.close(descriptor)
                 continue
             yield Lease(name, descriptor, record), about
+
+
+def forget_dead() -> None:
+    """Removes the records of shared leases whose process has gone; their locks went with it."""
+    for record in folder().glob("machine.*.json"):
+        pid = record.name.split(".")[1]
+        if pid.isdecimal() and not Path("/proc", pid).exists():
+            record.unlink(missing_ok=True)

@@ -11,7 +11,6 @@ from dodo_dsl.run import leases
 
 PROJECT_LABEL = "com.docker.compose.project"
 SERVICE_LABEL = "com.docker.compose.service"
-LEASE_PREFIX = "docker-"
 _STOP_S = 2
 _MAX_COPY = 4 << 30
 
@@ -65,8 +64,8 @@ def copy_out(container: Any, folder: str, target: Path) -> None:
 def reap_projects(client: Any) -> list[str]:
     """Removes the projects of killed runs: those whose lease nobody holds, and nothing else."""
     removed = []
-    for lease, about in leases.orphans(LEASE_PREFIX):
-        project = lease.name.removeprefix(LEASE_PREFIX)
+    for lease, about in leases.orphans(leases.PROJECT):
+        project = lease.name.removeprefix(leases.PROJECT)
         count = remove_project(client, project)
         if count:
             removed.append(f"{about.get('test', '?')}: {count} containers, networks and volumes")

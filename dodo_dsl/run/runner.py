@@ -67,16 +67,16 @@ def work_folder() -> WorkFolder:
     """A folder of a fresh name, leased."""
     token = secrets.token_hex(4)
     path = Path(tempfile.gettempdir()).resolve() / f"{FOLDER_PREFIX}{token}"
-    lease = leases.try_lease(f"run-{token}", {"folder": str(path)})
+    lease = leases.try_lease(f"{leases.RUN}{token}", {"folder": str(path)})
     assert lease is not None, "a fresh name is free"
     return WorkFolder(path, lease)
 
 
 def reap_folders() -> None:
     """Removes the folders of killed runs."""
-    for lease, about in leases.orphans("run-"):
+    for lease, about in leases.orphans(leases.RUN):
         folder = Path(str(about.get("folder", "")))
-        if folder.name == f"{FOLDER_PREFIX}{lease.name.removeprefix('run-')}":
+        if folder.name == f"{FOLDER_PREFIX}{lease.name.removeprefix(leases.RUN)}":
             shutil.rmtree(folder, ignore_errors=True)
         lease.release()
 
