@@ -10,6 +10,7 @@ from typing import TextIO
 from dodo_dsl import __version__
 from dodo_dsl.cli import compile as compile_command
 from dodo_dsl.cli import doctor as doctor_command
+from dodo_dsl.cli import images as images_command
 from dodo_dsl.cli import list as list_command
 from dodo_dsl.cli import report as report_command
 from dodo_dsl.cli import run as run_command
@@ -20,6 +21,7 @@ COMMANDS: dict[str, ModuleType] = {
     "run": run_command,
     "list": list_command,
     "report": report_command,
+    "images": images_command,
     "doctor": doctor_command,
 }
 

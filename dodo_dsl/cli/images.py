@@ -1,0 +1,110 @@
+"""dodo images: build and push the images of DoDo's services."""
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.diagnostics import format_text, has_errors
+from dodo_dsl.images import context, docker, wheels
+from dodo_dsl.images.names import Image, NoSuchImage, choose, known
+from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.manifest import load_manifests
+
+EXAMPLES = """examples:
+  dodo images build                                   all of them, as the deployment names them
+  dodo images build collision virtual-camera          two of them
+  dodo images build --offline-wheels                  where a build cannot reach the package index
+  dodo images push --prefix registry.example.org/dodo
+"""
+_INDEX_HINT = "where a build cannot reach the package index, --offline-wheels lets this machine download the packages"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    build = _action(actions, "build", "build images from the installed DoDo")
+    build.add_argument(
+        "--base-image", metavar="I", help=f"Python to stand on (default: {context.default_base_image()})"
+    )
+    build.add_argument("--offline-wheels", action="store_true", help="download packages here, not inside the build")
+    build.add_argument("--source", metavar="URL", default="", help="where the sources are, for the images' labels")
+    _action(actions, "push", "push images to their registry; log in with `docker login` before")
+
+
+def _action(
+    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str
+) -> argparse.ArgumentParser:
+    action = actions.add_parser(name, help=text, description=text)
+    action.add_argument("name", nargs="*", metavar="NAME", help="services, sandbox, base or vision (default: all)")
+    action.add_argument(
+        "--prefix", metavar="P", help="of the images' names (default: dodo.yml's images.prefix, or dodo)"
+    )
+    action.add_argument("--tag", metavar="T", help="of the images (default: dodo.yml's images.tag, or the version)")
+    return action
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    deployment, found = load_deployment(find_deployment(Path.cwd()))
+    if has_errors(found):
+        stderr.write(format_text(found))
+        return Exit.USAGE
+    try:
+        images = _chosen(options, deployment)
+        docker.require_engine()
+        return _build(options, images, stdout) if options.action == "build" else _push(images, stdout)
+    except NoSuchImage as error:
+        stderr.write(f"dodo images: {error}\n")
+        return Exit.USAGE
+    except (docker.DockerError, wheels.WheelsError) as error:
+        stderr.write(f"dodo images: {error}\n")
+        return Exit.ERROR
+
+
+def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
+    prefix = (options.prefix or deployment.image_prefix).rstrip("/")
+    if options.action == "push" and prefix == Deployment.image_prefix:
+        raise NoSuchImage("to which registry? name it with --prefix, or as images.prefix in dodo.yml")
+    names = known(load_manifests()[0].values())
+    return choose(options.name, names, prefix, options.tag or deployment.image_tag)
+
+
+def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> int:
+    docker.require_buildx()
+    packages = _packages(options.base_image or context.default_base_image(), stdout) if options.offline_wheels else None
+    with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
+        folder = Path(name)
+        context.assemble(folder, packages)
+        context.define(folder, images, options.base_image, options.source)
+        progress = "auto" if stdout.isatty() else "plain"
+        words = ("buildx", "bake", "--file", context.DEFINITION, "--progress", progress)
+        code, output = docker.show(words, stdout, folder)
+    if code:
+        hint = f"; {_INDEX_HINT}" if packages is None and (stdout.isatty() or "requirements/install" in output) else ""
+        raise docker.DockerError(f"the images cannot be built, the reason stands above{hint}")
+    width = max(len(image.reference) for image in images)
+    for image in images:
+        stdout.write(f"built {image.reference:<{width}}  {docker.size(image.reference) / 1e6:.0f} MB\n")
+    return Exit.OK
+
+
+def _packages(base_image: str, stdout: TextIO) -> Path:
+    python = wheels.python_of(base_image)
+    stdout.write(f"packages for Python {python.tag} on {python.machine}, by pip of this machine\n")
+    stdout.flush()
+    return wheels.provide(python, wheels.cache_folder())
+
+
+def _push(images: list[Image], stdout: TextIO) -> int:
+    missing = [image for image in images if not docker.is_local(image.reference)]
+    if missing:
+        names = " ".join(image.name for image in missing)
+        raise NoSuchImage(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
+    for number, image in enumerate(images, 1):
+        stdout.write(f"[{number}/{len(images)}] {image.reference}\n")
+        code, output = docker.show(("push", image.reference), stdout)
+        if code:
+            denied = any(word in output for word in ("denied", "unauthorized", "no basic auth"))
+            hint = f"; log in with: docker login {image.reference.partition('/')[0]}" if denied else ""
+            raise docker.DockerError(f"{image.reference} cannot be pushed, the reason stands above{hint}")
+    return Exit.OK

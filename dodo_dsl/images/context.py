@@ -1,0 +1,63 @@
+"""The build context: what ``services/Dockerfile`` copies, from a checkout or from an installed wheel."""
+
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from dodo_dsl import __version__, data
+from dodo_dsl.images.names import Image
+
+DEFINITION = "docker-bake.json"
+CONSTRAINTS = "constraints.txt"
+REQUIREMENTS = "services/requirements"
+_DOCKERFILE = "services/Dockerfile"
+
+
+def assemble(folder: Path, wheels: Path | None) -> None:
+    """Copies sources, constraints and wheels into an empty folder."""
+    root, package = data.root(), Path(data.__file__).parent
+    no_bytecode = shutil.ignore_patterns("__pycache__")
+    shutil.copyfile(root / CONSTRAINTS, folder / CONSTRAINTS)
+    shutil.copytree(root / "services", folder / "services", ignore=no_bytecode)
+    shutil.copytree(package / "opendlv", folder / "dodo_dsl" / "opendlv", ignore=no_bytecode)
+    shutil.copyfile(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")
+    if wheels is not None:
+        shutil.copytree(wheels, folder / "wheels", copy_function=_link)
+
+
+def _link(source: str, target: str) -> None:
+    """A wheel of some megabytes need not be copied where a hard link will do."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+
+
+def define(folder: Path, images: Sequence[Image], base_image: str | None, source: str) -> None:
+    """Writes the targets of ``docker buildx bake``, one an image; without a base image the Dockerfile's is taken."""
+    arguments = {"VERSION": __version__, "SOURCE": source}
+    if base_image:
+        arguments["BASE_IMAGE"] = base_image
+    targets = {
+        image.name: {
+            "context": ".",
+            "dockerfile": _DOCKERFILE,
+            "target": image.name,
+            "args": arguments,
+            "tags": [image.reference],
+            "output": ["type=docker"],
+        }
+        for image in images
+    }
+    definition = {"group": {"default": {"targets": list(targets)}}, "target": targets}
+    (folder / DEFINITION).write_text(json.dumps(definition, indent=2), encoding="utf-8")
+
+
+def default_base_image() -> str:
+    """The Dockerfile's own base image."""
+    for line in (data.root() / _DOCKERFILE).read_text(encoding="utf-8").splitlines():
+        if line.startswith("ARG BASE_IMAGE="):
+            return line.partition("=")[2].strip()
+    raise ValueError(f"{_DOCKERFILE} names no BASE_IMAGE")

@@ -1,0 +1,41 @@
+"""What images there are, and what they are called in a deployment."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from dodo_dsl.diagnostics import did_you_mean
+from dodo_dsl.spec.manifest import Manifest
+
+SANDBOX = "sandbox"
+SHARED = ("base", "vision")
+"""Stages that applications may stand on."""
+
+
+class NoSuchImage(Exception):
+    """A name that means no image of DoDo's; one sentence."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """An image; ``name`` is also its stage in ``services/Dockerfile``."""
+
+    name: str
+    reference: str
+
+
+def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:
+    """The stages that are images: the sandbox, those of services, and those for applications.
+
+    A manifest that names a complete image (``registry.example.org/team/radar:1``) has it from elsewhere.
+    """
+    bare = {m.image for m in manifests if "/" not in m.image and ":" not in m.image}
+    return (*SHARED, *sorted({SANDBOX, *bare}))
+
+
+def choose(words: Sequence[str], names: Sequence[str], prefix: str, tag: str) -> list[Image]:
+    """The images that words mean, all without any; raises NoSuchImage."""
+    for word in words:
+        if word not in names:
+            hint = did_you_mean(word, names)
+            raise NoSuchImage(f"there is no image '{word}'; {hint or 'there are ' + ', '.join(names)}")
+    return [Image(name, f"{prefix}/{name}:{tag}") for name in names if name in words or not words]

@@ -1,0 +1,94 @@
+"""Wheels for an image build without a package index: pip downloads them here, for the base image's Python."""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from dodo_dsl import data
+from dodo_dsl.images import docker
+from dodo_dsl.images.context import CONSTRAINTS, REQUIREMENTS
+
+_OLDEST_GLIBC = 17  # manylinux2014 is glibc 2.17
+_QUESTION = "import platform, sys; print(*sys.version_info[:2], platform.machine(), platform.libc_ver()[1] or '-')"
+
+
+class WheelsError(Exception):
+    """Wheels that cannot be had; one sentence."""
+
+
+@dataclass(frozen=True)
+class Python:
+    """The Python of a base image: (major, minor), the machine such as ``aarch64``, and glibc's (major, minor)."""
+
+    version: tuple[int, int]
+    machine: str
+    glibc: tuple[int, int]
+
+    @property
+    def tag(self) -> str:
+        return f"{self.version[0]}.{self.version[1]}"
+
+    def platforms(self) -> list[str]:
+        """Wheel platforms that it takes, the newest first (PEP 600)."""
+        newest = max(self.glibc[1], _OLDEST_GLIBC)
+        names = [f"manylinux_2_{minor}_{self.machine}" for minor in range(newest, _OLDEST_GLIBC - 1, -1)]
+        return [*names, f"manylinux2014_{self.machine}"]
+
+
+def python_of(image: str) -> Python:
+    """Asks an image; the engine pulls it when it is missing. Raises WheelsError."""
+    try:
+        answer = docker.ask("run", "--rm", "--network", "none", "--entrypoint", "python3", image, "-c", _QUESTION)
+        major, minor, machine, glibc = answer.split()
+        glibc_major, glibc_minor = glibc.split(".")[:2]
+        return Python((int(major), int(minor)), machine, (int(glibc_major), int(glibc_minor)))
+    except docker.DockerError as error:
+        raise WheelsError(f"base image {image} does not run python3: {error}") from None
+    except ValueError:
+        raise WheelsError(f"base image {image} has no Python with glibc, which the wheels need") from None
+
+
+def cache_folder() -> Path:
+    """Where downloaded wheels are kept from build to build."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dodo" / "wheels"
+
+
+def provide(python: Python, cache: Path) -> Path:
+    """A folder with a wheel for each requirement and nothing else; raises WheelsError.
+
+    It is named after what was asked for, and appears under this name only when it is complete.
+    """
+    requirements = sorted((data.root() / REQUIREMENTS).glob("*.txt"))
+    constraints = data.root() / CONSTRAINTS
+    digest = hashlib.sha256(repr(python).encode())
+    for file in (*requirements, constraints):
+        digest.update(file.read_bytes())
+    folder = cache / digest.hexdigest()[:16]
+    if not folder.is_dir():
+        cache.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix="part-", dir=cache))
+        try:
+            _download(python, requirements, constraints, part)
+            if not folder.is_dir():
+                part.rename(folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    return folder
+
+
+def _download(python: Python, requirements: list[Path], constraints: Path, folder: Path) -> None:
+    words = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "download"]
+    words += ["--dest", str(folder), "--only-binary", ":all:", "--implementation", "cp"]
+    words += ["--python-version", python.tag, "--constraint", str(constraints)]
+    words += [word for platform in python.platforms() for word in ("--platform", platform)]
+    words += [word for file in requirements for word in ("--requirement", str(file))]
+    result = subprocess.run(words, capture_output=True, text=True, errors="replace", check=False)
+    if result.returncode:
+        said = [line.strip() for line in result.stderr.splitlines() if line.strip()]
+        why = next((line for line in reversed(said) if line.startswith("ERROR")), said[-1] if said else "")
+        raise WheelsError(f"pip cannot download wheels for Python {python.tag} on {python.machine}: {why}")
