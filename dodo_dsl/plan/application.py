@@ -9,7 +9,8 @@ from typing import Any
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.plan import argv
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.source import Mapping, Node, Scalar, Sequence, plain, read
+from dodo_dsl.source import Mapping, Node, Scalar, plain, read
+from dodo_dsl.spec.schema import validate
 
 SANDBOX = "sandbox"
 _DROPPED_TOP = ("version", "name", "networks")
@@ -27,11 +28,11 @@ class ApplicationSource:
 def read_application(path: Path) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """The compose file of an application and what keeps it from being one."""
     node, found = read(path)
+    if node is None and not found:
+        found = [Diagnostic(Span(str(path)), "application-file", "the file is empty, expected a compose file")]
+    if node is not None:
+        found = [*found, *validate(node, "application")]
     services = node.get("services") if isinstance(node, Mapping) else None
-    if not has_errors(found) and (not isinstance(services, Mapping) or not services.entries):
-        span = node.span if node else Span(str(path))
-        message = "this is no compose file of an application: it has no services"
-        found = [*found, Diagnostic(span, "application-file", message)]
     if not isinstance(node, Mapping) or not isinstance(services, Mapping) or has_errors(found):
         return None, found
     spans = {name: entry.key for name, entry in services.entries.items()}
@@ -54,14 +55,8 @@ def _without_cid(services: Mapping) -> list[Diagnostic]:
 
 
 def _problems(name: str, node: Node, key: Span) -> list[Diagnostic]:
-    if not isinstance(node, Mapping):
-        return [Diagnostic(key, "application-file", f"service '{name}' is no mapping")]
     problems = []
-    process = node.get("x-dodo-process")
-    if process is not None and not _is_argv(process):
-        message = f"'x-dodo-process' of '{name}' is no list of texts, expected for example [python, perception.py]"
-        problems.append(Diagnostic(process.span, "application-file", message))
-    command = node.get("command")
+    command = node.get("command") if isinstance(node, Mapping) else None
     if isinstance(command, Scalar) and isinstance(command.value, str):
         try:
             shlex.split(command.text)
@@ -70,12 +65,6 @@ def _problems(name: str, node: Node, key: Span) -> list[Diagnostic]:
     if name == SANDBOX or name.startswith("dodo-"):
         problems.append(Diagnostic(key, "application-file", f"the name '{name}' is kept for DoDo's own services"))
     return problems
-
-
-def _is_argv(node: Node) -> bool:
-    if not isinstance(node, Sequence) or not node.items:
-        return False
-    return all(isinstance(item, Scalar) and item.text for item in node.items)
 
 
 def _takes_cid(node: Node) -> bool:
