@@ -73,7 +73,8 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
     docker.require_buildx()
     packages = _packages(options.base_image or context.default_base_image(), stdout) if options.offline_wheels else None
     with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
-        folder = Path(name)
+        folder = Path(name) / "dodo-images"
+        folder.mkdir()
         context.assemble(folder, packages)
         context.define(folder, images, options.base_image, options.source)
         progress = "auto" if stdout.isatty() else "plain"

@@ -16,13 +16,16 @@ _DOCKERFILE = "services/Dockerfile"
 
 
 def assemble(folder: Path, wheels: Path | None) -> None:
-    """Copies sources, constraints and wheels into an empty folder."""
+    """Copies sources, constraints and wheels into an empty folder, with their dates.
+
+    The engine knows a context by its folder's name, and takes over only what has another date than the last time.
+    """
     root, package = data.root(), Path(data.__file__).parent
     no_bytecode = shutil.ignore_patterns("__pycache__")
-    shutil.copyfile(root / CONSTRAINTS, folder / CONSTRAINTS)
+    shutil.copy2(root / CONSTRAINTS, folder / CONSTRAINTS)
     shutil.copytree(root / "services", folder / "services", ignore=no_bytecode)
     shutil.copytree(package / "opendlv", folder / "dodo_dsl" / "opendlv", ignore=no_bytecode)
-    shutil.copyfile(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")
+    shutil.copy2(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")
     if wheels is not None:
         shutil.copytree(wheels, folder / "wheels", copy_function=_link)
 
@@ -32,7 +35,7 @@ def _link(source: str, target: str) -> None:
     try:
         os.link(source, target)
     except OSError:
-        shutil.copyfile(source, target)
+        shutil.copy2(source, target)
 
 
 def define(folder: Path, images: Sequence[Image], base_image: str | None, source: str) -> None:
