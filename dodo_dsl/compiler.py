@@ -38,7 +38,7 @@ def load(paths: Sequence[Path], application: Path | None = None, start: Path | N
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any."""
     deployment, found = load_deployment(find_deployment(start or Path.cwd()))
     manifests, manifest_problems = load_manifests()
-    locations, empty = locate(paths, deployment.registry)
+    locations, empty = locate(paths, deployment.registry, _registries_above(paths))
     loaded = [load_spec(location) for location in locations]
     specs = tuple(spec for spec, _ in loaded)
     found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
@@ -49,6 +49,12 @@ def load(paths: Sequence[Path], application: Path | None = None, start: Path | N
         source, problems = read_application(file)
         found.extend(problems)
     return Checked(deployment, manifests, specs, tuple(ordered(found)), source, tuple(empty))
+
+
+def _registries_above(paths: Sequence[Path]) -> list[Path]:
+    """The registries of the deployments that hold the paths, wherever DoDo was started."""
+    files = {find_deployment(path if path.is_dir() else path.parent) for path in paths}
+    return [folder for file in files if file for folder in load_deployment(file)[0].registry]
 
 
 def plan(checked: Checked, out: Path) -> tuple[Compiled, tuple[Diagnostic, ...]]:

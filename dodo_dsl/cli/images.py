@@ -21,6 +21,10 @@ EXAMPLES = """examples:
 _INDEX_HINT = "where a build cannot reach the package index, --offline-wheels lets this machine download the packages"
 
 
+class _Usage(Exception):
+    """A sentence for the user; the exit code is 2."""
+
+
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     build = _action(actions, "build", "build images from the installed DoDo")
@@ -53,7 +57,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         images = _chosen(options, deployment)
         docker.require_engine()
         return _build(options, images, stdout) if options.action == "build" else _push(images, stdout)
-    except NoSuchImage as error:
+    except (NoSuchImage, _Usage) as error:
         stderr.write(f"dodo images: {error}\n")
         return Exit.USAGE
     except (docker.DockerError, wheels.WheelsError) as error:
@@ -64,7 +68,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     prefix = (options.prefix or deployment.image_prefix).rstrip("/")
     if options.action == "push" and prefix == Deployment.image_prefix:
-        raise NoSuchImage("to which registry? name it with --prefix, or as images.prefix in dodo.yml")
+        raise _Usage("to which registry? name it with --prefix, or as images.prefix in dodo.yml")
     names = known(load_manifests()[0].values())
     return choose(options.name, names, prefix, options.tag or deployment.image_tag)
 
@@ -100,7 +104,7 @@ def _push(images: list[Image], stdout: TextIO) -> int:
     missing = [image for image in images if not docker.is_local(image.reference)]
     if missing:
         names = " ".join(image.name for image in missing)
-        raise NoSuchImage(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
+        raise _Usage(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
     for number, image in enumerate(images, 1):
         stdout.write(f"[{number}/{len(images)}] {image.reference}\n")
         code, output = docker.show(("push", image.reference), stdout)

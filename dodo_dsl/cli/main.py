@@ -75,7 +75,3 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
         place = f"{error.filename}: " if error.filename else ""
         stderr.write(f"dodo: {place}{error.strerror or error}\n")
         return Exit.ERROR
-
-
-def run() -> None:
-    sys.exit(main(sys.argv[1:], sys.stdout, sys.stderr))

@@ -8,6 +8,7 @@ from pathlib import Path
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.registry import SUFFIX
 
 
 class NoSuchTest(Exception):
@@ -31,7 +32,7 @@ def existing_file(path: Path | None) -> Path | None:
 
 
 def _is_path(word: str) -> bool:
-    return "/" in word or word.endswith(".dodo.yml") or word in (".", "..")
+    return "/" in word or word.endswith(SUFFIX) or Path(word).is_dir()
 
 
 def select(words: Sequence[str], levels: Sequence[str], application: Path | None) -> Checked:

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors
 from dodo_dsl.plan import argv
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.source import Mapping, Node, Scalar, plain, read
 from dodo_dsl.spec.schema import validate
 
 SANDBOX = "sandbox"
+KEYS = ("x-dodo", "x-dodo-process")
 _DROPPED_TOP = ("version", "name", "networks")
 
 
@@ -56,6 +57,10 @@ def _without_cid(services: Mapping) -> list[Diagnostic]:
 
 def _problems(name: str, node: Node, key: Span) -> list[Diagnostic]:
     problems = []
+    for word, entry in node.entries.items() if isinstance(node, Mapping) else ():
+        if word.startswith("x-dodo") and word not in KEYS:
+            hint = did_you_mean(word, KEYS)
+            problems.append(Diagnostic(entry.key, "unknown-key", f"DoDo knows no key '{word}'", hint))
     command = node.get("command") if isinstance(node, Mapping) else None
     if isinstance(command, Scalar) and isinstance(command.value, str):
         try:
@@ -138,7 +143,7 @@ class _Rewriter:
         self._command(cid)
         self._environment(cid)
         self._paths()
-        for key in ("x-dodo", "x-dodo-process"):
+        for key in KEYS:
             self.service.pop(key, None)
         for key in ("container_name", "restart", "ports"):
             if self.service.pop(key, None) is not None:

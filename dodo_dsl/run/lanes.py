@@ -103,7 +103,8 @@ def reap() -> list[str]:
         if LANE.fullmatch(lane):
             killed = _kill_lane(lane)
             memories = remove_memories(lane)
-            removed.append(f"{about.get('test', '?')}: {killed} processes and {memories} shared memories")
+            if killed or memories:
+                removed.append(f"{about.get('test', '?')}: {killed} processes and {memories} shared memories")
         lease.release()
     return removed
 

@@ -235,7 +235,10 @@ class ProcessBackend:
         outputs = [output.hand_over() for output in self._outputs.values() if not output.done.is_set()]
         self._send({"do": "keep"}, (*(reader for reader, _ in outputs), *(log for _, log in outputs)))
         pid = self._process.pid
-        look = f"ps -s {pid} -f" if self.isolation == "host" else f"nsenter -t {pid} -n -i -m bash"
+        look = f"ps -f --ppid {pid}"
+        if self.isolation == "network":
+            inner = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+            look = f"nsenter {'' if os.getuid() == 0 else '-U --preserve-credentials '}-t {inner[0]} -n -i -m -p bash"
         memory = f", shared memory '{self.lane.memory_prefix}*'" if self.lane.memory_prefix else ""
         return [
             f"{self.plan.slug} is kept up: CID {self.lane.cid}{memory}, logs in {self.report / 'logs'}",

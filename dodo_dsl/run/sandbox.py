@@ -104,7 +104,8 @@ class Sandbox:
                 start_new_session=True,
             )
         except (OSError, ValueError) as error:
-            self.tell(unstartable=name, why=getattr(error, "strerror", None) or str(error))
+            why = getattr(error, "strerror", None) or str(error)
+            self.tell(unstartable=name, why=f"{getattr(error, 'filename', None) or order['argv'][0]}: {why}")
 
     def _do_send(self, _descriptors: list[int], cid: int, data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):

@@ -19,10 +19,10 @@ class Location:
         return self.path.name.removesuffix(SUFFIX)
 
 
-def _specs_below(folder: Path, root: Path) -> Iterator[Location]:
+def _specs_below(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob(f"*{SUFFIX}")):
         if not any(part.startswith(".") for part in path.relative_to(folder).parts):
-            yield Location(path, root)
+            yield path
 
 
 def _root_of(path: Path, registries: Sequence[Path]) -> Path:
@@ -34,16 +34,27 @@ def _root_of(path: Path, registries: Sequence[Path]) -> Path:
     return path.parent.parent if own_folder else path.parent
 
 
-def locate(paths: Iterable[Path], registries: Sequence[Path]) -> tuple[list[Location], list[Path]]:
-    """The specs that are or lie below ``paths`` (all registries without any), and the paths that hold none."""
-    roots = [r.resolve() for r in registries]
+def _root_below(path: Path, folder: Path, registries: Sequence[Path]) -> Path:
+    """The root of a spec that was found below a folder: the folder itself where that is higher than its own root."""
+    root = _root_of(path, registries)
+    return folder if root.is_relative_to(folder) and root not in registries else root
+
+
+def locate(
+    paths: Iterable[Path], registries: Sequence[Path], others: Sequence[Path] = ()
+) -> tuple[list[Location], list[Path]]:
+    """The specs that are or lie below ``paths`` (all ``registries`` without any), and the paths that hold none.
+
+    ``others`` are registries too, whose specs are not meant by themselves.
+    """
+    own = [r.resolve() for r in registries]
+    roots = [*own, *(r.resolve() for r in others)]
     found: dict[Path, Location] = {}
     empty = []
-    wanted = [p.resolve() for p in paths] or roots
+    wanted = [p.resolve() for p in paths] or own
     for path in wanted:
         if path.is_dir():
-            known = [r for r in roots if path.is_relative_to(r)]
-            specs = list(_specs_below(path, known[0] if known else path))
+            specs = [Location(p, _root_below(p, path, roots)) for p in _specs_below(path)]
         else:
             specs = [Location(path, _root_of(path, roots))] if path.is_file() and path.name.endswith(SUFFIX) else []
         found.update((s.path, s) for s in specs)

@@ -101,6 +101,7 @@ REFUSED = {
     "services: {a: {command: --cid=1, volumes: {a: b}}}\n": "wrong-type",
     "services: {a: {command: --cid=1, x-dodo-process: python x.py}}\n": "wrong-type",
     "services: {a: {command: --cid=1, x-dodo: {inn: []}}}\n": "unknown-key",
+    "services: {a: {command: --cid=1, x-dodo-proces: [a]}}\n": "unknown-key",
     "services: {../a: {command: --cid=1}}\n": "wrong-value",
     "services: {sandbox: {command: --cid=1}}\n": "application-file",
     "services: {a: {image: x}}\n": "application-cid",

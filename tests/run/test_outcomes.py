@@ -84,7 +84,7 @@ def test_missing_program_is_an_error(bench: Bench) -> None:
     broken = Application(".", (ApplicationService("app", ("no-such-program-of-dodo",)),))
     (outcome,) = bench.run(replace(bench.plan(), application=broken))
     assert outcome.outcome == "error"
-    assert outcome.reason == "service 'app' could not be started: No such file or directory"
+    assert outcome.reason == "service 'app' could not be started: no-such-program-of-dodo: No such file or directory"
 
 
 def test_last_lines_and_logs_of_the_service_that_decided(bench: Bench) -> None:

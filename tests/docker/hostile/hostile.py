@@ -1,0 +1,78 @@
+"""An application that harms whom it can reach, and drives nobody.
+
+python3 hostile.py --cid=111 --name=video0.argb --harm=flood|groups|memory|tmp
+"""
+
+import itertools
+import os
+import socket
+import sys
+import time
+from pathlib import Path
+
+import sysv_ipc
+
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages import MessageSet
+
+FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
+CID = int(FLAGS["cid"])
+MESSAGES = MessageSet.standard()
+
+
+def request(name: str, **fields: float) -> bytes:
+    message = MESSAGES.type(name)(**fields)
+    now = time.time_ns() // 1000
+    return encode_frame(Envelope(MESSAGES.id(message), MESSAGES.encode(message), now, 0, now, 0))
+
+
+def flood() -> None:
+    """As many datagrams as the processor allows, garbage and large ones, on the test's own bus."""
+    junk = encode_frame(Envelope(5000, os.urandom(20_000), 0, 0, 0, 0))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for turn in itertools.count():
+            sender.sendto(junk if turn % 2 else os.urandom(100), (f"225.0.0.{CID}", 12175))
+            if turn % 200 == 0:
+                time.sleep(0.01)
+
+
+def groups() -> None:
+    """Full steering and pedal on every other test's group."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        while True:
+            steering = request("opendlv.proxy.GroundSteeringRequest", groundSteering=-0.29)
+            pedal = request("opendlv.proxy.PedalPositionRequest", position=-0.9)
+            frame = request("opendlv.sim.Frame", x=100.0, qw=1.0)
+            for cid in range(1, 255):
+                if cid != CID:
+                    for datagram in (steering, pedal, frame):
+                        sender.sendto(datagram, (f"225.0.0.{cid}", 12175))
+            time.sleep(0.05)
+
+
+def memory() -> None:
+    """Zeros into all shared memory in sight, token files of the usual names made anew."""
+    while True:
+        for name in ("video1.argb", "video1.i420", "img.argb", "img.i420"):
+            token = Path("/tmp", name)
+            token.touch()
+            key = sysv_ipc.ftok(str(token), 1, True)
+            sysv_ipc.SharedMemory(key, sysv_ipc.IPC_CREAT, size=640 * 480 * 4)
+        for line in Path("/proc/sysvipc/shm").read_text().splitlines()[1:]:
+            segment = sysv_ipc.SharedMemory(int(line.split()[0]))
+            segment.write(b"\0" * segment.size)
+            segment.detach()
+        time.sleep(0.02)
+
+
+def tmp() -> None:
+    """Writes into /tmp until it is full, and keeps it so."""
+    for number in itertools.count():
+        try:
+            Path(f"/tmp/filler-{number % 1000}").write_bytes(os.urandom(1 << 20))
+        except OSError:
+            time.sleep(0.05)
+
+
+print(f"hostile: {FLAGS['harm']}", flush=True)
+{"flood": flood, "groups": groups, "memory": memory, "tmp": tmp}[FLAGS["harm"]]()
