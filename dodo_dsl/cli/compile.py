@@ -18,6 +18,9 @@ EXAMPLES = """examples:
 """
 
 
+_MOST_LINES = 200
+
+
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", nargs="*", metavar="PATH", help="specs, folders or names (default: all)")
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
@@ -33,7 +36,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         stderr.write(f"dodo compile: {error}\n")
         return Exit.USAGE
     if options.check:
-        return _check(checked, options, stdout)
+        return _check(checked, options, stdout, stderr)
     return _write(checked, options, stdout, stderr)
 
 
@@ -42,7 +45,7 @@ def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
         stdout.write(FORMATS[style](diagnostics))
 
 
-def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int:
+def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = list(checked.diagnostics), ""
     if checked.ok and checked.application is not None and checked.specs:
         compiled, problems = plan(checked, options.output)
@@ -53,10 +56,18 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int
     if has_errors(diagnostics):
         return Exit.USAGE
     if options.format == "text":
-        stdout.write(stale)
-        state = f"{options.output} is stale" if stale else "no problems"
+        stdout.write(_shortened(stale))
+        state = f"{options.output} is stale; dodo compile brings it up to date" if stale else "no problems"
         stdout.write(f"{_count(len(checked.specs))} checked: {state}\n")
+    elif stale:
+        stderr.write(f"{options.output} is stale; dodo compile brings it up to date\n")
     return Exit.PROBLEMS if stale else Exit.OK
+
+
+def _shortened(difference: str) -> str:
+    lines = difference.splitlines(keepends=True)
+    rest = f"... {len(lines) - _MOST_LINES} more lines\n" if len(lines) > _MOST_LINES else ""
+    return "".join(lines[:_MOST_LINES]) + rest
 
 
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

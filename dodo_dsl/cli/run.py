@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from dodo_dsl.emit.write import PLAN_FILE, write
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan, PlanError, from_json
-from dodo_dsl.report.write import Tested, write_report
+from dodo_dsl.report.write import Tested, forget, write_report
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
 from dodo_dsl.run.runner import Runner, default_backend, default_parallel, reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
@@ -159,8 +158,7 @@ def _backends(
 
 
 def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> list[Outcome]:
-    for job in jobs:
-        shutil.rmtree(job.report, ignore_errors=True)
+    forget(report.resolve(), [job.plan.slug for job in jobs])
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
     write_report(report, outcomes, {job.plan.slug: Tested(job.plan, job.folder) for job in jobs})

@@ -86,7 +86,7 @@ class _Builder:
         return Plan(
             name=name,
             slug=name,
-            spec=spec.path.relative_to(spec.location.root).as_posix(),
+            spec=self._shown(spec.path),
             description=spec.description or "",
             level=spec.level or "",
             kind=spec.kind or "",
@@ -104,8 +104,12 @@ class _Builder:
         )
 
     def _place(self, key: str, span: Span) -> None:
-        file = Path(span.file).relative_to(self.spec.location.root).as_posix()
-        self.places[key] = Place(file, span.line, span.column)
+        self.places[key] = Place(self._shown(Path(span.file)), span.line, span.column)
+
+    def _shown(self, path: Path) -> str:
+        """A spec's path as its repository has it; outside a deployment, as its registry does."""
+        root = self.deployment.root if self.deployment.file else self.spec.location.root
+        return path.relative_to(root if path.is_relative_to(root) else self.spec.location.root).as_posix()
 
     def _image(self, image: str) -> str:
         bare = "/" not in image and ":" not in image

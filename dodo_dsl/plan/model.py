@@ -57,7 +57,7 @@ class Application:
 
 @dataclass(frozen=True)
 class Place:
-    """Where in a spec something was written; ``file`` is relative to the registry's root."""
+    """Where in a spec something was written; ``file`` is relative to the repository, or else to the registry."""
 
     file: str
     line: int

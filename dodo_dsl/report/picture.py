@@ -89,4 +89,4 @@ def _frame(axes: Any, drive: Drive) -> None:
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.grid(True, linewidth=0.3)
-    axes.legend(loc="best", fontsize=8)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2, fontsize=8, frameon=False)

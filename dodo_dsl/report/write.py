@@ -1,5 +1,6 @@
 """A run's report folder."""
 
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from dodo_dsl.report.drive import read_drive
 
 RECORDING = "test.rec"
 TRAJECTORY = "trajectory.png"
+LOGS = "logs"
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,18 @@ class Tested:
 
     plan: Plan
     folder: Path
+
+
+def forget(folder: Path, slugs: Sequence[str]) -> None:
+    """Removes what earlier runs left in a report folder for the tests that they name, and for ``slugs``."""
+    try:
+        earlier = [outcome.slug for outcome in results.load(folder / results.FILE_NAME)]
+    except results.ResultsError:
+        earlier = []
+    for slug in {*slugs, *earlier}:
+        place = folder / slug
+        if place.parent == folder and (place / LOGS).is_dir():
+            shutil.rmtree(place)
 
 
 def write_report(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Tested]) -> None:
@@ -49,7 +63,7 @@ def _shown(folder: Path) -> str:
 
 def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
     return {
-        o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / "logs").glob("*.log"))]
+        o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / LOGS).glob("*.log"))]
         for o in outcomes
     }
 

@@ -33,7 +33,8 @@ def test_the_rectangle_lies_along_the_heading() -> None:
 
 @given(poses)
 def test_the_rectangle_is_the_one_that_shapely_turns(pose: Pose) -> None:
-    assert outline(pose, KIWI).symmetric_difference(dense(pose, pose, 1)[0]).area < 1e-12
+    # overlays of nearly equal shapes are not reliable, so the distance of their outlines is compared
+    assert shapely.hausdorff_distance(outline(pose, KIWI), dense(pose, pose, 1)[0]) < 1e-9
 
 
 @settings(deadline=None)
