@@ -29,7 +29,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     build = _action(actions, "build", "build images from the installed DoDo")
     build.add_argument(
-        "--base-image", metavar="I", help=f"Python to stand on (default: {context.default_base_image()})"
+        "--base-image", metavar="I", help="image with Python to stand on (default: one of python:*-slim)"
     )
     build.add_argument("--offline-wheels", action="store_true", help="download packages here, not inside the build")
     build.add_argument("--source", metavar="URL", default="", help="where the sources are, for the images' labels")

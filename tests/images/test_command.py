@@ -1,0 +1,124 @@
+"""dodo images: what it says and how it ends when something is missing."""
+
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.main import main
+from dodo_dsl.images.names import NoSuchImage, choose, known
+from dodo_dsl.spec.manifest import load_manifests
+from tests.images.dockerfile import ROOT
+
+
+def run(*words: str) -> tuple[int, str]:
+    stdout, stderr = StringIO(), StringIO()
+    code = main(["images", *words], stdout, stderr)
+    return code, stderr.getvalue() + stdout.getvalue()
+
+
+@pytest.fixture
+def docker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that is all of PATH, for a docker command that lacks something."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+    monkeypatch.chdir(tmp_path)
+    return folder / "docker"
+
+
+def script(path: Path, text: str) -> None:
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+
+
+def test_unknown_names_are_usage(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    code, said = run("build", "colision")
+    assert code == Exit.USAGE
+    assert said == "dodo images: there is no image 'colision'; did you mean 'collision' or 'vision'?\n"
+
+
+def test_names_are_those_of_the_manifests() -> None:
+    manifests, _ = load_manifests()
+    names = known(manifests.values())
+    assert {"base", "vision", "sandbox", "collision", "virtual-camera"} <= set(names)
+    one, two = choose(["vision", "collision"], names, "registry.example.org/dodo", "2")
+    assert (one.reference, two.reference) == (
+        "registry.example.org/dodo/vision:2",
+        "registry.example.org/dodo/collision:2",
+    )
+    assert [image.name for image in choose([], names, "dodo", "1")] == list(names)
+    with pytest.raises(NoSuchImage, match="known: base, collision"):
+        choose(["zzz"], names, "dodo", "1")
+
+
+def test_without_docker(docker: Path) -> None:
+    assert run("build") == (
+        Exit.ERROR,
+        "dodo images: the docker command is missing; install Docker Engine with its command line\n",
+    )
+
+
+def test_without_an_engine(docker: Path) -> None:
+    script(docker, "echo 'Cannot connect to the Docker daemon at unix:///x.sock.' >&2; exit 1")
+    code, said = run("build")
+    assert code == Exit.ERROR
+    assert said == "dodo images: no Docker engine answers: Cannot connect to the Docker daemon at unix:///x.sock.\n"
+
+
+def test_without_buildx(docker: Path) -> None:
+    script(docker, 'case "$1" in buildx) exit 1;; *) echo 28.0;; esac')
+    code, said = run("build")
+    assert code == Exit.ERROR
+    assert said == "dodo images: docker has no buildx; install the package docker-buildx-plugin\n"
+
+
+def test_a_failed_build_shows_why_and_says_so(docker: Path) -> None:
+    script(docker, 'case "$2" in bake) echo "#9 sh /opt/tools/requirements/install base: failed"; exit 1;; esac')
+    code, said = run("build")
+    assert code == Exit.ERROR
+    assert "dodo images: the images cannot be built, the reason stands above; where a build cannot reach" in said
+    assert "#9 sh /opt/tools/requirements/install base: failed" in said
+
+
+def test_a_base_image_without_python(docker: Path) -> None:
+    script(docker, 'case "$1" in run) echo "exec: python3: not found" >&2; exit 127;; esac')
+    code, said = run("build", "--offline-wheels", "--base-image", "busybox")
+    assert code == Exit.ERROR
+    assert said == "dodo images: base image busybox does not run python3: exec: python3: not found\n"
+
+
+def test_push_asks_for_a_registry(docker: Path) -> None:
+    code, said = run("push")
+    assert (code, said) == (
+        Exit.USAGE,
+        "dodo images: to which registry? name it with --prefix, or as images.prefix in dodo.yml\n",
+    )
+
+
+def test_push_takes_the_deployments_names_and_wants_built_images(docker: Path, tmp_path: Path) -> None:
+    (tmp_path / "dodo.yml").write_text('dodo: 1\nimages: {prefix: registry.example.org/team, tag: "7"}\n')
+    script(docker, 'case "$1" in version) echo 28.0;; esac')
+    code, said = run("push", "base", "collision")
+    assert code == Exit.USAGE
+    assert said == (
+        "dodo images: registry.example.org/team/base:7 is not on this machine; "
+        "build it first: dodo images build base collision\n"
+    )
+
+
+def test_push_without_a_log_in_says_how(docker: Path) -> None:
+    script(docker, 'case "$1" in push) echo "unauthorized: access to it is denied"; exit 1;; *) echo 1;; esac')
+    code, said = run("push", "base", "--prefix", "registry.example.org/team", "--tag", "1")
+    assert code == Exit.ERROR
+    assert said.endswith("unauthorized: access to it is denied\n")
+    assert "base:1 cannot be pushed, the reason stands above; log in with: docker login registry.example.org\n" in said
+
+
+def test_a_broken_deployment_is_usage(docker: Path, tmp_path: Path) -> None:
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nimages: {prefix: [1]}\n")
+    code, said = run("build")
+    assert code == Exit.USAGE
+    assert "dodo.yml:2:" in said

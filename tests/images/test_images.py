@@ -1,0 +1,203 @@
+"""The images on a real engine: what they are, what they hold, and how they behave where they may do nothing."""
+
+import contextlib
+import json
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from dodo_dsl import __version__
+from dodo_dsl.images import context
+from dodo_dsl.spec.manifest import Manifest, load_manifests
+from tests.images.conftest import TAG, docker
+from tests.images.dockerfile import ROOT
+from tests.images.layers import layers
+
+pytestmark = pytest.mark.slow
+
+MANIFESTS, _ = load_manifests()
+HARDENED = ("--read-only", "--cap-drop", "ALL", "--security-opt", "no-new-privileges:true")
+SHARING = 1.15
+"""Design section 9: bytes of all images against the largest one's."""
+
+each_service = pytest.mark.parametrize("manifest", MANIFESTS.values(), ids=lambda m: m.name)
+
+
+def config(reference: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(docker("image", "inspect", "--format", "{{json .Config}}", reference))
+    return found
+
+
+def run(reference: str, *words: str, flags: tuple[str, ...] = HARDENED) -> str:
+    return docker("run", "--rm", "--network", "none", *flags, "--entrypoint", words[0], reference, *words[1:])
+
+
+@contextlib.contextmanager
+def started(reference: str, volume: str, service: str, *words: str, flags: tuple[str, ...] = ()) -> Iterator[str]:
+    """A service in a container as the compiled files start it; taken away at the end."""
+    ready = f"test -f /tmp/dodo-ready-{service}"
+    health = ("--health-cmd", ready, "--health-interval", "500ms", "--health-retries", "120")
+    command = ["run", "--detach", "--init", *HARDENED, *health, "--env", f"DODO_SERVICE={service}"]
+    container = docker(*command, "--volume", f"{volume}:/tmp", *flags, reference, *words)
+    try:
+        yield container
+    finally:
+        docker("rm", "--force", "--volumes", container)
+
+
+def await_health(container: str, patience: float = 60.0) -> str:
+    """The health when it is decided, or ``exited`` with what the container said."""
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        state = json.loads(docker("inspect", "--format", "{{json .State}}", container))
+        if not state["Running"]:
+            return "exited: " + docker("logs", container)
+        if state["Health"]["Status"] != "starting":
+            return str(state["Health"]["Status"])
+        time.sleep(0.2)
+    return "starting"
+
+
+def test_there_is_an_image_for_each_service(built: dict[str, str]) -> None:
+    assert set(built) == {"base", "vision", "sandbox", *(m.image for m in MANIFESTS.values())}
+
+
+@each_service
+def test_service_says_its_help(built: dict[str, str], manifest: Manifest) -> None:
+    out = docker("run", "--rm", "--network", "none", *HARDENED, built[manifest.image], "--help")
+    assert out.startswith(f"{manifest.name}: {manifest.description}")
+
+
+@each_service
+def test_labels_and_user(built: dict[str, str], manifest: Manifest) -> None:
+    about = config(built[manifest.image])
+    assert about["User"] == "10001:10001"
+    assert about["Labels"] == {
+        "org.opencontainers.image.title": manifest.image,
+        "org.opencontainers.image.version": __version__,
+        "org.opencontainers.image.source": "https://git.example.org/dodo",
+        "dodo.service": manifest.name,
+    }
+
+
+@each_service
+def test_image_holds_its_own_service_only_and_its_bytecode(built: dict[str, str], manifest: Manifest) -> None:
+    reference, folder = built[manifest.image], manifest.folder.name
+    held = run(reference, "ls", "services").split()
+    assert set(held) == {"__init__.py", "__pycache__", "base", folder}
+    sources = run(reference, "find", "/opt/dodo", "-name", "*.py").splitlines()
+    compiled = set(run(reference, "find", "/opt/dodo", "-name", "*.cpython-*.pyc").splitlines())
+    assert len(sources) > 20
+    for source in map(Path, sources):
+        assert any(c.startswith(f"{source.parent}/__pycache__/{source.stem}.") for c in compiled), source
+
+
+def test_shared_stages_do_not_pass_for_services(built: dict[str, str]) -> None:
+    assert config(built["sandbox"])["Labels"]["dodo.service"] == "sandbox"
+    assert "dodo.service" not in config(built["base"])["Labels"]
+    assert "dodo.service" not in config(built["vision"])["Labels"]
+    assert {config(built[name])["User"] for name in ("base", "vision", "sandbox")} == {"10001:10001"}
+
+
+@pytest.mark.parametrize("name", ["sandbox", "virtual-camera"])
+def test_nothing_is_writable_that_need_not_be(built: dict[str, str], name: str) -> None:
+    """Looked at as root, who sees every folder; ``/dev`` and ``/proc`` are the engine's."""
+    as_root = ("--user", "0")
+    find = ("find", "/", "-xdev")
+    world = run(built[name], *find, "-perm", "-0002", "!", "-type", "l", flags=as_root).splitlines()
+    assert set(world) <= {"/tmp", "/var/tmp", "/run/lock"}
+    assert run(built[name], "stat", "--format", "%a %u", "/tmp", flags=as_root) == "1777 0"
+    assert run(built[name], *find, "-user", "10001", flags=as_root).splitlines() == ["/dodo/report"]
+    assert run(built[name], *find, "-nouser", flags=as_root) == ""
+
+
+def test_sandbox_can_do_what_the_runner_asks_of_it(built: dict[str, str]) -> None:
+    """It sleeps without a command, and its bash sends datagrams (TestBegin)."""
+    assert config(built["sandbox"])["Cmd"] == ["sleep", "infinity"]
+    assert run(built["sandbox"], "bash", "-c", "printf x > /dev/udp/127.0.0.1/9 && id -u") == "10001"
+
+
+def test_service_gets_healthy_and_ends_when_told_to(built: dict[str, str], volume: str) -> None:
+    with started(built["integrator"], volume, "pose", "--cid=131") as container:
+        assert await_health(container) == "healthy"
+        assert docker("logs", container).splitlines()[0] == '{"dodo": "ready"}'
+        docker("stop", "--time", "10", container)
+        assert docker("inspect", "--format", "{{.State.ExitCode}}", container) == "0"
+
+
+def test_service_that_is_not_ready_is_not_healthy(built: dict[str, str], volume: str) -> None:
+    with started(built["base"], volume, "pose", "sleep", "60", flags=("--health-retries", "1")) as container:
+        assert await_health(container) == "unhealthy"
+
+
+def test_recorder_writes_into_a_volume_that_docker_makes(built: dict[str, str], volume: str) -> None:
+    words = ("rec-recorder", "--rec=/dodo/report/test.rec", "--cid=132")
+    with started(built["rec-recorder"], volume, *words, flags=("--volume", "/dodo/report")) as container:
+        assert await_health(container) == "healthy"
+        assert docker("exec", container, "stat", "--format", "%u", "/dodo/report/test.rec") == "10001"
+
+
+def test_camera_shares_memory_with_another_user(built: dict[str, str], volume: str) -> None:
+    """An application may well run as root without capabilities to read what is not its own."""
+    maps = ROOT / "tests_registry" / "maps"
+    flags = ("--ipc", "shareable", "--volume", f"{maps}:/dodo/files/maps:ro")
+    words = ("camera", "--map-path=/dodo/files/maps/straight", "--cid=133")
+    with started(built["virtual-camera"], volume, *words, flags=flags) as container:
+        assert await_health(container) == "healthy"
+        look = "from dodo_dsl.opendlv.memory import SharedMemory as S; print(S.attach('video0.argb').size)"
+        application = ("--user", "0", "--ipc", f"container:{container}", "--volume", f"{volume}:/tmp")
+        assert run(built["vision"], "python3", "-c", look, flags=(*HARDENED, *application)) == str(640 * 480 * 4)
+
+
+def test_layers_are_shared(built: dict[str, str]) -> None:
+    found = layers(sorted(built.values()))
+    assert len(found) == len(built)
+    together = sum({digest: size for own in found.values() for digest, size in own.items()}.values())
+    largest = max(sum(own.values()) for own in found.values())
+    assert largest > 100_000_000
+    assert together <= SHARING * largest
+
+
+def test_a_second_build_makes_the_same_files(built: dict[str, str], base_image: str, tmp_path: Path) -> None:
+    """The stage of the sources, built anew from files with other dates: its layers stay shared."""
+    folder = tmp_path / "dodo-images-again"
+    folder.mkdir()
+    context.assemble(folder, None)
+    for path in folder.rglob("*.py"):
+        path.touch()
+    words = ["docker", "buildx", "build", "--quiet", "--no-cache", "--target", "code", "--file", "services/Dockerfile"]
+    words += ["--build-arg", f"BASE_IMAGE={base_image}", "--iidfile", str(tmp_path / "id"), "."]
+    subprocess.run(words, cwd=folder, check=True, capture_output=True, timeout=300)
+    image = (tmp_path / "id").read_text()
+    try:
+        sums = "find . -type f -exec sha256sum {} + | sort"
+        again = docker("run", "--rm", "--workdir", "/shared", image, "sh", "-c", sums)
+        first = docker("run", "--rm", "--workdir", "/opt/dodo", built["sandbox"], "sh", "-c", sums)
+        assert again == first
+    finally:
+        docker("image", "rm", "--force", image)
+
+
+def test_the_example_application_is_built_and_starts(
+    built: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = shutil.copytree(ROOT / "examples" / "kiwi", tmp_path / "kiwi")
+    compose = yaml.safe_load((folder / "docker-compose.yml").read_text())
+    for name, service in compose["services"].items():
+        service["image"] = f"dodo-test/kiwi-{name}:{TAG}"
+    (folder / "docker-compose.yml").write_text(yaml.safe_dump(compose))
+    monkeypatch.setenv("DODO_BASE", built["vision"])
+    docker("compose", "--project-directory", str(folder), "-f", str(folder / "docker-compose.yml"), "build")
+    references = [service["image"] for service in compose["services"].values()]
+    try:
+        for reference in references:
+            assert config(reference)["User"] == "10001:10001"
+            assert "--cid" in docker("run", "--rm", "--network", "none", *HARDENED, reference, "--help")
+    finally:
+        docker("image", "rm", "--force", *references)
