@@ -12,6 +12,7 @@ import yaml
 
 from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.plan.application import read_application
+from dodo_dsl.report.drive import read_ground
 from dodo_dsl.spec.deployment import load_deployment
 
 ROOT = Path(__file__).parents[1]
@@ -72,3 +73,12 @@ def test_services_help_ends_with_an_example(folder: Path) -> None:
 @pytest.mark.parametrize("folder", sorted((ROOT / "tests_registry").glob("*/*.dodo.yml")), ids=lambda p: p.parent.name)
 def test_every_test_has_a_readme(folder: Path) -> None:
     assert (folder.parent / "README.md").read_text().startswith(f"# {folder.parent.name}\n")
+
+
+def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
+    """Its obstacles and instances are what report and services read."""
+    (text,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "maps.md").read_text(), re.DOTALL)
+    (tmp_path / "map.json").write_text(text)
+    ground = read_ground(tmp_path)
+    assert [name for name, _ in ground.lines] == ["left", "right", "finish"]
+    assert [len(points) for _, points in ground.models] == [2]

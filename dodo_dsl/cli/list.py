@@ -6,27 +6,33 @@ from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, load
-from dodo_dsl.diagnostics import format_text, shown_path
+from dodo_dsl.diagnostics import did_you_mean, format_text, shown_path
 
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
   dodo list --services      the services that a test may use
+  dodo list --services integrator    one of them: parameters, messages
   dodo list --json          for programs
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--services", action="store_true", help="services instead of tests")
+    parser.add_argument(
+        "--services", nargs="?", const="", metavar="NAME", help="services instead of tests, or one with its parameters"
+    )
     parser.add_argument("--json", action="store_true", help="as JSON")
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     checked = load([])
-    rows = _services(checked) if options.services else _tests(checked)
+    if options.services:
+        return _explain(checked, options.services, stdout, stderr)
+    of_services = options.services is not None
+    rows = _services(checked) if of_services else _tests(checked)
     if options.json:
         stdout.write(json.dumps(rows, indent=2) + "\n")
     else:
-        columns = ("name", "layers", "description") if options.services else ("name", "level", "kind", "description")
+        columns = ("name", "layers", "description") if of_services else ("name", "level", "kind", "description")
         _table(rows, columns, stdout)
     if checked.ok:
         return Exit.OK
@@ -52,6 +58,23 @@ def _services(checked: Checked) -> list[dict[str, str]]:
         {"name": m.name, "layers": ", ".join(m.layers), "description": m.description}
         for m in sorted(checked.manifests.values(), key=lambda m: m.name)
     ]
+
+
+def _explain(checked: Checked, name: str, stdout: TextIO, stderr: TextIO) -> int:
+    manifest = checked.manifests.get(name)
+    if manifest is None:
+        stderr.write(f"dodo list: there is no service '{name}'; {did_you_mean(name, checked.manifests)}\n")
+        return Exit.USAGE
+    stdout.write(f"{manifest.name} ({', '.join(manifest.layers)}): {manifest.description}\n\nparameters:\n")
+    for parameter in manifest.parameters.values():
+        default = "" if parameter.default is None else f", default {parameter.default}"
+        facts = "required" if parameter.required else f"{parameter.type}{default}"
+        stdout.write(f"  {parameter.name}: {facts} {parameter.unit}".rstrip() + f"\n      {parameter.help}\n")
+    for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):
+        for way, names in (("in", ports.inputs), ("out", ports.outputs)):
+            if names:
+                stdout.write(f"{title} {way}: {', '.join(names)}\n")
+    return Exit.OK
 
 
 def _table(rows: list[dict[str, str]], columns: tuple[str, ...], stdout: TextIO) -> None:
