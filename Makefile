@@ -25,6 +25,7 @@ lint:
 
 test: lint
 	@scripts/install-compose
+	@scripts/start-engine
 	.venv/bin/pytest
 
 bench:

@@ -1,14 +1,17 @@
+"""The images that compiled tests name by default, built from the base image that needs no registry."""
+
 import subprocess
+import sys
 
 import pytest
 
-from dodo_dsl import __version__
+from tests.images.conftest import base_image  # noqa: F401
+from tests.images.dockerfile import ROOT
 
 
 @pytest.fixture(scope="session")
-def images() -> None:
-    probe = subprocess.run(
-        ["docker", "image", "inspect", f"dodo/sandbox:{__version__}"], capture_output=True, check=False
-    )
-    if probe.returncode:
-        pytest.skip("no engine")
+def images(base_image: str) -> None:
+    """DoDo's images of this version under their default names."""
+    command = [sys.executable, "-m", "dodo_dsl", "images", "build", "--offline-wheels", "--base-image", base_image]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=600)
+    assert result.returncode == 0, result.stdout[-4000:] + result.stderr
