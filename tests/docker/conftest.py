@@ -10,7 +10,7 @@ from tests.images.dockerfile import ROOT
 
 
 @pytest.fixture(scope="session")
-def images(base_image: str) -> None:
+def images(base_image: str) -> None:  # noqa: F811
     """DoDo's images of this version under their default names."""
     command = [sys.executable, "-m", "dodo_dsl", "images", "build", "--offline-wheels", "--base-image", base_image]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=600)
