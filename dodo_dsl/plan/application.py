@@ -189,10 +189,11 @@ class _Rewriter:
     def _own_tmp(self, volume: Any) -> Any:
         if isinstance(volume, str) and (volume == "/tmp:/tmp" or volume.startswith("/tmp:/tmp:")):
             self._note("/tmp is the test's own")
-            return "tmp:/tmp" + volume.removeprefix("/tmp:/tmp")
+            options = [o for o in volume.removeprefix("/tmp:/tmp").strip(":").split(",") if o in ("ro", "rw")]
+            return "tmp:/tmp:" + ",".join([*options, "nocopy"])  # the image's own /tmp must not change the test's
         if isinstance(volume, dict) and (volume.get("source"), volume.get("target")) == ("/tmp", "/tmp"):
             self._note("/tmp is the test's own")
-            return {"type": "volume", "source": "tmp", "target": "/tmp"}
+            return {"type": "volume", "source": "tmp", "target": "/tmp", "volume": {"nocopy": True}}
         return volume
 
     def _depend(self, after: tuple[str, ...], isolation: str) -> None:

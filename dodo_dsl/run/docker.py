@@ -20,6 +20,7 @@ from dodo_dsl.run.projects import PROJECT_LABEL, SERVICE_LABEL, copy_out, remove
 from dodo_dsl.run.pulls import Pulls, Say
 
 _PORT = 12175
+_BUILD_PROJECT = "dodo-build"
 _REPORT = "/dodo/report"
 _OVERLAP = "overlaps"
 _TELL = 'printf "%b" "$1" > "/dev/udp/$2/$3"'
@@ -75,9 +76,11 @@ class DockerBackend:
     def _filters(self) -> dict[str, Any]:
         return {"label": f"{PROJECT_LABEL}={self.project}"}
 
-    async def _compose(self, *words: str, subnet: str = "", log: Path | None = None) -> tuple[int, str, str]:
+    async def _compose(
+        self, *words: str, subnet: str = "", log: Path | None = None, project: str = ""
+    ) -> tuple[int, str, str]:
         """Exit code, standard output and the last line of standard error of a compose command."""
-        environment = {**os.environ, "COMPOSE_PROJECT_NAME": self.project, "COMPOSE_PROGRESS": "plain"}
+        environment = {**os.environ, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
         if subnet:
             environment["DODO_SUBNET"] = subnet
         process = await asyncio.create_subprocess_exec(
@@ -104,12 +107,21 @@ class DockerBackend:
         foreign = {s["image"] for name, s in self._config.items() if name in application and name not in built}
         for note in await self._pulls.provide(own, foreign, self._say):
             self._say(note)
-        if built:
-            self._say(f"building {', '.join(built)}")
-            log = self.report / "logs" / "build.log"
-            code, _, problem = await self._compose("build", *built, log=log)
-            if code:
-                raise BackendError(f"the application's images cannot be built: {problem}; {log} has the whole output")
+        named = [name for name in built if "image" in self._config[name]]
+        if named:
+            key = json.dumps([self._config[name]["build"] for name in named])
+            await self._pulls.once(key, lambda: self._build(named, _BUILD_PROJECT))
+        if len(named) < len(built):
+            await self._build([name for name in built if name not in named], self.project)
+
+    async def _build(self, names: list[str], project: str) -> str:
+        """Builds images; compose writes the project into them, so images with names of their own get one for all."""
+        self._say(f"building {', '.join(names)}")
+        log = self.report / "logs" / "build.log"
+        code, _, problem = await self._compose("build", *names, log=log, project=project)
+        if code:
+            raise BackendError(f"the application's images cannot be built: {problem}; {log} has the whole output")
+        return ""
 
     async def _create(self) -> None:
         """Network, volumes and containers; a subnet that the engine has in use is left to others."""

@@ -1,7 +1,7 @@
 """Images before a test's clock starts: DoDo's own are pulled when missing, the application's are resolved anew."""
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
 from dodo_dsl.run.events import BackendError
@@ -18,14 +18,18 @@ class Pulls:
 
     async def provide(self, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
         """Makes the images local; returns notes on what was taken as it is. Raises BackendError."""
-        waits = [self._once(image, self._own, say) for image in sorted(set(own))]
-        waits += [self._once(image, self._application, say) for image in sorted(set(application))]
+        waits = [self._pull_once(image, self._own, say) for image in sorted(set(own))]
+        waits += [self._pull_once(image, self._application, say) for image in sorted(set(application))]
         return [note for note in await asyncio.gather(*waits) if note]
 
-    async def _once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str:
-        if image not in self._tasks:
-            self._tasks[image] = asyncio.ensure_future(asyncio.to_thread(work, image, say))
-        return await asyncio.shield(self._tasks[image])
+    async def _pull_once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str:
+        return await self.once(image, lambda: asyncio.to_thread(work, image, say))
+
+    async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str]]) -> str:
+        """Does a piece of work once for all tests of the run; those that come later wait for the first."""
+        if key not in self._tasks:
+            self._tasks[key] = asyncio.ensure_future(work())
+        return await asyncio.shield(self._tasks[key])
 
     def _own(self, image: str, say: Say) -> str:
         if not self._is_local(image):

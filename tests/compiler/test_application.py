@@ -53,7 +53,7 @@ def test_own_network(tmp_path: Path) -> None:
             "perception": {
                 "build": "../../team",
                 "ipc": "service:sandbox",
-                "volumes": ["tmp:/tmp", "../../team/weights:/weights:ro"],
+                "volumes": ["tmp:/tmp:nocopy", "../../team/weights:/weights:ro"],
                 "command": ["--cid=140", "--name=video0.argb", "--threshold=${THRESHOLD:-3}"],
                 "depends_on": waits,
             },
