@@ -1,6 +1,7 @@
 """Problems as values: where, which rule, what is wrong and the way out."""
 
 import difflib
+import functools
 import hashlib
 import json
 import os
@@ -12,6 +13,7 @@ from typing import Literal
 Severity = Literal["error", "warning"]
 
 _MAX_FRAME_LINE = 160
+_MAX_FILE = 1 << 20
 
 
 @dataclass(frozen=True, order=True)
@@ -64,16 +66,26 @@ def shown_path(file: str) -> str:
     return file if relative.startswith("..") else relative
 
 
+@functools.lru_cache(maxsize=4)
+def _lines(file: str) -> list[str]:
+    """The beginning of a file, as far as a spec may be long."""
+    path = Path(file)
+    if not path.is_file():
+        return []
+    with path.open("rb") as stream:
+        return stream.read(_MAX_FILE).decode("utf-8", "replace").splitlines()
+
+
 def _source_line(span: Span) -> str | None:
     try:
-        text = Path(span.file).read_bytes().decode("utf-8", "replace")
+        lines = _lines(span.file)
     except OSError:
         return None
-    lines = text.splitlines()
     return lines[span.line - 1] if 0 < span.line <= len(lines) else None
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
+    """The text without what could move a terminal's cursor or speak to a CI log."""
     return "".join(c if c.isprintable() else ("→" if c == "\t" else "�") for c in text)
 
 
@@ -82,7 +94,7 @@ def _code_frame(span: Span) -> list[str]:
     if line is None:
         return []
     start = max(0, span.column - 1 - _MAX_FRAME_LINE // 2) if len(line) > _MAX_FRAME_LINE else 0
-    part = _printable(line[start : start + _MAX_FRAME_LINE])
+    part = printable(line[start : start + _MAX_FRAME_LINE])
     offset = span.column - 1 - start
     marks = "^" * max(1, min(span.length, len(part) - offset))
     gutter = str(span.line)
@@ -92,9 +104,9 @@ def _code_frame(span: Span) -> list[str]:
 def _text(diagnostic: Diagnostic) -> str:
     span = diagnostic.span
     head = f"{shown_path(span.file)}:{span.line}:{span.column}: {diagnostic.severity}[{diagnostic.rule}]: "
-    lines = [head + _printable(diagnostic.message), *_code_frame(span)]
+    lines = [head + printable(diagnostic.message), *_code_frame(span)]
     if diagnostic.hint:
-        lines.append(f"  hint: {_printable(diagnostic.hint)}")
+        lines.append(f"  hint: {printable(diagnostic.hint)}")
     return "\n".join(lines)
 
 

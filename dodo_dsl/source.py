@@ -117,6 +117,7 @@ class _Open:
     anchor: str | None
     is_mapping: bool
     weight: int = 1
+    depth: int = 1
     items: list[Node] = field(default_factory=list)
     entries: dict[str, Entry] = field(default_factory=dict)
     merged: list[Node] = field(default_factory=list)
@@ -128,7 +129,7 @@ class _Builder:
         self.file = file
         self.stack: list[_Open] = []
         self.root: Node | None = None
-        self.anchors: dict[str, tuple[Node, int]] = {}
+        self.anchors: dict[str, tuple[Node, int, int]] = {}
         self.count = 0
         self.documents = 0
         self.diagnostics: list[Diagnostic] = []
@@ -174,13 +175,18 @@ class _Builder:
         span = self.span(event)
         if event.anchor not in self.anchors:
             raise _Stop(Diagnostic(span, "yaml-syntax", f"alias '*{event.anchor}' has no finished anchor before it"))
-        node, weight = self.anchors[event.anchor]
-        self._add(node, weight, None, span)
+        node, weight, depth = self.anchors[event.anchor]
+        self._check_depth(span, len(self.stack) + depth)
+        self._add(node, weight, None, span, depth)
+
+    @staticmethod
+    def _check_depth(span: Span, depth: int) -> None:
+        if depth > MAX_DEPTH:
+            raise _Stop(Diagnostic(span, "too-large", f"nested deeper than {MAX_DEPTH} levels, aliases counted"))
 
     def _open(self, event: Any) -> None:
         span = self.span(event)
-        if len(self.stack) >= MAX_DEPTH:
-            raise _Stop(Diagnostic(span, "too-large", f"nested deeper than {MAX_DEPTH} levels"))
+        self._check_depth(span, len(self.stack) + 1)
         is_mapping = isinstance(event, yaml.MappingStartEvent)
         span = Span(span.file, span.line, span.column)
         self.stack.append(_Open(span, self._tag(event), event.anchor, is_mapping))
@@ -193,7 +199,7 @@ class _Builder:
         else:
             node = Sequence(top.span, tuple(top.items), top.tag)
         self.count -= top.weight - 1
-        self._add(node, top.weight, top.anchor)
+        self._add(node, top.weight, top.anchor, None, top.depth)
 
     def _with_merged(self, top: _Open) -> dict[str, Entry]:
         entries = dict(top.entries)
@@ -205,16 +211,17 @@ class _Builder:
                     self.report(source.span, "yaml-syntax", "'<<' merges mappings, and this is none")
         return entries
 
-    def _add(self, node: Node, weight: int, anchor: str | None, at: Span | None = None) -> None:
+    def _add(self, node: Node, weight: int, anchor: str | None, at: Span | None = None, depth: int = 0) -> None:
         span = at or node.span
         self._grow(span, weight)
         if anchor:
-            self.anchors[anchor] = (node, weight)
+            self.anchors[anchor] = (node, weight, depth)
         if not self.stack:
             self.root = node
             return
         top = self.stack[-1]
         top.weight += weight
+        top.depth = max(top.depth, depth + 1)
         if not top.is_mapping:
             top.items.append(node)
         elif top.key is None:
@@ -284,6 +291,8 @@ def read(path: Path) -> tuple[Node | None, list[Diagnostic]]:
     """As ``parse``, from a file; unreadable, oversized and non-UTF-8 files are diagnostics too."""
     file = str(path)
     try:
+        if path.exists() and not path.is_file():
+            return None, [Diagnostic(Span(file), "unreadable-file", "this is no plain file")]
         with path.open("rb") as stream:
             raw = stream.read(MAX_BYTES + 1)
     except OSError as error:

@@ -6,7 +6,7 @@ from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, load
-from dodo_dsl.diagnostics import did_you_mean, format_text, shown_path
+from dodo_dsl.diagnostics import did_you_mean, format_text, printable, shown_path
 
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
@@ -82,4 +82,4 @@ def _table(rows: list[dict[str, str]], columns: tuple[str, ...], stdout: TextIO)
     widths = [max((len(row[c]) for row in rows), default=0) for c in columns[:-1]]
     for row in rows:
         cells = [row[c].ljust(w) for c, w in zip(columns, widths, strict=False)]
-        stdout.write("  ".join([*cells, row[columns[-1]]]) + "\n")
+        stdout.write(printable("  ".join([*cells, row[columns[-1]]])) + "\n")

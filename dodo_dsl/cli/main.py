@@ -25,6 +25,8 @@ COMMANDS: dict[str, ModuleType] = {
     "doctor": doctor_command,
 }
 
+DEBUG = "DODO_DEBUG"
+
 _EXAMPLES = """examples:
   dodo list                          what tests there are
   dodo compile --check               every problem of every test, nothing written
@@ -74,4 +76,9 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         stderr.write(f"dodo: {place}{error.strerror or error}\n")
+        return Exit.ERROR
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        stderr.write(f"dodo: a fault of DoDo itself: {type(error).__name__}: {error}\n{DEBUG}=1 shows where\n")
         return Exit.ERROR

@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from typing import Any, Self, TextIO
 
+from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
 
 _STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
@@ -14,7 +15,7 @@ def summary_line(outcome: Outcome, width: int) -> str:
     times = ""
     if outcome.setup_s is not None and outcome.execution_s is not None:
         times = f" (set-up {outcome.setup_s:.1f} s, ran {outcome.execution_s:.1f} s)"
-    return f"{outcome.outcome.upper():<6}  {outcome.name:<{width}}  {outcome.reason}{times}"
+    return f"{outcome.outcome.upper():<6}  {outcome.name:<{width}}  {printable(outcome.reason)}{times}"
 
 
 class PlainProgress:

@@ -2,20 +2,24 @@
 
 import argparse
 import asyncio
-from collections.abc import Sequence
+import contextlib
+import os
+import resource
+import signal
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO, cast
 
 from dodo_dsl.cli import progress, selection
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import NoApplication, plan
-from dodo_dsl.diagnostics import format_text, has_errors, ordered
+from dodo_dsl.diagnostics import format_text, has_errors, ordered, printable
 from dodo_dsl.emit.write import PLAN_FILE, write
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan, PlanError, from_json
-from dodo_dsl.report.write import Tested, forget, write_report
+from dodo_dsl.report.write import Drawable, forget, write_report
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
 from dodo_dsl.run.runner import Runner, default_backend, default_parallel, reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
@@ -43,11 +47,18 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--clock", choices=("realtime", "lockstep"), help="instead of the specs'")
     parser.add_argument("--isolation", choices=("network", "host"), help="instead of the specs'")
     parser.add_argument("--report", type=Path, default=Path("dodo-report"), metavar="DIR", help="default: dodo-report")
-    parser.add_argument("--seed", type=int, metavar="N", help="instead of the specs'")
+    parser.add_argument("--seed", type=_seed, metavar="N", help="instead of the specs'")
     parser.add_argument("--repeat", type=_positive, default=1, metavar="N", help="run every test N times")
     parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="a test that dodo compile wrote")
     parser.add_argument("--keep", action="store_true", help="leave everything up and say how to look inside")
     selection.add_application(parser)
+
+
+def _seed(text: str) -> int:
+    number = int(text) if text.isdecimal() and len(text) < 12 else -1
+    if not 0 <= number < 1 << 32:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 to 4294967295")
+    return number
 
 
 def _positive(text: str) -> int:
@@ -58,6 +69,10 @@ def _positive(text: str) -> int:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _stop_like_interrupt)
+    _more_descriptors()
+    stdout = cast(TextIO, _Robust(stdout))
     reap_folders()
     with work_folder() as folder:
         try:
@@ -71,6 +86,13 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
     return _exit_code(outcomes, runner.interrupted)
+
+
+def _more_descriptors() -> None:
+    """Every service has a pipe and a log: as many descriptors as this process may have."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
@@ -88,10 +110,24 @@ def _prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
         folders = [folder / p.slug for p in plans]
     if options.seed is not None:
         plans = [replace(p, seed=options.seed) for p in plans]
-    report = options.report.resolve()
+    report = _usable(options.report, [p.slug for p in plans])
     return [
         Job(p, f, report / p.slug) for n in range(options.repeat) for p, f in _repetition(plans, folders, n)
     ], deployment
+
+
+def _usable(report: Path, slugs: Sequence[str]) -> Path:
+    """The report's folder, made; a folder of specs or of compiled tests is refused."""
+    try:
+        report.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _Usage(f"'{report}' cannot take the report: {error.strerror}") from error
+    for slug in slugs:
+        if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
+            raise _Usage(f"'{report}' holds tests; name another folder with --report")
+    if not os.access(report, os.W_OK):
+        raise _Usage(f"'{report}' cannot take the report: it may not be written")
+    return report.resolve()
 
 
 def _repetition(plans: Sequence[Plan], folders: Sequence[Path], number: int) -> list[tuple[Plan, Path]]:
@@ -161,17 +197,68 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> l
     forget(report.resolve(), [job.plan.slug for job in jobs])
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
-    write_report(report, outcomes, {job.plan.slug: Tested(job.plan, job.folder) for job in jobs})
+    with _undisturbed():
+        problems = write_report(report, outcomes, {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs})
+    stdout.writelines(f"{problem}\n" for problem in problems)
     stdout.write("\n")
     width = max(len(o.name) for o in outcomes)
     for outcome in outcomes:
         stdout.write(progress.summary_line(outcome, width) + "\n")
         if outcome.outcome != "passed":
-            stdout.writelines(f"        | {line}\n" for line in outcome.last_lines)
+            stdout.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
     stdout.write(f"\n{counts['passed']} passed, {counts['failed']} failed, {counts['error']} in error\n")
     stdout.write(f"report: {report / 'index.html'}\n")
     return outcomes
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Results that exist are written, whoever presses Ctrl-C now."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+class _Robust:
+    """A stream whose reader may leave (``dodo run | head``): the run goes on to its end and report."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._broken = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        try:
+            return 0 if self._broken else self._stream.write(text)
+        except OSError:
+            return self._give_up()
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        self.write("".join(lines))
+
+    def flush(self) -> None:
+        try:
+            if not self._broken:
+                self._stream.flush()
+        except OSError:
+            self._give_up()
+
+    def _give_up(self) -> int:
+        self._broken = True
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+        return 0
+
+
+def _stop_like_interrupt(_number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
 
 
 def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:

@@ -43,10 +43,12 @@ def select(words: Sequence[str], levels: Sequence[str], application: Path | None
     if checked.empty:
         raise NoSuchTest(f"there is no test at '{checked.empty[0]}'; specs end in .dodo.yml")
     if names:
-        registry = checked if not paths else load([], application)
-        chosen = [spec for word in names for spec in _named(word, registry.specs)]
-        own = checked.specs if paths else ()
-        checked = _narrowed(registry, (*own, *chosen))
+        given = {spec.path for spec in checked.specs} if paths else set()
+        if paths:
+            checked = load([*paths, *checked.deployment.registry], application)
+        others = [spec for spec in checked.specs if spec.path not in given]
+        chosen = {spec.path for word in names for spec in _named(word, others)}
+        checked = _narrowed(checked, [spec for spec in checked.specs if spec.path in given | chosen])
     if levels:
         kept = tuple(s for s in checked.specs if s.level in levels)
         if not kept:

@@ -2,10 +2,13 @@
 
 import dataclasses
 import json
+import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 FORMAT = 1
+_SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 LAYERS = ("environment", "action", "evaluation", "application")
 
 FlagKind = Literal["text", "path", "memory", "report"]
@@ -119,9 +122,43 @@ def from_json(text: str) -> Plan:
         application["changes"] = tuple(application["changes"])
         raw["application"] = Application(**application)
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
-        return Plan(**raw)
-    except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
+        plan = Plan(**raw)
+        problem = _problem(plan)
+    except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
         raise PlanError(f"not a compiled test ({error}); compile it again") from error
+    if problem:
+        raise PlanError(f"not a compiled test ({problem}); compile it again")
+    return plan
+
+
+def _problem(plan: Plan) -> str:
+    """What no compiled test holds; the types of JSON say nothing about themselves."""
+    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.application.folder)
+    services: list[Service | ApplicationService] = [*plan.services, *plan.application.services]
+    rules = {
+        "slug": isinstance(plan.slug, str) and bool(_SLUG.fullmatch(plan.slug)),
+        "a text": all(isinstance(text, str) and "\0" not in text for text in texts),
+        "level": plan.level in ("sil", "dil", "hil"),
+        "isolation": plan.isolation in ("network", "host"),
+        "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
+        "cid": isinstance(plan.cid, int) and 1 <= plan.cid <= 254,
+        "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
+        "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
+        "a service's layer": all(s.layer in LAYERS for s in plan.services),
+        "a flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
+        "a word": all(isinstance(w, str) for s in services for w in s.process or ())
+        and all(isinstance(w, str) for s in plan.application.services for w in s.command),
+        "an environment": all(isinstance(s.environment, dict) for s in plan.application.services),
+    }
+    return next((name for name, holds in rules.items() if not holds), "")
+
+
+def _is_flag(flag: Flag) -> bool:
+    kinds = ("text", "path", "memory", "report")
+    plain = isinstance(flag.name, str) and isinstance(flag.value, str) and isinstance(flag.kind, str)
+    relative = ".." not in str(flag.value).split("/") and not str(flag.value).startswith("/")
+    inside = flag.kind not in ("path", "report") or relative
+    return plain and flag.kind in kinds and inside
 
 
 def _service(raw: dict[str, Any]) -> Service:

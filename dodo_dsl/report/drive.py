@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.codec import MessageError
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.plan.model import Plan
@@ -55,7 +56,10 @@ def _path(recording: Path) -> Iterator[tuple[float, float, float, float]]:
             start = envelope.sample_time
         if envelope.data_type != wanted:
             continue
-        frame: Any = messages.decode(envelope.data_type, envelope.payload)
+        try:
+            frame: Any = messages.decode(envelope.data_type, envelope.payload)
+        except MessageError:
+            continue
         if not all(map(math.isfinite, (frame.x, frame.y, frame.qx, frame.qy, frame.qz, frame.qw))):
             continue
         heading = math.atan2(2 * (frame.qw * frame.qz + frame.qx * frame.qy), 1 - 2 * (frame.qy**2 + frame.qz**2))

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.drive import Drive
 
@@ -25,7 +26,8 @@ def draw(drive: Drive, outcome: Outcome, target: Path) -> None:
     axes.plot([p[0] for p in drive.path], [p[1] for p in drive.path], color=colour, linewidth=1.6, label="path")
     _vehicles(axes, drive, colour)
     _frame(axes, drive)
-    axes.set_title(f"{outcome.name}: {outcome.outcome}\n{outcome.reason}", fontsize=10, wrap=True)
+    reason = printable(outcome.reason).replace("$", r"\$")  # no mathematics is meant
+    axes.set_title(f"{outcome.name}: {outcome.outcome}\n{reason}", fontsize=10, wrap=True)
     figure.savefig(target, dpi=_PIXELS_PER_INCH, format="png")
 
 

@@ -35,7 +35,7 @@ def load(path: Path) -> list[Outcome]:
         return [_outcome(t) for t in document["tests"]]
     except FileNotFoundError as error:
         raise ResultsError(f"there is no {path}") from error
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ResultsError(f"{path}: no results of DoDo ({error})") from error
 
 

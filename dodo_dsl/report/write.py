@@ -1,5 +1,7 @@
 """A run's report folder."""
 
+import contextlib
+import re
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,10 +16,12 @@ from dodo_dsl.report.drive import read_drive
 RECORDING = "test.rec"
 TRAJECTORY = "trajectory.png"
 LOGS = "logs"
+SANDBOX_LOG = "sandbox.log"
+SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 
 
 @dataclass(frozen=True)
-class Tested:
+class Drawable:
     """A test's Plan and the folder that it was compiled into, for the map under its path."""
 
     plan: Plan
@@ -25,24 +29,37 @@ class Tested:
 
 
 def forget(folder: Path, slugs: Sequence[str]) -> None:
-    """Removes what earlier runs left in a report folder for the tests that they name, and for ``slugs``."""
+    """Removes what earlier runs wrote for the tests that they name, and for ``slugs``; other files stay."""
     try:
         earlier = [outcome.slug for outcome in results.load(folder / results.FILE_NAME)]
     except results.ResultsError:
         earlier = []
     for slug in {*slugs, *earlier}:
-        place = folder / slug
-        if place.parent == folder and (place / LOGS).is_dir():
-            shutil.rmtree(place)
+        if SLUG.fullmatch(slug):
+            _forget_test(folder / slug)
 
 
-def write_report(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Tested]) -> None:
-    """Draws each drive and writes results.json, junit.xml, metrics.txt and index.html into ``folder``."""
+def _forget_test(place: Path) -> None:
+    shutil.rmtree(place / LOGS, ignore_errors=True)
+    for name in (RECORDING, TRAJECTORY, SANDBOX_LOG):
+        (place / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):  # there is none, or it holds what others put there
+        place.rmdir()
+
+
+def write_report(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Drawable]) -> list[str]:
+    """Writes the results first, draws each drive, and returns sentences on what could not be drawn."""
     folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    problems = []
     for outcome in outcomes:
         if outcome.slug in tests:
-            _draw(folder / outcome.slug, outcome, tests[outcome.slug])
+            try:
+                _draw(folder / outcome.slug, outcome, tests[outcome.slug])
+            except Exception as error:  # noqa: BLE001  (what is drawn comes from services; no picture costs a verdict)
+                problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
     write_summaries(folder, outcomes)
+    return problems
 
 
 def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
@@ -68,7 +85,7 @@ def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
     }
 
 
-def _draw(folder: Path, outcome: Outcome, test: Tested) -> None:
+def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
     drive = read_drive(test.plan, test.folder, folder / RECORDING)
     if drive is None:
         return

@@ -50,6 +50,11 @@ class Processes:
         self._cids = cids
         self._isolation = isolation
         self._descriptors = descriptors
+        self._alone = asyncio.Lock()
+
+    def _turn(self, plan: Plan) -> AbstractAsyncContextManager[None]:
+        """Tests of this run that need the machine for themselves queue here, where waiting has no limit."""
+        return self._alone if lanes.runs_alone(plan) else contextlib.nullcontext()
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
         for left in lanes.reap():
@@ -68,7 +73,7 @@ class Processes:
             lane = Lane(plan.cid, descriptors=self._descriptors)
             yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
             return
-        async with lanes.host_lane(plan, self._cids, say, keep) as leased:
+        async with self._turn(plan), lanes.host_lane(plan, self._cids, say, keep) as leased:
             lane = replace(leased, descriptors=(*leased.descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
 

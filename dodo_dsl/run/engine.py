@@ -64,8 +64,20 @@ class Engine:
         finally:
             self.finished = time.monotonic()
             self.say("taking down")
-            kept = await self.backend.close(keep)
+            kept = await self._closed(keep)
         return self._outcome(), kept
+
+    async def _closed(self, keep: bool) -> list[str]:
+        """Teardown to its end, however often the run is interrupted meanwhile."""
+        closing = asyncio.ensure_future(self.backend.close(keep))
+        while not closing.done():
+            try:
+                await asyncio.shield(closing)
+            except asyncio.CancelledError:
+                if closing.cancelled():
+                    raise
+                asyncio.current_task().uncancel()  # type: ignore[union-attr]
+        return closing.result()
 
     async def _set_up(self, start: float) -> None:
         self.say("setting up")
@@ -90,7 +102,8 @@ class Engine:
 
     async def _next(self, deadline: float) -> Event | None:
         try:
-            return await asyncio.wait_for(self.backend.next_event(), max(0.0, deadline - time.monotonic()))
+            async with asyncio.timeout(max(0.0, deadline - time.monotonic())):
+                return await self.backend.next_event()
         except TimeoutError:
             return None
 
@@ -121,6 +134,8 @@ class Engine:
         match event:
             case Ready(service):
                 self.ready.add(service)
+            case Verdict(service) if self.began is None:
+                self._end("error", f"evaluator '{service}' gave a verdict before the test began", service)
             case Verdict(service):
                 self.facts.verdicts.setdefault(service, []).append(event)
             case Malformed(service, problem):

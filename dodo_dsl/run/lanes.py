@@ -29,7 +29,7 @@ def namespaces_refusal() -> str:
     """Why tests cannot have namespaces of their own here; empty when they can."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
-        argv = [sys.executable, "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), "network"]
+        argv = [sys.executable, "-P", "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), "network"]
         environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
         process = subprocess.Popen(argv, pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL, env=environment)
         theirs.close()
@@ -39,6 +39,12 @@ def namespaces_refusal() -> str:
     if b'"up"' in answer:
         return ""
     return answer.decode().partition('"down": "')[2].rstrip('"}') or "the kernel refused"
+
+
+def runs_alone(plan: Plan) -> bool:
+    """Whether the application cannot be told another CID or memory than those built in."""
+    services = plan.application.services
+    return not any(s.takes_cid for s in services) or not any(s.takes_memory for s in services)
 
 
 @contextlib.asynccontextmanager
@@ -51,8 +57,7 @@ async def host_lane(
     the sandbox, which holds them until it is taken down. Raises BackendError when no lane
     comes free, or when its only CID carries foreign traffic.
     """
-    services = plan.application.services
-    alone = not any(s.takes_cid for s in services) or not any(s.takes_memory for s in services)
+    alone = runs_alone(plan)
     name = f"dodo-{secrets.token_hex(4)}-"
     about = {"test": plan.slug, "lane": name}
     held: list[leases.Lease] = []
@@ -120,17 +125,29 @@ def _kill_lane(lane: str) -> int:
                     os.kill(int(entry.name), signal.SIGKILL)
                     killed.append(entry)
     deadline = time.monotonic() + _KILL_S
-    while any((entry / "exe").exists() for entry in killed) and time.monotonic() < deadline:
+    while any(_lives(entry) for entry in killed) and time.monotonic() < deadline:
         time.sleep(0.01)
     return len(killed)
+
+
+def _lives(process: Path) -> bool:
+    """Whether a process still holds anything: a zombie does not."""
+    try:
+        return (process / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def remove_memories(prefix: str) -> int:
     """Removes shared memories by the prefix of their names, with their semaphores; says how many there were."""
     from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
 
-    tokens = [p for p in Path("/tmp").glob(f"{prefix}*") if p.is_file() and not p.is_symlink()]
-    for token in tokens:
+    removed = 0
+    for token in [p for p in Path("/tmp").glob(f"{prefix}*") if p.is_file() and not p.is_symlink()]:
+        if token.name.startswith(f"{prefix}ready-"):
+            token.unlink(missing_ok=True)
+            continue
         with contextlib.suppress(SharedMemoryError):
             SharedMemory.create(token.name, 1).close()  # a creator removes what a dead one left
-    return len(tokens)
+            removed += 1
+    return removed

@@ -32,7 +32,7 @@ def folder() -> Path:
     """The machine's lease folder, open to all users as ``/run/lock`` is."""
     wanted = os.environ.get(FOLDER_VARIABLE)
     path = Path(wanted) if wanted else Path("/run/lock/dodo")
-    if not wanted and not path.parent.is_dir():
+    if not wanted and not path.is_dir() and not os.access(path.parent, os.W_OK):
         path = Path("/tmp/dodo-leases")
     if not path.is_dir():
         path.mkdir(parents=True, exist_ok=True)
@@ -66,10 +66,16 @@ def _lock_file(name: str) -> Path:
 
 
 def _open(name: str) -> int:
-    descriptor = os.open(_lock_file(name), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
-    with contextlib.suppress(PermissionError):
-        os.fchmod(descriptor, 0o666)
-    return descriptor
+    """The lock file, made where there is none: kernels refuse O_CREAT on another user's file in a sticky folder."""
+    flags = os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW
+    while True:
+        try:
+            return os.open(_lock_file(name), flags)
+        except FileNotFoundError:
+            with contextlib.suppress(FileExistsError):
+                descriptor = os.open(_lock_file(name), flags | os.O_CREAT | os.O_EXCL, 0o666)
+                os.fchmod(descriptor, 0o666)
+                return descriptor
 
 
 def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease | None:
@@ -82,14 +88,14 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
             return None
         raise
-    record = folder() / (f"{name}.{os.getpid()}.json" if shared else f"{name}.json")
+    record = folder() / f"{name}.{os.getpid()}.json"
     record.write_text(json.dumps({"pid": os.getpid(), **about}))
     return Lease(name, descriptor, record)
 
 
 def holder(name: str) -> str:
     """Who holds a lease, for a sentence."""
-    for record in sorted(folder().glob(f"{name}*.json")):
+    for record in sorted(folder().glob(f"{name}.*.json")):
         with contextlib.suppress(ProcessLookupError, FileNotFoundError, ValueError, KeyError):
             about = json.loads(record.read_text())
             os.kill(int(about["pid"]), 0)
@@ -124,10 +130,12 @@ def _kind(names: Sequence[str]) -> str:
 
 
 def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
-    """Leases that nobody holds any more but whose record is still there; each is yielded held."""
+    """This user's leases that nobody holds any more but whose record is still there; each is yielded held."""
     for record in sorted(folder().glob(f"{prefix}*.json")):
-        name = record.name.removesuffix(".json")
+        name = record.name.split(".")[0]
         with contextlib.suppress(OSError, ValueError):
+            if record.stat().st_uid != os.getuid():
+                continue
             about = json.loads(record.read_text())
             descriptor = _open(name)
             try:
@@ -139,8 +147,8 @@ def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
 
 
 def forget_dead() -> None:
-    """Removes the records of shared leases whose process has gone; their locks went with it."""
+    """Removes the records of machine leases whose process has gone; their locks went with it."""
     for record in folder().glob("machine.*.json"):
-        pid = record.name.split(".")[1]
-        if pid.isdecimal() and not Path("/proc", pid).exists():
-            record.unlink(missing_ok=True)
+        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+            if not Path("/proc", str(int(json.loads(record.read_text())["pid"]))).exists():
+                record.unlink(missing_ok=True)

@@ -7,6 +7,7 @@ from typing import Any
 from dodo_dsl.run.events import Event, Malformed, Ready, Verdict
 
 _OUTCOMES = ("passed", "failed")
+_MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
 
 
@@ -17,8 +18,10 @@ def read_line(service: str, judge: bool, line: bytes) -> Event | None:
         return None
     try:
         message = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return Malformed(service, "its JSON cannot be read") if judge and b'"verdict"' in text else None
+    if not isinstance(message, dict):
+        return None
     kind = message.get("dodo")
     if kind == "ready":
         return Ready(service)
@@ -33,8 +36,8 @@ def read_line(service: str, judge: bool, line: bytes) -> Event | None:
 def _problem(message: dict[str, Any]) -> str:
     if message.get("outcome") not in _OUTCOMES:
         return f"its outcome is {json.dumps(message.get('outcome'))[:40]}, expected passed or failed"
-    if not isinstance(message.get("reason"), str):
-        return "it has no reason"
+    if not _is_text(message.get("reason")):
+        return "it has no reason, or none that can be written"
     checks = message.get("checks")
     if not isinstance(checks, list):
         return "its checks are no list"
@@ -42,15 +45,20 @@ def _problem(message: dict[str, Any]) -> str:
 
 
 def _check_problem(check: object) -> str:
-    if not isinstance(check, dict) or not isinstance(check.get("name"), str):
+    if not isinstance(check, dict) or not _is_text(check.get("name")):
         return "a check has no name"
     name = check["name"]
     surplus = set(check) - _CHECK_KEYS
+    missing = _CHECK_KEYS - set(check)
+    if missing:
+        return f"check '{name}' has no key '{min(missing)}'"
     if surplus:
         return f"check '{name}' has an unknown key '{min(surplus)}'"
     if not _is_number(check.get("value"), none=True):
         return f"check '{name}' has a value that is no finite number"
-    limit = check.get("limit", {})
+    if not isinstance(check["unit"], str) or not _is_text(check["unit"] or "1"):
+        return f"check '{name}' has a unit that is no text"
+    limit = check["limit"]
     if not isinstance(limit, dict) or not all(k in ("min", "max") and _is_number(v) for k, v in limit.items()):
         return f"check '{name}' has a limit that is not of min and max"
     if not isinstance(check.get("ok"), bool):
@@ -61,4 +69,14 @@ def _check_problem(check: object) -> str:
 def _is_number(value: object, none: bool = False) -> bool:
     if value is None:
         return none
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _is_text(value: object) -> bool:
+    """A text that UTF-8 can write, of a length that a report can show."""
+    if not isinstance(value, str) or not 0 < len(value) <= _MAX_TEXT:
+        return False
+    return not any("\ud800" <= character <= "\udfff" for character in value)

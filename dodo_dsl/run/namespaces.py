@@ -67,17 +67,15 @@ def furnish() -> None:
 
 def _private_tmp() -> None:
     """An empty ``/tmp`` with the old one's folders, but not its files: those may be another test's tokens."""
-    folders = {}
-    for entry in os.scandir(_TMP):
-        if entry.is_dir(follow_symlinks=False):
-            with contextlib.suppress(OSError):
-                folders[entry.name] = os.open(entry.path, os.O_PATH | os.O_DIRECTORY | os.O_NOFOLLOW)
+    old = os.open(_TMP, os.O_PATH | os.O_DIRECTORY)
+    folders = [entry.name for entry in os.scandir(_TMP) if entry.is_dir(follow_symlinks=False)]
     _call("mount", b"tmpfs", bytes(_TMP), b"tmpfs", _MS_NOSUID | _MS_NODEV, _TMP_SIZE.encode())
-    for name, descriptor in folders.items():
+    for name in folders:
         target = _TMP / name
         target.mkdir()
-        _call("mount", f"/proc/self/fd/{descriptor}".encode(), bytes(target), None, _MS_BIND | _MS_REC, None)
-        os.close(descriptor)
+        with contextlib.suppress(FileNotFoundError):  # it was removed meanwhile
+            _call("mount", f"/proc/self/fd/{old}/{name}".encode(), bytes(target), None, _MS_BIND | _MS_REC, None)
+    os.close(old)
 
 
 def _loopback_up() -> None:

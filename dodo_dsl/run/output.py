@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 _MAX_LINE = 1 << 16
+_MAX_LOG = 64 << 20
 _TAIL_LINES = 8
 _TAIL_WIDTH = 300
 
@@ -21,6 +22,7 @@ class Output:
         log.parent.mkdir(parents=True, exist_ok=True)
         self._log = log.open("ab", buffering=0)
         self._on_line = on_line
+        self._written = 0
         self._rest = b""
         self._skipping = False
         self._tail: deque[bytes] = deque(maxlen=_TAIL_LINES)
@@ -53,7 +55,6 @@ class Output:
         if not data:
             self._finish()
             return
-        self._log.write(data)
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
             self._take(line)
@@ -61,6 +62,21 @@ class Output:
             if not self._skipping:
                 self._tail.append(self._rest[:_TAIL_WIDTH])
             self._skipping, self._rest = True, b""
+        self._write(data)
+
+    def _write(self, data: bytes) -> None:
+        """Into the log, while that has room; what a service says to the runner counts either way."""
+        if self._written > _MAX_LOG:
+            return
+        if self._written + len(data) > _MAX_LOG:
+            data = f"\n... dodo: the log ends here, at {_MAX_LOG >> 20} MiB\n".encode()
+            self._written = _MAX_LOG
+        self._written += len(data)
+        try:
+            self._log.write(data)
+        except OSError as error:
+            self._written = _MAX_LOG + 1
+            self._tail.append(f"... dodo: the log cannot be written: {error.strerror}".encode())
 
     def _take(self, line: bytes) -> None:
         if self._skipping:

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import select
 import socket
 import subprocess
 import sys
@@ -22,6 +23,8 @@ from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Unstartable
 from dodo_dsl.run.output import Output
 
 _CLOSE_S = 10.0
+OWN_VARIABLES = ("PYTHONPATH", "DODO_LANE")
+"""What the sandbox has otherwise than the runner, so it is always said."""
 
 
 @dataclass(frozen=True)
@@ -73,18 +76,17 @@ class ProcessBackend:
         self.report.mkdir(parents=True, exist_ok=True)
         with theirs, (self.report / "sandbox.log").open("wb") as stderr:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), self.isolation],
+                [sys.executable, "-P", "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), self.isolation],
                 pass_fds=(theirs.fileno(), *self.lane.descriptors),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=stderr,
                 start_new_session=True,
-                env={**os.environ, "PYTHONPATH": _package_path(), "DODO_LANE": self.lane.name},
+                env={**os.environ, "PYTHONPATH": package_path(), "DODO_LANE": self.lane.name},
             )
         loop.add_reader(ours, self._hear)
         answer = await self._up
         if "down" in answer:
-            await self.close(keep=False)
             raise BackendError(f"no sandbox of isolation {self.isolation}: {answer['down']}")
 
     def _hear(self) -> None:
@@ -127,9 +129,20 @@ class ProcessBackend:
     def _send(self, message: dict[str, Any], descriptors: tuple[int, ...] = ()) -> None:
         assert self._channel is not None
         try:
-            socket.send_fds(self._channel, [json.dumps(message).encode()], list(descriptors))
+            self._send_patiently(self._channel, json.dumps(message).encode(), descriptors)
         except OSError as error:
             self._events.put_nowait(Lost(f"the test's sandbox cannot be reached: {error.strerror}"))
+
+    @staticmethod
+    def _send_patiently(channel: socket.socket, data: bytes, descriptors: tuple[int, ...]) -> None:
+        """Sends one message; a sandbox that is busy starting processes is waited for."""
+        while True:
+            try:
+                socket.send_fds(channel, [data], list(descriptors))
+            except BlockingIOError:
+                select.select([], [channel], [], _CLOSE_S)
+            else:
+                return
 
     async def start(self, layer: str) -> dict[str, bool]:
         commands = []
@@ -157,7 +170,7 @@ class ProcessBackend:
         output = Output(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
         order = {"do": "start", "id": command.name, "argv": command.argv, "cwd": str(command.folder)}
-        self._send({**order, "env": dict(command.environment)}, (output.writer,))
+        self._send({**order, "env": changes(os.environ, command.environment)}, (output.writer,))
         output.release_writer()
 
     def _command(self, service: Service | ApplicationService) -> Command:
@@ -168,9 +181,9 @@ class ProcessBackend:
     def _own_command(self, service: Service) -> Command:
         environment = {
             **base_environment(),
-            "PYTHONPATH": _package_path(),
+            "PYTHONPATH": package_path(),
             "DODO_SERVICE": service.name,
-            "DODO_READY_FILE": f"/tmp/dodo-ready-{self.lane.name}{service.name}",
+            "DODO_READY_FILE": ready_file(self.lane.name, service.name),
             "DODO_LANE": self.lane.name,
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
@@ -218,8 +231,8 @@ class ProcessBackend:
         for output in self._outputs.values():
             output.close()
         log = self.report / "sandbox.log"
-        if log.stat().st_size == 0:
-            log.unlink()
+        if log.is_file() and log.stat().st_size == 0:
+            log.unlink(missing_ok=True)
         return []
 
     @staticmethod
@@ -251,7 +264,18 @@ class ProcessBackend:
         return output.tail() if output else []
 
 
-def _package_path() -> str:
+def ready_file(lane: str, service: str) -> str:
+    """Where a service leaves its ready file; in a lane of the host, what begins with the lane's name is removed."""
+    return f"/tmp/{lane}ready-{service}" if lane else f"/tmp/dodo-ready-{service}"
+
+
+def changes(base: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str | None]:
+    """What to set, and with None to remove, to make ``wanted`` of ``base``: the sandbox has the base already."""
+    different: dict[str, str | None] = {name: value for name, value in wanted.items() if base.get(name) != value}
+    return {**different, **{name: wanted.get(name) for name in OWN_VARIABLES}}
+
+
+def package_path() -> str:
     """``PYTHONPATH`` for services and sandbox: where ``services`` lies, and where ``dodo_dsl`` does."""
     places = [str(data.root()), str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
     return os.pathsep.join(dict.fromkeys(p for p in places if p))

@@ -124,6 +124,8 @@ class Runner:
                 self.kept.extend(kept)
         except BackendError as error:
             outcome = self._without_answer(job.plan, str(error))
+        except OSError as error:
+            outcome = self._without_answer(job.plan, f"this machine cannot run the test: {error}")
         except asyncio.CancelledError:
             outcome = self._without_answer(job.plan, "the run was interrupted before this test began")
         self.progress.done(outcome)

@@ -3,7 +3,8 @@
 It is process 1 of namespaces of its own (``network``), or their parent on the host (``host``). The runner talks to it
 over a socket; when that closes, whatever closed it, the sandbox ends everything that it started, and itself.
 
-    runner to sandbox   {"do": "start", "id", "argv", "env", "cwd"} with the output's descriptor; {"do": "close"};
+    runner to sandbox   {"do": "start", "id", "argv", "env", "cwd"} with the output's descriptor,
+                        "env" being what differs from the sandbox's own (null removes); {"do": "close"};
                         {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why}; {"unstartable": id, "why"}; {"exited": id, "code"}
 """
@@ -96,7 +97,7 @@ class Sandbox:
         try:
             self.children[name] = subprocess.Popen(
                 order["argv"],
-                env=order["env"],
+                env={k: v for k, v in {**os.environ, **order["env"]}.items() if v is not None},
                 cwd=order["cwd"],
                 stdin=subprocess.DEVNULL,
                 stdout=output,

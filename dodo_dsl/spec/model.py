@@ -90,7 +90,7 @@ def _spec(location: Location, node: Mapping, timeout: float | None) -> Spec:
         timeout_s=timeout,
         clock=text("clock", "realtime"),
         isolation=text("isolation", "network"),
-        seed=seed.value if isinstance(seed, Scalar) and isinstance(seed.value, int) else 0,
+        seed=int(seed.value) if isinstance(seed, Scalar) and isinstance(seed.value, int | float) else 0,
         uses=tuple(_uses(node)),
         spans={key: entry.value.span for key, entry in node.entries.items()},
     )

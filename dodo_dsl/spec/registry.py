@@ -21,7 +21,7 @@ class Location:
 
 def _specs_below(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob(f"*{SUFFIX}")):
-        if not any(part.startswith(".") for part in path.relative_to(folder).parts):
+        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts):
             yield path
 
 

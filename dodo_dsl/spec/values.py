@@ -156,11 +156,16 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
     if not scalar.text or Path(scalar.text).is_absolute():
         message = f"{_name(parameter)} is '{scalar.text}', expected a path relative to the spec"
         raise ValueProblem(scalar.span, "path-escape", message)
-    target = (folder / scalar.text).resolve()
+    try:
+        target = (folder / scalar.text).resolve()
+        exists = target.exists()
+    except (OSError, RuntimeError) as error:
+        message = f"{_name(parameter)}: '{scalar.text[:60]}' is no path ({getattr(error, 'strerror', error)})"
+        raise ValueProblem(scalar.span, "missing-file", message) from error
     if not target.is_relative_to(root.resolve()):
         message = f"{_name(parameter)}: '{scalar.text}' leaves the registry"
         raise ValueProblem(scalar.span, "path-escape", message, "files of a test lie in its registry")
-    if not target.exists():
+    if not exists:
         beside = [p.name for p in target.parent.iterdir()] if target.parent.is_dir() else []
         message = f"{_name(parameter)}: there is no file or folder '{scalar.text}'"
         raise ValueProblem(scalar.span, "missing-file", message, did_you_mean(target.name, beside))

@@ -142,6 +142,52 @@ def test_interrupt_takes_everything_down_and_still_reports(desk: Desk, isolation
     assert gone(marks(desk))
 
 
+def test_interrupt_during_teardown_keeps_the_verdict(desk: Desk) -> None:
+    stubborn = "import signal\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n" + WAIT
+    process = desk.start(desk.bench.plan(application=stubborn))
+    wait_for(process, "taking down")
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 130, out
+    (test,) = desk.results()
+    assert (test["outcome"], test["reason"]) == ("passed", "it drove")
+    assert gone(marks(desk))
+
+
+def test_reader_that_leaves_does_not_end_the_run(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan())
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.wait(30) == 0
+    (test,) = desk.results()
+    assert test["outcome"] == "passed"
+
+
+def test_report_among_tests_is_refused_and_harms_nothing(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan(), report="generated")
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert "holds tests; name another folder with --report" in out
+    assert (desk.folder / "generated" / "test" / "test.json").is_file()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"slug": "../../x"}, {"timeout_s": "1"}, {"cid": 999}, {"seed": -1}, {"services": 3}, {"application": {}}],
+    ids=str,
+)
+def test_tampered_compiled_tests_are_refused(desk: Desk, change: dict[str, object]) -> None:
+    folder = desk.compiled(desk.bench.plan())
+    raw = json.loads((folder / "test.json").read_text())
+    (folder / "test.json").write_text(json.dumps({**raw, **change}))
+    command = [sys.executable, "-m", "dodo_dsl", "run", "--compiled", str(folder)]
+    environment = {**desk.environment, "PYTHONPATH": str(ROOT)}
+    result = subprocess.run(command, cwd=desk.folder, env=environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 2
+    assert "not a compiled test" in result.stderr
+
+
 @pytest.mark.parametrize("isolation", ["network", "host"])
 def test_killed_runner_leaves_nothing(desk: Desk, isolation: str) -> None:
     process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", isolation)
@@ -219,6 +265,7 @@ def test_usage_errors_are_sentences(desk: Desk) -> None:
         (["no-such-test"], "there is no test 'no-such-test'"),
         (["--application", "none.yml"], "there is no file 'none.yml', expected the application's compose file"),
         (["a/b.dodo.yml"], "there is no test at"),
+        (["--seed", "-1"], "'-1' is no whole number from 0 to 4294967295"),
         (["-j", "0"], "'0' is no whole number of 1 or more"),
     ):
         environment = {**desk.environment, "PYTHONPATH": str(ROOT)}

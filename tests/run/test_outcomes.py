@@ -49,6 +49,11 @@ CASES = {
         "error",
         "service 'judge' of layer evaluation ended with exit code 2",
     ),
+    "verdict-before-the-begin": (
+        {"judge": PASS + READY + WAIT},
+        "error",
+        "evaluator 'judge' gave a verdict before the test began",
+    ),
     "timeout": (
         {"judge": READY + WAIT, "timeout_s": 0.5},
         "error",
@@ -142,8 +147,9 @@ def test_application_without_flags_runs_alone_on_the_host(tmp_path: Path, monkey
 
 
 def test_set_up_and_execution_are_measured_apart(bench: Bench) -> None:
-    (outcome,) = bench.run(bench.plan(environment="time.sleep(0.5)\n" + READY + WAIT))
+    judge = READY + "time.sleep(2.0)\n" + PASS
+    (outcome,) = bench.run(bench.plan(environment="time.sleep(0.5)\n" + READY + WAIT, judge=judge))
     assert outcome.setup_s is not None
     assert outcome.execution_s is not None
     assert outcome.setup_s >= 0.5
-    assert outcome.execution_s >= 0.3
+    assert outcome.execution_s > 0.3

@@ -1,15 +1,43 @@
-"""``name-differs``: a test's name equals its file's; ``name-taken``: it is unique."""
+"""``name-differs``: a test's name equals its file's; ``name-taken``: it is unique.
+
+``name-reserved``: a test is a job of its name, and GitLab reads some names as keywords.
+"""
 
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, shown_path
 
+KEYWORDS = frozenset(
+    {
+        "after-script",
+        "before-script",
+        "cache",
+        "default",
+        "false",
+        "gate",
+        "image",
+        "include",
+        "nil",
+        "pages",
+        "services",
+        "spec",
+        "stages",
+        "true",
+        "types",
+        "variables",
+        "workflow",
+    }
+)
+
 
 def check(context: Context) -> Iterator[Diagnostic]:
     spec = context.spec
     if spec.name is None:
         return
+    if spec.name in KEYWORDS:
+        message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
+        yield Diagnostic(spec.span("name"), "name-reserved", message, f"for example 'sil-{spec.name}'")
     stem = spec.location.stem
     if spec.name != stem:
         message = f"the name '{spec.name}' differs from the file's name"

@@ -1,0 +1,62 @@
+"""The report is written whatever services said, and its clean-up removes only what reports hold."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.report import results
+from dodo_dsl.report.write import Drawable, forget, write_report
+from tests.run.helpers import Bench
+
+OUTCOME = Outcome(
+    "test", "test", "t/t.dodo.yml", "sil", "closed-loop", "failed", "hit wall", 130, 0, "realtime", "process"
+)
+
+
+def recording(path: Path, *payloads: bytes) -> None:
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"".join(encode_frame(Envelope(1003, payload, 0, 0, n, 0)) for n, payload in enumerate(payloads)))
+
+
+def frame(x: float) -> bytes:
+    messages = MessageSet.standard()
+    return messages.encode(messages.type("opendlv.sim.Frame")(x=x, qw=1.0))
+
+
+@pytest.mark.parametrize("reason", ["cost $a_{ and $x", "<script>alert(1)</script>", "\x1b[31m\x00 \ufffe", "a\nb"])
+def test_hostile_reasons_and_frames(tmp_path: Path, reason: str) -> None:
+    recording(tmp_path / "report" / "test" / "test.rec", frame(0), b"\x0a\xff\xff\xff", frame(1), frame(float("nan")))
+    outcome = replace(OUTCOME, reason=reason, last_lines=(reason,))
+    tested = {"test": Drawable(Bench(tmp_path).plan(), tmp_path)}
+    assert write_report(tmp_path / "report", [outcome], tested) == []
+    assert results.load(tmp_path / "report" / "results.json") == [outcome]
+    assert (tmp_path / "report" / "test" / "trajectory.png").is_file()
+    assert "<script>" not in (tmp_path / "report" / "index.html").read_text()
+    assert (tmp_path / "report" / "junit.xml").is_file()
+
+
+def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
+    report = tmp_path / "project" / "report"
+    for slug in ("test", "gone"):
+        (report / slug / "logs").mkdir(parents=True)
+        (report / slug / "test.rec").write_bytes(b"")
+    (report / "test" / "notes.txt").write_text("mine")
+    (tmp_path / "project" / "logs").mkdir()
+    document = json.loads(results.to_json([replace(OUTCOME, slug="gone"), replace(OUTCOME, slug="..")]))
+    (report / "results.json").write_text(json.dumps(document))
+    forget(report, ["test"])
+    assert sorted(p.name for p in report.iterdir()) == ["results.json", "test"]
+    assert [p.name for p in (report / "test").iterdir()] == ["notes.txt"]
+    assert (tmp_path / "project" / "logs").is_dir()
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"dodo": "results", "version": 1, "tests": [3]}', "[" * 100_000])
+def test_results_that_are_none(tmp_path: Path, text: str) -> None:
+    (tmp_path / "results.json").write_text(text)
+    with pytest.raises(results.ResultsError):
+        results.load(tmp_path / "results.json")
