@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -227,3 +228,22 @@ def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
     subprocess.run(["docker", "compose", "down", "-v"], cwd=folder, capture_output=True, check=True)
     assert '"outcome": "passed"' in result.stdout, result.stdout[-3000:] + result.stderr[-3000:]
     assert result.returncode == 0
+
+
+def test_host_isolation_leases_and_refuses_foreign_traffic(tmp_path: Path) -> None:
+    words = ["sil-closed-straight", "--isolation", "host", "--report", str(tmp_path / "report")]
+    process = start(tmp_path, *words)
+    out, _ = process.communicate(timeout=120)
+    assert process.returncode == 0, out
+    (test,) = results(tmp_path / "report").values()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.connect((f"225.0.0.{test['cid']}", 12175))
+        port = stranger.getsockname()[1]
+        second = start(tmp_path, *words)
+        while second.poll() is None:
+            stranger.send(b"\x0d\xa4\x00\x00\x00")
+            time.sleep(0.02)
+    out, _ = second.communicate()
+    assert second.returncode == 3, out
+    (test,) = results(tmp_path / "report").values()
+    assert f":{port}; end it" in str(test["reason"])

@@ -1,0 +1,123 @@
+"""A cold pull of all services' images: shared layers beside one independent image a service.
+
+Pushes DoDo's images (``dodo images build``) to an image registry of its own on 127.0.0.1, once as they are and once
+flattened to one layer each, and pulls both into an empty engine. Root on Debian with docker.io and docker-registry.
+"""
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import __version__
+
+PORT = 5917
+HOST = f"127.0.0.1:{PORT}"
+NAMES = ("sandbox", "collision", "dynamic-model", "integrator", "rec-recorder", "virtual-camera")
+MANIFEST = "application/vnd.docker.distribution.manifest.v2+json"
+
+
+def docker(*words: str, host: str = "") -> str:
+    command = ["docker", *(["-H", host] if host else []), *words]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+@contextlib.contextmanager
+def process(*command: str, answers: list[str]) -> Iterator[None]:
+    """A process that runs until the block ends; the block begins when ``answers`` succeeds."""
+    running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        for _ in range(300):
+            if subprocess.run(answers, capture_output=True, check=False).returncode == 0:
+                break
+            time.sleep(0.1)
+        yield
+    finally:
+        running.terminate()
+        running.wait()
+
+
+@contextlib.contextmanager
+def image_registry(folder: Path) -> Iterator[None]:
+    config = folder / "registry.yml"
+    storage = f"filesystem: {{rootdirectory: {folder / 'registry'}}}"
+    config.write_text(f"version: 0.1\nlog: {{level: error}}\nstorage: {{{storage}}}\nhttp: {{addr: '{HOST}'}}\n")
+    with process("docker-registry", "serve", str(config), answers=["bash", "-c", f": >/dev/tcp/127.0.0.1/{PORT}"]):
+        yield
+
+
+@contextlib.contextmanager
+def empty_engine(folder: Path) -> Iterator[str]:
+    root = Path(tempfile.mkdtemp(dir=folder))
+    host = f"unix://{root}/docker.sock"
+    flags = [f"--data-root={root}/data", f"--exec-root={root}/exec", f"--pidfile={root}/pid", f"--host={host}"]
+    rest = ["--bridge=none", "--iptables=false", "--max-concurrent-downloads=3"]
+    with process("dockerd", *flags, *rest, answers=["docker", "-H", host, "info"]):
+        yield host
+
+
+def push(kind: str, name: str) -> None:
+    target = f"{HOST}/{kind}/{name}:1"
+    source = f"dodo/{name}:{__version__}"
+    if kind == "shared":
+        docker("tag", source, target)
+    else:
+        container = docker("create", source, "true")
+        flat = ["bash", "-c", 'docker export "$1" | docker import - "$2"', "flat", container, target]
+        subprocess.run(flat, check=True, capture_output=True)
+        docker("rm", container)
+    docker("push", "-q", target)
+    docker("image", "rm", target)
+
+
+def manifest(kind: str, name: str) -> list[dict[str, Any]]:
+    """The layers of one image in the registry."""
+    request = urllib.request.Request(f"http://{HOST}/v2/{kind}/{name}/manifests/1", headers={"Accept": MANIFEST})
+    with urllib.request.urlopen(request) as answer:
+        found: list[dict[str, Any]] = json.load(answer)["layers"]
+    return found
+
+
+def layers(kind: str) -> dict[str, int]:
+    """Compressed bytes by layer of all images of a kind."""
+    return {layer["digest"]: layer["size"] for name in NAMES for layer in manifest(kind, name)}
+
+
+def largest(kind: str) -> int:
+    """Compressed bytes of the largest image."""
+    return max(sum(layer["size"] for layer in manifest(kind, name)) for name in NAMES)
+
+
+def cold_pull(kind: str, folder: Path) -> float:
+    with empty_engine(folder) as host:
+        start = time.perf_counter()
+        for name in NAMES:
+            docker("pull", "-q", f"{HOST}/{kind}/{name}:1", host=host)
+        return time.perf_counter() - start
+
+
+def main() -> int:
+    ready = os.getuid() == 0 and shutil.which("docker-registry") and shutil.which("dockerd")
+    if not ready or subprocess.run(["docker", "info"], capture_output=True, check=False).returncode:
+        print("needs root, docker-registry, dockerd and an engine that answers: nothing to measure")
+        return 0
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name, image_registry(Path(name)):
+        for kind in ("shared", "alone"):
+            for service in NAMES:
+                push(kind, service)
+            seconds, size = cold_pull(kind, Path(name)), sum(layers(kind).values())
+            print(f"{kind:<7} {size / 1e6:7.1f} MB in {len(layers(kind))} layers, {seconds:5.1f} s;", end=" ")
+            print(f"{size / largest(kind):.3f} times the largest image")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
