@@ -1,7 +1,6 @@
-"""A test on the docker backend beside ``docker compose up --exit-code-from`` of the same compiled test.
+"""The closed-loop tests on the docker backend, at once, beside ``docker compose up`` of the same one after the other.
 
-Both drive the same car for the same time; what differs is set-up and teardown. The images must exist
-(``dodo images build``).
+Both drive the same cars for the same time. The images must exist (``dodo images build``).
 """
 
 import json
@@ -14,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-TEST = "sil-closed-straight"
+TESTS = ("sil-closed-left-curve", "sil-closed-straight")
 ROUNDS = 3
 
 
@@ -33,20 +32,20 @@ def main() -> int:
     rows = []
     with tempfile.TemporaryDirectory() as name:
         out, report = Path(name) / "generated", Path(name) / "report"
-        seconds([*dodo, "compile", TEST, "-o", str(out)], folder=ROOT)
+        seconds([*dodo, "compile", *TESTS, "-o", str(out)], folder=ROOT)
         up = ["docker", "compose", "up", "--exit-code-from", "track"]
         down = ["docker", "compose", "down", "-v"]
         for _ in range(ROUNDS):
-            run = [*dodo, "run", TEST, "--backend", "docker", "--report", str(report)]
+            run = [*dodo, "run", *TESTS, "--backend", "docker", "-j", str(len(TESTS)), "--report", str(report)]
             ours = seconds(run, folder=ROOT)
-            (test,) = json.loads((report / "results.json").read_text())["tests"]
-            rows.append((ours, test["setup_s"], test["execution_s"], seconds(up, down, folder=out / TEST)))
+            tests = json.loads((report / "results.json").read_text())["tests"]
+            setup, execution = (max(test[key] for test in tests) for key in ("setup_s", "execution_s"))
+            rows.append((ours, setup, execution, sum(seconds(up, down, folder=out / test) for test in TESTS)))
     total, setup, execution, peer = (statistics.median(column) for column in zip(*rows, strict=True))
-    rest = total - setup - execution
-    parts = f"set-up {setup:.1f} s, test {execution:.1f} s, the rest {rest:.1f} s"
-    print(f"dodo run --backend docker: {total:5.1f} s: {parts}")
-    print(f"docker compose up and down: {peer:4.1f} s")
-    print(f"ratio: {peer / total:.2f}")
+    parts = f"set-up {setup:.1f} s, test {execution:.1f} s, the rest {total - setup - execution:.1f} s"
+    print(f"dodo run --backend docker, {len(TESTS)} at once:   {total:5.1f} s: {parts}")
+    print(f"docker compose up and down, one by one: {peer:5.1f} s")
+    print(f"the peer takes {peer / total:.2f} times as long")
     return 0
 
 
