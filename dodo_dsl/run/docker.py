@@ -244,9 +244,20 @@ class DockerBackend:
                 sender.sendto(frame, (group, _PORT))
             return
         escaped = "".join(f"\\x{byte:02x}" for byte in frame)
-        await asyncio.to_thread(
-            self._containers[SANDBOX].exec_run, ["bash", "-c", _TELL, "tell", escaped, group, str(_PORT)]
-        )
+        words = ["bash", "-c", _TELL, "tell", escaped, group, str(_PORT)]
+        problem = await asyncio.to_thread(self._exec_problem, words)
+        if problem:
+            raise BackendError(f"the test's bus cannot be told that the test begins: {problem}")
+
+    def _exec_problem(self, words: list[str]) -> str:
+        """What a command in the sandbox container failed with, or nothing."""
+        from docker.errors import DockerException
+
+        try:
+            code, output = self._containers[SANDBOX].exec_run(words)
+        except (DockerException, OSError) as error:
+            return str(error)
+        return "" if code == 0 else (output or b"").decode("utf-8", "replace").strip() or f"exit code {code}"
 
     async def close(self, keep: bool) -> list[str]:
         self._closing = True
