@@ -23,6 +23,7 @@ _PORT = 12175
 _BUILD_PROJECT = "dodo-build"
 _REPORT = "/dodo/report"
 _OVERLAP = "overlaps"
+_YIELDING = ("nice", "-n", "10")  # the set-up of one test leaves the processor to those that drive already
 _TELL = 'printf "%b" "$1" > "/dev/udp/$2/$3"'
 
 
@@ -84,7 +85,7 @@ class DockerBackend:
         if subnet:
             environment["DODO_SUBNET"] = subnet
         process = await asyncio.create_subprocess_exec(
-            "docker", "compose", *words, cwd=self.folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
+            *_YIELDING, "docker", "compose", *words, cwd=self.folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
         )  # fmt: skip
         try:
