@@ -34,20 +34,23 @@ class NoApplication(Exception):
     """Plans need an application, and neither the command line nor a deployment names one."""
 
 
-def load(paths: Sequence[Path], application: Path | None = None, start: Path | None = None) -> Checked:
-    """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any."""
+def load(paths: Sequence[Path], application: Sequence[Path] = (), start: Path | None = None) -> Checked:
+    """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
+
+    ``application`` are compose files that count instead of the deployment's.
+    """
     deployment, found = load_deployment(find_deployment(start or Path.cwd()))
-    manifests, manifest_problems = load_manifests()
+    manifests, manifest_problems = load_manifests(deployment.services)
     locations, empty = locate(paths, deployment.registry, _registries_above(paths))
     loaded = [load_spec(location) for location in locations]
-    specs = tuple(spec for spec, _ in loaded)
+    specs = tuple(spec for instances, _ in loaded for spec in instances)
     found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
-    found.extend(check(specs, manifests))
-    file = application or deployment.application
+    files = application or deployment.application
     source = None
-    if file is not None:
-        source, problems = read_application(file)
+    if files:
+        source, problems = read_application(files[0] if len(files) == 1 else files)  # type: ignore[arg-type]
         found.extend(problems)
+    found.extend(check(specs, manifests, deployment, getattr(source, "declared", None)))
     return Checked(deployment, manifests, specs, tuple(ordered(found)), source, tuple(empty))
 
 

@@ -2,27 +2,43 @@
 
 from collections.abc import Iterable, Mapping
 
-from dodo_dsl.check.context import Context, Rule
-from dodo_dsl.check.rules import layers, levels, names, parameters, services
+from dodo_dsl.check.context import Context, Declared, Rule
+from dodo_dsl.check.rules import layers, levels, messages, names, parameters, references, rigs, services, wiring
 from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
 
 RULES: tuple[Rule, ...] = (
     names.check,
     levels.check,
+    rigs.check,
     services.check,
     layers.check,
     parameters.check,
+    messages.check,
+    references.check,
+    wiring.check,
 )
 
 
-def check(specs: Iterable[Spec], manifests: Mapping[str, Manifest]) -> list[Diagnostic]:
-    """All problems of all specs; ``specs`` are the ones that a name may collide with."""
+def check(
+    specs: Iterable[Spec],
+    manifests: Mapping[str, Manifest],
+    deployment: Deployment,
+    declared: Mapping[str, Declared | None] | None = None,
+) -> list[Diagnostic]:
+    """All problems of all instances; ``specs`` are the ones that a name may collide with.
+
+    ``declared`` is what the services of the application say of themselves, None without an application.
+    """
     everything = tuple(specs)
     by_name: dict[str, list[Spec]] = {}
     for spec in everything:
         by_name.setdefault(spec.name or "", []).append(spec)
     return [
-        diagnostic for spec in everything for rule in RULES for diagnostic in rule(Context(spec, manifests, by_name))
+        diagnostic
+        for spec in everything
+        for rule in RULES
+        for diagnostic in rule(Context(spec, manifests, by_name, deployment, declared))
     ]

@@ -69,7 +69,10 @@ class Place:
 
 @dataclass(frozen=True)
 class Plan:
-    """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation."""
+    """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation.
+
+    ``rig`` is empty below level hil; ``messages`` are ODVD files of the deployment, relative to ``files/``.
+    """
 
     name: str
     slug: str
@@ -87,6 +90,8 @@ class Plan:
     sandbox_image: str
     services: tuple[Service, ...]
     application: Application
+    rig: str = ""
+    messages: tuple[str, ...] = ()
     source_map: dict[str, Place] = field(default_factory=dict)
 
     def layer(self, name: str) -> tuple[Service, ...]:
@@ -121,6 +126,7 @@ def from_json(text: str) -> Plan:
         application["services"] = tuple(_application_service(s) for s in application["services"])
         application["changes"] = tuple(application["changes"])
         raw["application"] = Application(**application)
+        raw["messages"] = tuple(raw["messages"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
         plan = Plan(**raw)
         problem = _problem(plan)
@@ -133,7 +139,7 @@ def from_json(text: str) -> Plan:
 
 def _problem(plan: Plan) -> str:
     """What no compiled test holds; the types of JSON say nothing about themselves."""
-    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.application.folder)
+    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.rig, plan.application.folder)
     services: list[Service | ApplicationService] = [*plan.services, *plan.application.services]
     rules = {
         "slug": isinstance(plan.slug, str) and bool(_SLUG.fullmatch(plan.slug)),
@@ -143,6 +149,7 @@ def _problem(plan: Plan) -> str:
         "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
         "cid": isinstance(plan.cid, int) and 1 <= plan.cid <= 254,
         "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
+        "messages": all(_is_inside(path) for path in plan.messages),
         "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "a service's layer": all(s.layer in LAYERS for s in plan.services),
         "a flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
@@ -156,9 +163,12 @@ def _problem(plan: Plan) -> str:
 def _is_flag(flag: Flag) -> bool:
     kinds = ("text", "path", "memory", "report")
     plain = isinstance(flag.name, str) and isinstance(flag.value, str) and isinstance(flag.kind, str)
-    relative = ".." not in str(flag.value).split("/") and not str(flag.value).startswith("/")
-    inside = flag.kind not in ("path", "report") or relative
+    inside = flag.kind not in ("path", "report") or _is_inside(flag.value)
     return plain and flag.kind in kinds and inside
+
+
+def _is_inside(path: object) -> bool:
+    return isinstance(path, str) and ".." not in path.split("/") and not path.startswith("/")
 
 
 def _service(raw: dict[str, Any]) -> Service:

@@ -15,6 +15,7 @@ from dodo_dsl.spec.manifest import Parameter
 Kind = Literal["text", "path", "memory"]
 
 _MEMORY = re.compile(r"/?[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_MESSAGE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", re.ASCII)
 _MAX_TEXT = 4096
 
 
@@ -138,6 +139,15 @@ def _memory(parameter: Parameter, node: Node, _: Path) -> Value:
     return Value(scalar.text, "memory")
 
 
+def _message(parameter: Parameter, node: Node, _: Path) -> Value:
+    scalar = _scalar(parameter, node, "a message's name")
+    if not _MESSAGE.fullmatch(scalar.text):
+        message = f"{_name(parameter)} is '{scalar.text[:60]}', expected a message's full name"
+        hint = "for example opendlv.proxy.GroundSteeringRequest"
+        raise ValueProblem(scalar.span, "wrong-value", message, hint)
+    return Value(scalar.text)
+
+
 def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     items = node.items if isinstance(node, Sequence) else (node,)
     texts = []
@@ -179,5 +189,6 @@ _CONVERTERS: dict[str, Callable[[Parameter, Node, Path], Value]] = {
     "boolean": _boolean,
     "path": _path,
     "memory": _memory,
+    "message": _message,
     "list": _list,
 }
