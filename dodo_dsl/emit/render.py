@@ -2,7 +2,6 @@
 
 import functools
 import json
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +10,8 @@ import yaml
 
 from dodo_dsl import data
 from dodo_dsl.emit.containers import containers
+from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
-
-CHILD = "child.gitlab-ci.yml"
-_STAGES = ("sil", "dil", "hil")
-_SPARE_MINUTES = 10
 
 
 @dataclass(frozen=True)
@@ -24,19 +20,6 @@ class File:
 
     path: str
     text: str
-
-
-@dataclass(frozen=True)
-class Job:
-    """A job of the child pipeline."""
-
-    name: str
-    stage: str
-    tag: str
-    gated: bool
-    minutes: int
-    interruptible: bool
-    script: str
 
 
 class _Dumper(yaml.SafeDumper):
@@ -99,29 +82,11 @@ def render_plan(plan: Plan) -> list[File]:
     return files
 
 
-def _jobs(suite: Suite, gated: bool, folder: str) -> list[Job]:
-    return [
-        Job(
-            name=plan.slug,
-            stage=plan.level,
-            tag=plan.tag,
-            gated=gated and plan.level == "hil",
-            minutes=math.ceil(plan.timeout_s / 60) + _SPARE_MINUTES,
-            interruptible=plan.level != "hil",
-            script=f"dodo run --compiled {folder}/{plan.slug} --report dodo-report",
-        )
-        for plan in suite.plans
-    ]
-
-
 def render_pipeline(suite: Suite, folder: str) -> File:
     """The child pipeline; ``folder`` is the output folder's name, as the parent's artifact has it."""
-    levels = {plan.level for plan in suite.plans}
-    gated = suite.gates and "hil" in levels and bool(levels & {"sil", "dil"})
-    stages = [s for s in _STAGES if s in levels]
-    if gated:
-        stages.insert(stages.index("hil"), "gate")
-    return File(CHILD, _render("child.gitlab-ci.yml.j2", stages=stages, gate=gated, jobs=_jobs(suite, gated, folder)))
+    child = pipeline(suite, folder)
+    text = _render("child.gitlab-ci.yml.j2", stages=child.stages, gate=child.gate, images=child.images, jobs=child.jobs)
+    return File(CHILD, text)
 
 
 def render(suite: Suite, folder: str) -> list[File]:
