@@ -9,12 +9,12 @@ from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
 from dodo_dsl.plan.files import Copy, FilesError, copies
-from dodo_dsl.plan.model import Flag, Place, Plan, Service, Suite
+from dodo_dsl.plan.model import Flag, Place, Plan, Service, Suite, is_device
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
-from dodo_dsl.spec.rig import Rig
+from dodo_dsl.spec.rig import EMULATED_FILE, Rig
 from dodo_dsl.spec.values import Value, convert, default_value
 
 RECORDER = "dodo-recorder"
@@ -129,6 +129,8 @@ class _Builder:
         return tuple(targets)
 
     def _place(self, key: str, span: Span) -> None:
+        if span.file == EMULATED_FILE:
+            return  # built in, nobody wrote it
         shown = self.shown.get(span.file)
         if shown is None:
             shown = self.shown[span.file] = self._shown(Path(span.file))
@@ -175,7 +177,14 @@ class _Builder:
             manifest.process,
             tuple(flags),
             judge=use.layer == "evaluation",
+            devices=self._devices(use, manifest),
         )
+
+    def _devices(self, use: Use, manifest: Manifest) -> tuple[str, ...]:
+        """The device files among what the manifest names; a rig's camera may be none (rpicam, a recording)."""
+        values = arguments.texts(self.spec, use, manifest, self.rig)
+        named = (values.get(device.strip("{}"), device) for device in manifest.devices)
+        return tuple(device for device in named if is_device(device))
 
     def _flag(self, use: Use, parameter: Parameter, key: str) -> Flag | None:
         entry = arguments.written(self.spec, use, parameter, self.rig)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 FORMAT = 1
 _SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+_DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 LAYERS = ("environment", "action", "evaluation", "application")
 
 FlagKind = Literal["text", "path", "memory", "report"]
@@ -25,7 +26,10 @@ class Flag:
 
 @dataclass(frozen=True)
 class Service:
-    """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts."""
+    """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts.
+
+    ``devices`` are device files of the machine that it needs.
+    """
 
     layer: str
     name: str
@@ -34,6 +38,7 @@ class Service:
     process: tuple[str, ...]
     flags: tuple[Flag, ...] = ()
     judge: bool = False
+    devices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -153,6 +158,7 @@ def _problem(plan: Plan) -> str:
         "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "a service's layer": all(s.layer in LAYERS for s in plan.services),
         "a flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
+        "a device": all(is_device(d) for s in plan.services for d in s.devices),
         "a word": all(isinstance(w, str) for s in services for w in s.process or ())
         and all(isinstance(w, str) for s in plan.application.services for w in s.command),
         "an environment": all(isinstance(s.environment, dict) for s in plan.application.services),
@@ -167,12 +173,18 @@ def _is_flag(flag: Flag) -> bool:
     return plain and flag.kind in kinds and inside
 
 
+def is_device(path: str) -> bool:
+    """Whether a text is the path of a device file below /dev."""
+    return bool(_DEVICE.fullmatch(path))
+
+
 def _is_inside(path: object) -> bool:
     return isinstance(path, str) and ".." not in path.split("/") and not path.startswith("/")
 
 
 def _service(raw: dict[str, Any]) -> Service:
-    return Service(**{**raw, "process": tuple(raw["process"]), "flags": tuple(Flag(**f) for f in raw["flags"])})
+    words = {key: tuple(raw[key]) for key in ("process", "devices")}
+    return Service(**{**raw, **words, "flags": tuple(Flag(**f) for f in raw["flags"])})
 
 
 def _application_service(raw: dict[str, Any]) -> ApplicationService:

@@ -1,17 +1,19 @@
 """The deployment: ``dodo.yml`` at the root of a user's repository."""
 
 import ipaddress
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl import __version__, data
-from dodo_dsl.diagnostics import Diagnostic, has_errors
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, plain, read
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.schema import validate
 
+_ODVD_PLACE = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+): (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
@@ -78,6 +80,7 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
         gates=raw.get("gates", True),
         rigs=rigs,
     )
+    _odvd(node.entries.get("messages"), deployment.messages, problems)
     return deployment, [*found, *problems]
 
 
@@ -107,6 +110,23 @@ def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple
         else:
             problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'"))
     return tuple(files)
+
+
+def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnostic]) -> None:
+    """What keeps the deployment's messages from being used."""
+    if not files or entry is None:
+        return
+    from dodo_dsl.opendlv.messages import MessageSet  # not before it is needed: it takes its time to load
+    from dodo_dsl.opendlv.odvd import OdvdError
+
+    try:
+        MessageSet.load(*files)
+    except OdvdError as error:
+        place = _ODVD_PLACE.fullmatch(str(error))
+        span, text = entry.key, str(error)
+        if place:
+            span, text = Span(place["file"], int(place["line"]), int(place["column"])), place["text"]
+        problems.append(Diagnostic(span, "wrong-messages", text))
 
 
 def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:

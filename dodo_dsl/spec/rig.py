@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, parse
 
 EMULATED = "emulated"
+EMULATED_FILE = "the emulated rig"
 
 _EMULATED = """
 kind: dynamic
@@ -58,6 +59,6 @@ class Rig:
 @functools.cache
 def emulated() -> Rig:
     """The rig whose firmware runs in a simulator."""
-    node, _ = parse(_EMULATED, "the emulated rig")
+    node, _ = parse(_EMULATED, EMULATED_FILE)
     assert isinstance(node, Mapping)
     return Rig(EMULATED, "dynamic", None, node)
