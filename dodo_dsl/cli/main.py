@@ -12,6 +12,7 @@ from dodo_dsl.cli import compile as compile_command
 from dodo_dsl.cli import doctor as doctor_command
 from dodo_dsl.cli import images as images_command
 from dodo_dsl.cli import list as list_command
+from dodo_dsl.cli import new as new_command
 from dodo_dsl.cli import report as report_command
 from dodo_dsl.cli import run as run_command
 from dodo_dsl.cli.exits import Exit
@@ -20,6 +21,7 @@ COMMANDS: dict[str, ModuleType] = {
     "compile": compile_command,
     "run": run_command,
     "list": list_command,
+    "new": new_command,
     "report": report_command,
     "images": images_command,
     "doctor": doctor_command,

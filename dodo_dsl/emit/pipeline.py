@@ -67,7 +67,7 @@ def _needs_images(plan: Plan) -> bool:
 
 
 def _job(plan: Plan, gate: bool, folder: str) -> Job:
-    rig = getattr(plan, "rig", "")
+    rig = plan.rig
     real = plan.level == "hil" and rig != EMULATED
     return Job(
         name=plan.slug,
