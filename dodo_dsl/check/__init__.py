@@ -1,6 +1,7 @@
 """The rules: each is a module with one question, in one explicit list."""
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from dodo_dsl.check.context import Context, Declared, Rule
 from dodo_dsl.check.rules import layers, levels, messages, names, parameters, references, rigs, services, wiring
@@ -33,12 +34,13 @@ def check(
     ``declared`` is what the services of the application say of themselves, None without an application.
     """
     everything = tuple(specs)
-    by_name: dict[str, list[Spec]] = {}
+    by_name: dict[str, dict[Path, Spec]] = {}
     for spec in everything:
-        by_name.setdefault(spec.name or "", []).append(spec)
+        by_name.setdefault(spec.name or "", {}).setdefault(spec.path, spec)
+    named = {name: list(specs.values()) for name, specs in by_name.items()}
     return [
         diagnostic
         for spec in everything
         for rule in RULES
-        for diagnostic in rule(Context(spec, manifests, by_name, deployment, declared))
+        for diagnostic in rule(Context(spec, manifests, named, deployment, declared))
     ]

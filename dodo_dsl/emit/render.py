@@ -1,17 +1,23 @@
 """Plans through the Jinja templates."""
 
 import functools
-import json
+import textwrap
 from dataclasses import dataclass
 from typing import Any
 
 import jinja2
+import orjson
 import yaml
 
 from dodo_dsl import data
 from dodo_dsl.emit.containers import containers
 from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
+
+
+_SERVICE_DEPTH = 2
+_MOST_BLOCKS = 10_000
+_BLOCKS: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -32,13 +38,31 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _yaml_block(value: Any) -> str:
-    return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000).rstrip("\n")
+def _yaml_block(value: dict[str, Any], depth: int = 0) -> str:
+    """A compose file in block style. Tests of one application share most of it, so what lies deep is kept."""
+    parts = []
+    for key, below in value.items():
+        if isinstance(below, dict) and below and depth < _SERVICE_DEPTH:
+            head = _dumped({key: None}).removesuffix(" null")
+            parts.append(f"{head}\n{textwrap.indent(_yaml_block(below, depth + 1), '  ')}")
+        else:
+            parts.append(_dumped({key: below}))
+    return "\n".join(parts)
+
+
+def _dumped(value: dict[str, Any]) -> str:
+    key = repr(value)
+    if key not in _BLOCKS:
+        if len(_BLOCKS) >= _MOST_BLOCKS:
+            _BLOCKS.clear()
+        text: str = yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000)
+        _BLOCKS[key] = text.rstrip("\n")
+    return _BLOCKS[key]
 
 
 def _yaml(value: Any) -> str:
     """A scalar as JSON, which YAML reads as the same value whatever it holds."""
-    return json.dumps(value, ensure_ascii=False)
+    return orjson.dumps(value).decode()
 
 
 @functools.cache

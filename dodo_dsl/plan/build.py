@@ -1,7 +1,8 @@
 """From specs without errors to Plans."""
 
+import functools
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
 from dodo_dsl.plan.files import Copy, FilesError, copies
-from dodo_dsl.plan.model import Flag, Place, Plan, Service, Suite, is_device
+from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
@@ -44,11 +45,17 @@ def build(
         span = Span(str(deployment.file)) if deployment.file else ordered[-1].span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
+    tree = functools.cache(copies)  # tests share maps and recordings
+
+    @functools.cache
+    def planned(cid: int, isolated: str, judges: tuple[str, ...]) -> Application:
+        return plan_application(application, cid, isolated, out / "test", judges)
+
     builders = [
-        _Builder(spec, manifests, deployment, out, cid, index)
+        _Builder(spec, manifests, deployment, out, cid, index, tree, planned)
         for index, (spec, cid) in enumerate(zip(ordered, cids, strict=True))
     ]
-    plans = tuple(builder.plan(application) for builder in builders)
+    plans = tuple(builder.plan(application.spans) for builder in builders)
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
     return Compiled(Suite(plans, deployment.gates), files), problems
@@ -77,6 +84,8 @@ class _Builder:
         out: Path,
         cid: int,
         index: int,
+        tree: Callable[[Path, Path], list[Copy]],
+        application: Callable[[int, str, tuple[str, ...]], Application],
     ) -> None:
         self.spec = spec
         self.manifests = manifests
@@ -85,12 +94,15 @@ class _Builder:
         self.cid = cid
         self.index = index
         self.rig = deployment.rig(spec.rig) if spec.rig else None
+        self.tree = tree
+        self.application = application
         self.files: set[Copy] = set()
         self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
 
-    def plan(self, application: ApplicationSource) -> Plan:
+    def plan(self, application: Container[str]) -> Plan:
+        """The instance's Plan; ``application`` holds the names of the application's services."""
         spec, rig = self.spec, self.rig
         services = (*self._recorder(), *(self._service(use) for use in spec.uses))
         self._names_apart(services, application)
@@ -116,7 +128,7 @@ class _Builder:
             tag=rig.tag if rig else "sil",
             sandbox_image=self._image("sandbox"),
             services=services,
-            application=plan_application(application, self.cid, isolated, self.out / spec.slug, judges),
+            application=self.application(self.cid, isolated, judges),
             rig=rig.name if rig else "",
             messages=messages,
             source_map=self.places,
@@ -152,9 +164,9 @@ class _Builder:
         image = self._image(manifest.image)
         return [Service("environment", RECORDER, manifest.name, image, manifest.process, flags)]
 
-    def _names_apart(self, services: Sequence[Service], application: ApplicationSource) -> None:
+    def _names_apart(self, services: Sequence[Service], application: Container[str]) -> None:
         for service in services:
-            if service.name in application.spans:
+            if service.name in application:
                 use = next(u for u in self.spec.uses if u.name == service.name)
                 message = f"the application has a service '{service.name}' too"
                 self.problems.append(Diagnostic(use.span, "service-taken", message, "rename the one in the test"))
@@ -202,7 +214,7 @@ class _Builder:
         path = value.path or Path()
         root = self.spec.location.root.resolve()
         try:
-            self.files.update(copies(path, root))
+            self.files.update(self.tree(path, root))
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         return Flag(parameter.name, path.relative_to(root).as_posix(), "path")

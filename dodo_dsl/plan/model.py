@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import orjson
+
 FORMAT = 1
 _SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -116,8 +118,9 @@ class PlanError(ValueError):
 
 
 def to_json(plan: Plan) -> str:
-    document = {"dodo": "plan", "version": FORMAT, **dataclasses.asdict(plan)}
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    own = {field.name: getattr(plan, field.name) for field in dataclasses.fields(plan)}
+    document = {"dodo": "plan", "version": FORMAT, **own}
+    return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE).decode()
 
 
 def from_json(text: str) -> Plan:

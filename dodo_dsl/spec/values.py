@@ -37,8 +37,31 @@ class ValueProblem(Exception):
 
 
 def convert(parameter: Parameter, node: Node, root: Path) -> Value:
-    """The flag's value; raises ValueProblem at the place of what does not fit."""
-    return _CONVERTERS[parameter.type](parameter, node, root)
+    """The flag's value; raises ValueProblem at the place of what does not fit.
+
+    The instances of a matrix share the nodes that do not depend on it, so what a node came to is kept with it.
+    """
+    key = (id(parameter), id(node), root)
+    known = _KNOWN.get(key)
+    if known is None:
+        if len(_KNOWN) >= _MOST_KNOWN:
+            _KNOWN.clear()
+        known = _KNOWN[key] = (parameter, node, _convert(parameter, node, root))
+    outcome = known[2]
+    if isinstance(outcome, ValueProblem):
+        raise outcome
+    return outcome
+
+
+def _convert(parameter: Parameter, node: Node, root: Path) -> "Value | ValueProblem":
+    try:
+        return _CONVERTERS[parameter.type](parameter, node, root)
+    except ValueProblem as problem:
+        return problem
+
+
+_MOST_KNOWN = 100_000
+_KNOWN: dict[tuple[int, int, Path], tuple[Parameter, Node, Value | ValueProblem]] = {}
 
 
 def default_value(parameter: Parameter) -> Value | None:
