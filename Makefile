@@ -26,6 +26,7 @@ lint:
 
 test: lint
 	@scripts/install-compose
+	@scripts/install-gitlab-ci-local
 	@scripts/start-engine
 	.venv/bin/pytest
 
