@@ -14,7 +14,6 @@ from dodo_dsl.emit.containers import containers
 from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
 
-
 _SERVICE_DEPTH = 2
 _MOST_BLOCKS = 10_000
 _BLOCKS: dict[str, str] = {}

@@ -12,6 +12,7 @@ from typing import Any
 
 from dodo_dsl.plan.application import SANDBOX
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.trace import traced
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
 from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Ready, Unstartable
@@ -64,7 +65,7 @@ class DockerBackend:
     async def open(self) -> None:
         code, out, problem = await self._compose("config", "--format", "json")
         if code:
-            raise BackendError(f"docker compose does not take the compiled test: {problem}")
+            raise BackendError(f"docker compose does not take the compiled test: {traced(self.plan, problem)}")
         self._config = json.loads(out)["services"]
         await self._provide_images()
         await self._create()
@@ -132,7 +133,7 @@ class DockerBackend:
             if not code or _OVERLAP not in problem:
                 break
         if code:
-            raise BackendError(f"docker compose cannot create the test: {problem}")
+            raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
 
     def _find_containers(self) -> dict[str, Any]:
         found = self._client.containers.list(all=True, filters=self._filters())
