@@ -56,6 +56,8 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
     if path is None:
         return Deployment(Path.cwd(), registry=(data.registry(),)), []
     node, found = read(path)
+    if node is None and not found:
+        found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
         found = [*found, *validate(node, "deployment")]
     fallback = Deployment(path.parent, path, registry=(data.registry(),))

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from dodo_dsl import data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, shown_path
-from dodo_dsl.source import plain, read
+from dodo_dsl.source import Mapping, plain, read
+from dodo_dsl.spec import consistency
 from dodo_dsl.spec.schema import validate
 
 Value = str | int | float | bool | list[str | int | float] | None
@@ -69,8 +70,12 @@ def _ports(raw: dict[str, list[str]] | None) -> Ports:
 def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
     """The manifest of a ``service.yml`` and what is wrong with it."""
     node, found = read(path)
+    if node is None and not found:
+        found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected a service")]
     if node is not None:
         found = [*found, *validate(node, "service")]
+    if isinstance(node, Mapping) and not has_errors(found):
+        found = [*found, *consistency.problems(node)]
     if node is None or has_errors(found):
         return None, found
     raw = plain(node)
