@@ -15,7 +15,7 @@ help:
 demo:
 	@scripts/setup
 	$(DODO) compile
-	$(DODO) run
+	$(DODO) run 'sil-closed-*'
 
 lint:
 	@scripts/setup dev
