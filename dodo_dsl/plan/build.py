@@ -48,8 +48,9 @@ def build(
     tree = functools.cache(copies)  # tests share maps and recordings
 
     @functools.cache
-    def planned(cid: int, isolated: str, judges: tuple[str, ...]) -> Application:
-        return plan_application(application, cid, isolated, out / "test", judges)
+    def planned(cid: int, isolated: str, judges: tuple[str, ...], hardware: bool, privileged: bool) -> Application:
+        kept = {"hil": hardware, "privileged_allowed": privileged}
+        return plan_application(application, cid, isolated, out / "test", judges, **kept)
 
     builders = [
         _Builder(spec, manifests, deployment, out, cid, index, tree, planned)
@@ -85,7 +86,7 @@ class _Builder:
         cid: int,
         index: int,
         tree: Callable[[Path, Path], list[Copy]],
-        application: Callable[[int, str, tuple[str, ...]], Application],
+        application: Callable[[int, str, tuple[str, ...], bool, bool], Application],
     ) -> None:
         self.spec = spec
         self.manifests = manifests
@@ -111,6 +112,8 @@ class _Builder:
             if key in spec.spans:
                 self._place(key, spec.span(key))
         isolated = isolation(spec, rig)
+        hardware = rig is not None and not rig.is_emulated
+        privileged = rig is not None and rig.privileged
         messages = self._messages()
         return Plan(
             name=spec.title,
@@ -128,7 +131,7 @@ class _Builder:
             tag=rig.tag if rig else "sil",
             sandbox_image=self._image("sandbox"),
             services=services,
-            application=self.application(self.cid, isolated, judges),
+            application=self.application(self.cid, isolated, judges, hardware, privileged),
             rig=rig.name if rig else "",
             messages=messages,
             source_map=self.places,
