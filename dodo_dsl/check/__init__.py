@@ -1,6 +1,7 @@
 """The rules: each is a module with one question, in one explicit list."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.check.context import Context, Declared, Rule
@@ -38,9 +39,22 @@ def check(
     for spec in everything:
         by_name.setdefault(spec.name or "", {}).setdefault(spec.path, spec)
     named = {name: list(specs.values()) for name, specs in by_name.items()}
-    return [
-        diagnostic
-        for spec in everything
-        for rule in RULES
-        for diagnostic in rule(Context(spec, manifests, named, deployment, declared))
-    ]
+    instances: dict[Path, list[tuple[Spec, list[Diagnostic]]]] = {}
+    for spec in everything:
+        context = Context(spec, manifests, named, deployment, declared)
+        instances.setdefault(spec.path, []).append((spec, [d for rule in RULES for d in rule(context)]))
+    return [diagnostic for group in instances.values() for diagnostic in _with_instances(group)]
+
+
+def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[Diagnostic]:
+    """The problems of a file's instances, each once; those that only some have say which."""
+    having: dict[Diagnostic, dict[str, None]] = {}
+    for spec, found in group:
+        for diagnostic in found:
+            having.setdefault(diagnostic, {})[spec.title] = None
+    for diagnostic, titles in having.items():
+        if len(titles) == len(group):
+            yield diagnostic
+        else:
+            others = f" and {len(titles) - 1} more" if len(titles) > 1 else ""
+            yield replace(diagnostic, message=f"{diagnostic.message} (in {next(iter(titles))}{others})")

@@ -27,7 +27,7 @@ class Declared(Protocol):
 
 @dataclass(frozen=True)
 class Context:
-    """One instance with all manifests, the other specs by name, and the application's declarations if there is one."""
+    """One instance with all manifests, one instance of each file by name, and what the application declares."""
 
     spec: Spec
     manifests: Mapping[str, Manifest]
