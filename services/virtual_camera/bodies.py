@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from services.virtual_camera.bsp import Tree
 from services.virtual_camera.camera import NEAR, Array, View
-from services.virtual_camera.scene import Crowd
+from services.virtual_camera.light import Light
+from services.virtual_camera.crowd import Crowd
 from services.virtual_camera.shading import Group, Piece, cut, gather, silhouettes, whole
 
 SMALL = 8.0
@@ -16,14 +17,17 @@ INVISIBLE = 0.3
 """Copies of a smaller radius, in pixels, are not drawn."""
 
 Numbers = npt.NDArray[np.intp]
+Drawn = tuple[int, list[Piece]]
+"""The number of a body and its pieces."""
+
 _DRAWINGS: list[Callable[[Group], list[list[Piece]]]] = [silhouettes, whole, cut]
 
 
 class Bodies:
     """All copies of all models, in fixed order; ``tree`` says which region of space each stands in."""
 
-    def __init__(self, crowds: tuple[Crowd, ...], tree: Tree) -> None:
-        self._crowds = crowds
+    def __init__(self, crowds: tuple[Crowd, ...], tree: Tree, light: Light) -> None:
+        self._crowds, self._light = crowds, light
         counts = [len(crowd.turns) for crowd in crowds]
         self._crowd = np.repeat(np.arange(len(crowds)), counts)
         self._member = np.concatenate([np.arange(0), *(np.arange(count) for count in counts)])
@@ -31,8 +35,8 @@ class Bodies:
         self._middle = np.concatenate([np.zeros((0, 3)), *map(_middles, crowds)])
         self._leaf = tree.locate(self._middle)
 
-    def pieces(self, view: View) -> dict[int, list[Piece]]:
-        """For each region with something to see, the pieces to fill, from back to front."""
+    def pieces(self, view: View) -> dict[int, list[Drawn]]:
+        """For each region with something to see, the bodies in it and their pieces to fill, from back to front."""
         place = view.to_camera(self._middle)
         seen = np.flatnonzero(self._in_sight(view, place))
         seen = seen[np.argsort(-(place[seen] ** 2).sum(axis=1), kind="stable")]
@@ -42,9 +46,9 @@ class Bodies:
             these = seen[(self._crowd[seen] == crowd) & (drawing == kind)]
             bodies = _DRAWINGS[kind](self._group(view, crowd, these))
             drawn.update(zip(these.tolist(), bodies, strict=True))
-        regions: dict[int, list[Piece]] = {}
+        regions: dict[int, list[Drawn]] = {}
         for body in seen.tolist():
-            regions.setdefault(int(self._leaf[body]), []).extend(drawn[body])
+            regions.setdefault(int(self._leaf[body]), []).append((body, drawn[body]))
         return regions
 
     def _in_sight(self, view: View, place: Array) -> npt.NDArray[np.bool_]:
@@ -59,7 +63,7 @@ class Bodies:
 
     def _group(self, view: View, crowd: int, bodies: Numbers) -> Group:
         which, members = self._crowds[crowd], self._member[bodies]
-        return gather(view, which.shape, which.colour, which.positions[members], which.turns[members])
+        return gather(view, which.shape, which.colour, which.positions[members], which.turns[members], self._light)
 
 
 def _middles(crowd: Crowd) -> Array:

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from services.virtual_camera.camera import NEAR, Array, Pinhole, View, clip
 from services.virtual_camera.faces import Face, TextureMap
@@ -38,6 +39,13 @@ def draw_face(image: Image, view: View, face: Face) -> None:
         _draw_texture(image, view, visible, face.paint)
     else:
         fill(image, view.camera.project(visible), face.paint, OVERLAPPING)
+
+
+def cover_face(labels: npt.NDArray[np.int32], view: View, face: Face, label: int) -> None:
+    """Writes a number wherever ``draw_face`` would draw."""
+    visible = view.visible_part(view.to_camera(face.points))
+    if len(visible) > 2:
+        fill(labels, view.camera.project(visible), (label,), OVERLAPPING)
 
 
 def _texture_to_picture(view: View, paint: TextureMap) -> Array:
@@ -100,11 +108,18 @@ def _draw_band(image: Image, polygon: Array, inverse: Array, paint: TextureMap, 
     size = (right - left, bottom - top)
     if _fills_window(polygon, left, right, top, bottom):
         cv2.warpPerspective(canvas, warp, size, dst=window, flags=flags, borderMode=border)
+        _shade(window, paint.shade)
         return
     picture = cv2.warpPerspective(canvas, warp, size, flags=flags, borderMode=border)
+    _shade(picture, paint.shade)
     mask = np.zeros(window.shape[:2], np.uint8)
     fill_fixed(mask, fixed(inset(polygon, OVERLAPPING) - [left, top]), (255,))
     cv2.copyTo(picture, mask, window)
+
+
+def _shade(picture: Image, shade: float) -> None:
+    if shade != 1.0:
+        cv2.multiply(picture, (shade, shade, shade, 1.0), dst=picture)
 
 
 def _lookup(polygon: Array, inverse: Array, paint: TextureMap, level: int) -> tuple[Array, Image, int]:
