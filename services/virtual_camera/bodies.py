@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 from services.virtual_camera.bsp import Tree
 from services.virtual_camera.camera import NEAR, Array, View
-from services.virtual_camera.light import Light
 from services.virtual_camera.crowd import Crowd
+from services.virtual_camera.light import Light
 from services.virtual_camera.shading import Group, Piece, cut, gather, silhouettes, whole
 
 SMALL = 8.0
@@ -34,6 +34,15 @@ class Bodies:
         self._radius = np.repeat([crowd.shape.radius for crowd in crowds], counts)
         self._middle = np.concatenate([np.zeros((0, 3)), *map(_middles, crowds)])
         self._leaf = tree.locate(self._middle)
+        self.names = [crowd.name for crowd in crowds for _ in crowd.turns]
+        """The model's name of each body."""
+
+    def outline(self, body: int) -> tuple[Array, Numbers]:
+        """A body's vertices (V, 3) in the world and its faces (F, 8) of vertex numbers."""
+        crowd, member = self._crowds[self._crowd[body]], self._member[body]
+        c, s = np.cos(crowd.turns[member]), np.sin(crowd.turns[member])
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return crowd.shape.vertices @ turn.T + crowd.positions[member], crowd.shape.faces
 
     def pieces(self, view: View) -> dict[int, list[Drawn]]:
         """For each region with something to see, the bodies in it and their pieces to fill, from back to front."""

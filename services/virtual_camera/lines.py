@@ -1,12 +1,13 @@
 """Lines of the map's obstacles as tape on the ground."""
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from services.virtual_camera.faces import Face
 from services.virtual_camera.jsonnode import MapError
-from services.virtual_camera.mapfile import MapFile, ObstacleEntry
+from services.virtual_camera.mapfile import ObstacleEntry, find_map, read_obstacles
 from services.virtual_camera.raster import Colour
 
 TAPE: Colour = (235.0, 235.0, 235.0, 255.0)
@@ -14,14 +15,15 @@ THICKNESS = 0.0002
 """How high above z = 0 tape lies, in m: enough to be above the floor, and less than a model notices."""
 
 
-def pick(entries: MapFile, names: Sequence[str]) -> list[ObstacleEntry]:
-    """The obstacles with these names; MapError when one has no lines or is not there."""
-    known = {entry.name for entry in entries.obstacles}
+def pick(path: Path, names: Sequence[str]) -> list[ObstacleEntry]:
+    """The obstacles of a map with these names; MapError when one has no lines or is not there."""
+    obstacles = read_obstacles(path) if names else ()
+    known = {entry.name for entry in obstacles}
     for name in names:
         if name not in known:
             have = ", ".join(sorted(known)) or "none"
-            raise MapError(f"{entries.path}: no obstacle '{name}' with lines, the map has {have}")
-    return [entry for entry in entries.obstacles if entry.name in names]
+            raise MapError(f"{find_map(path)}: there is no obstacle '{name}' with lines; the map has {have}")
+    return [entry for entry in obstacles if entry.name in names]
 
 
 def line_faces(obstacles: Sequence[ObstacleEntry], width: float) -> Iterator[Face]:

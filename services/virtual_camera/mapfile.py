@@ -68,7 +68,6 @@ class MapFile:
     models: tuple[ModelEntry, ...]
     blocks: tuple[BlockEntry, ...]
     overlays: tuple[OverlayEntry, ...] = ()
-    obstacles: tuple[ObstacleEntry, ...] = ()
 
 
 def _triple(node: Node, names: str) -> Vector3:
@@ -168,5 +167,10 @@ def read_map(path: Path) -> MapFile:
     _limit(file, "models", sum(len(m.instances) for m in models), MAX_INSTANCES)
     _limit(file, "blocks", sum(len(b.instances) for b in blocks), MAX_BLOCKS)
     overlays = tuple(o for o in map(_overlay, root.items("overlay")) if o)
-    obstacles = tuple(o for o in map(_obstacle, root.items("obstacles")) if o)
-    return MapFile(file, models, blocks, overlays, obstacles)
+    return MapFile(file, models, blocks, overlays)
+
+
+def read_obstacles(path: Path) -> tuple[ObstacleEntry, ...]:
+    """The map's obstacles that have lines; MapError names the file and the JSON path."""
+    root = Node.load(find_map(path))
+    return tuple(o for o in map(_obstacle, root.items("obstacles")) if o)

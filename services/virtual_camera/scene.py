@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from services.virtual_camera.camera import Array
-from services.virtual_camera.faces import Covering, Face, TextureMap, box_faces
 from services.virtual_camera.clutter import clutter
 from services.virtual_camera.crowd import Crowd
+from services.virtual_camera.faces import Covering, Face, TextureMap, box_faces
 from services.virtual_camera.light import Light
 from services.virtual_camera.lines import line_faces, pick
 from services.virtual_camera.mapfile import BlockEntry, MapFile, ModelEntry, OverlayEntry, Vector3, read_map
@@ -82,7 +82,7 @@ def _block_faces(entry: BlockEntry) -> list[Face]:
 
 def _faces(entries: MapFile, wishes: Wishes) -> Iterator[Face]:
     blocks = [face for block in entries.blocks for face in _block_faces(block)]
-    lines = pick(entries, wishes.lines)
+    lines = pick(entries.path, wishes.lines)
     for face in [*(blocks or [_default_floor()]), *line_faces(lines, wishes.line_width)]:
         yield face.shaded(wishes.light.on(face.normal))
 

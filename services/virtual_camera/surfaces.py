@@ -110,7 +110,7 @@ def _draw_band(image: Image, polygon: Array, inverse: Array, paint: TextureMap, 
         cv2.warpPerspective(canvas, warp, size, dst=window, flags=flags, borderMode=border)
         _shade(window, paint.shade)
         return
-    picture = cv2.warpPerspective(canvas, warp, size, flags=flags, borderMode=border)
+    picture = np.asarray(cv2.warpPerspective(canvas, warp, size, flags=flags, borderMode=border), np.uint8)
     _shade(picture, paint.shade)
     mask = np.zeros(window.shape[:2], np.uint8)
     fill_fixed(mask, fixed(inset(polygon, OVERLAPPING) - [left, top]), (255,))
@@ -119,7 +119,7 @@ def _draw_band(image: Image, polygon: Array, inverse: Array, paint: TextureMap, 
 
 def _shade(picture: Image, shade: float) -> None:
     if shade != 1.0:
-        cv2.multiply(picture, (shade, shade, shade, 1.0), dst=picture)
+        cv2.multiply(picture, np.array([shade, shade, shade, 1.0]), dst=picture)
 
 
 def _lookup(polygon: Array, inverse: Array, paint: TextureMap, level: int) -> tuple[Array, Image, int]:
