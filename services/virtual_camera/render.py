@@ -11,6 +11,7 @@ from services.virtual_camera.camera import Pinhole, Pose, View
 from services.virtual_camera.faces import Face
 from services.virtual_camera.raster import Image, fill_fixed
 from services.virtual_camera.scene import Scene
+from services.virtual_camera.shading import Piece
 from services.virtual_camera.surfaces import cover_face, draw_backdrop, draw_face
 
 Labels = npt.NDArray[np.int32]
@@ -24,7 +25,7 @@ class Renderer:
         self.camera = Pinhole(width, height, fovy)
         self.scene = scene
         self._tree = Tree(list(scene.faces))
-        self.bodies = Bodies(scene.crowds, self._tree, scene.light)
+        self.bodies = Bodies(scene.crowds, self._tree, scene.light, scene.faces)
 
     def render(self, pose: Pose, out: Image | None = None) -> Image:
         """What a camera sees: (height, width, 4) in the order B, G, R, A.
@@ -43,16 +44,16 @@ class Renderer:
                     fill_fixed(image, points, colour)
         return image
 
-    def labels(self, pose: Pose) -> tuple[Labels, list[Drawn]]:
-        """For each pixel (height, width) the number of the body that it shows, or -1; and all bodies that are drawn."""
+    def labels(self, pose: Pose) -> tuple[Labels, dict[int, list[Piece]]]:
+        """For each pixel (height, width) the number of the body that it shows, or -1; and all that is drawn of each."""
         view = self.camera.view(pose)
         image = np.full((self.camera.height, self.camera.width), -1, np.int32)
-        bodies = []
+        bodies: dict[int, list[Piece]] = {}
         for item in self._back_to_front(view):
             if isinstance(item, Face):
                 cover_face(image, view, item, -1)
             else:
-                bodies.append(item)
+                bodies.setdefault(item[0], []).extend(item[1])
                 for points, _ in item[1]:
                     fill_fixed(image, points, (item[0],))
         return image, bodies
