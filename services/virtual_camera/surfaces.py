@@ -12,6 +12,8 @@ from services.virtual_camera.faces import Face, TextureMap
 from services.virtual_camera.raster import OVERLAPPING, Colour, Image, fill, fill_fixed, fixed, inset
 
 _DEPTH = np.array([0.0, 0.0, 1.0])
+_UNDER = 3.0
+"""So many pixels below the horizon the sky ends: the ground hides that."""
 _SHARPER = 0.3
 """Levels change this much (in octaves of resolution) later than where sizes match best."""
 
@@ -23,11 +25,14 @@ def corner_rays(camera: Pinhole) -> Array:
 
 
 def draw_backdrop(image: Image, view: View, sky: Colour, ground: Colour) -> None:
-    """Sky everywhere, then ground wherever the line of sight falls."""
-    cv2.rectangle(image, (0, 0), (image.shape[1], image.shape[0]), sky, cv2.FILLED)
-    below = clip(corner_rays(view.camera), -view.axes[:, 2], 0.0)
+    """Sky down to a little below the horizon, then ground wherever the line of sight falls."""
+    rays, camera = corner_rays(view.camera), view.camera
+    above = clip(rays, view.axes[:, 2], _UNDER * float(np.linalg.norm(view.axes[:2, 2])) / camera.focal)
+    if len(above):
+        fill_fixed(image, fixed(camera.project(above)), sky)
+    below = clip(rays, -view.axes[:, 2], 0.0)
     if len(below):
-        fill(image, view.camera.project(below), ground)
+        fill(image, camera.project(below), ground)
 
 
 def draw_face(image: Image, view: View, face: Face) -> None:
