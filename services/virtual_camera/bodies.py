@@ -41,6 +41,11 @@ class Bodies:
         self._solids = list(self._cut_up(tree, faces))
         self._append(self._solids)
 
+    @property
+    def solids(self) -> int:
+        """How many solids stand in for bodies that intersect."""
+        return len(self._solids)
+
     def _cut_up(self, tree: Tree, faces: Sequence[Face]) -> Iterator[Solid]:
         """Solids in place of the bodies that intersect; those bodies are not drawn any more."""
 
