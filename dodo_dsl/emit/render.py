@@ -13,6 +13,7 @@ from dodo_dsl import data
 from dodo_dsl.emit.containers import containers
 from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
+from dodo_dsl.plan.variables import dotenv_line
 
 _SERVICE_DEPTH = 2
 _MOST_BLOCKS = 10_000
@@ -72,7 +73,7 @@ def _templates() -> jinja2.Environment:
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
         keep_trailing_newline=True,
     )
-    environment.filters.update(yaml=_yaml, yaml_block=_yaml_block)
+    environment.filters.update(yaml=_yaml, yaml_block=_yaml_block, dotenv=dotenv_line)
     return environment
 
 
