@@ -257,8 +257,15 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
             "yaml-syntax",
             f"not YAML: {problem}",
         )
-    span = Span(file, mark.line + 1, mark.column + 1)
     lines = text.splitlines()
+    begin = getattr(error, "context_mark", None)
+    if mark.line >= len(lines) and begin:  # what is never closed is shown where it is opened
+        mark = begin
+    context = getattr(error, "context", None) or ""
+    if "simple key" in context and begin:
+        key = Span(file, begin.line + 1, begin.column + 1)
+        return Diagnostic(key, "yaml-syntax", "not YAML: expected 'key: value', with a blank after the colon")
+    span = Span(file, mark.line + 1, mark.column + 1)
     line = lines[mark.line] if mark.line < len(lines) else ""
     indent = line[: len(line) - len(line.lstrip())]
     if "\t" in indent or line[mark.column : mark.column + 1] == "\t":
@@ -269,7 +276,6 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
             "a tab character indents this line",
             "YAML takes spaces only",
         )
-    context, begin = getattr(error, "context", None), getattr(error, "context_mark", None)
     where = f" {context} that begins at line {begin.line + 1}" if context and begin else ""
     return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}{where}")
 

@@ -13,10 +13,12 @@ from dodo_dsl.spec import rig
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.schema import validate
 
-_ODVD_PLACE = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+): (?P<text>.+)", re.DOTALL)
+_ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
+_FROM_HERE = "paths count from the folder of dodo.yml"
+_NETWORK = "for example 10.213.0.0/16"
 DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 
@@ -99,7 +101,7 @@ def _folders(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tup
     for item in _texts(entry):
         folder = data.registry() if item.text == SHIPPED else (root / item.text).resolve()
         if not folder.is_dir():
-            problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'"))
+            problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'", _FROM_HERE))
         folders.append(folder)
     return tuple(folders)
 
@@ -110,7 +112,7 @@ def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple
         if (root / item.text).is_file():
             files.append(root / item.text)
         else:
-            problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'"))
+            problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'", _FROM_HERE))
     return tuple(files)
 
 
@@ -127,7 +129,7 @@ def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnosti
         place = _ODVD_PLACE.fullmatch(str(error))
         span, text = entry.key, str(error)
         if place:
-            span, text = Span(place["file"], int(place["line"]), int(place["column"])), place["text"]
+            span, text = Span(place["file"], int(place["line"] or 1), int(place["column"] or 1)), place["text"]
         problems.append(Diagnostic(span, "wrong-messages", text))
 
 
@@ -168,7 +170,7 @@ def _subnets(entry: Entry | None, problems: list[Diagnostic]) -> ipaddress.IPv4N
     try:
         network = ipaddress.IPv4Network(entry.value.text)
     except ValueError as error:
-        problems.append(Diagnostic(entry.value.span, "wrong-value", f"no IPv4 network: {error}"))
+        problems.append(Diagnostic(entry.value.span, "wrong-value", f"no IPv4 network: {error}", _NETWORK))
         return DEFAULT_SUBNETS
     if network.prefixlen > 28:
         message = f"'{entry.value.text}' is too small, every test needs a /28"

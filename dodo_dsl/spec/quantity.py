@@ -61,6 +61,8 @@ def convert(value: object, unit: str) -> Decimal:
         raise QuantityError(f"expected a quantity in {unit}", _example("1", unit))
     text = str(value)
     match = _QUANTITY.fullmatch(text)
+    if unit == SHARE and (not match or _DIMENSION.get(match["unit"] or SHARE) != "share"):
+        raise QuantityError(f"'{text}' is no share", "write for example 0.5 or 50 %")
     if not match:
         raise QuantityError(f"'{text}' is not a quantity in {unit}", _example("1", unit))
     if match["unit"] is None and unit == SHARE:

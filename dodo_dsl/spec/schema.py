@@ -49,7 +49,8 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
 
 def _tags(node: Node) -> Iterator[Diagnostic]:
     if node.tag:
-        yield Diagnostic(node.span, "yaml-tag", f"tag '{node.tag}' has no meaning here", "remove it; values are plain")
+        tag = node.tag.replace("tag:yaml.org,2002:", "!!")
+        yield Diagnostic(node.span, "yaml-tag", f"tag '{tag}' has no meaning here", "remove it; values are plain")
     if isinstance(node, Mapping):
         for entry in node.entries.values():
             yield from _tags(entry.value)
@@ -110,8 +111,9 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
     message = f"{place.name} {found}, expected {' or '.join(names)}"
-    hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and _kind(error.instance) != "object" else ""
-    yield Diagnostic(place.span, "wrong-type", message, hint if error.instance is not None else "")
+    is_scalar = isinstance(error.instance, int | float)
+    hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
+    yield Diagnostic(place.span, "wrong-type", message, hint)
 
 
 def _kind(value: object) -> str:
@@ -136,7 +138,7 @@ def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{place.name} is {_shown(error.instance)}, expected {error.validator_value}"
-    yield Diagnostic(place.span, "wrong-value", message)
+    yield Diagnostic(place.span, "wrong-value", message, error.schema.get("description", ""))
 
 
 def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -147,7 +149,8 @@ def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
     hint = ""
     if isinstance(error.instance, str):
         plain_name = re.sub(r"[^a-z0-9]+", "-", error.instance.lower()).strip("-")
-        hint = f"for example '{plain_name[:40]}'" if plain_name and plain_name != error.instance else ""
+        fits = re.search(error.schema.get("pattern", ""), plain_name[:40])
+        hint = f"for example '{plain_name[:40]}'" if fits and plain_name not in ("", error.instance) else ""
     yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} cannot stand here, expected {expected}", hint)
 
 
@@ -158,7 +161,8 @@ def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _too_few(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected at least one entry")
+    expected = "a text" if isinstance(error.instance, str) else "at least one entry"
+    yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected {expected}")
 
 
 def _fallback(error: Any, place: _Place) -> Iterator[Diagnostic]:

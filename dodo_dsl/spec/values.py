@@ -108,7 +108,7 @@ def _bare_number(parameter: Parameter, scalar: Scalar) -> Decimal:
     wanted: type | tuple[type, ...] = int if whole else (int, float)
     if isinstance(scalar.value, bool) or not isinstance(scalar.value, wanted):
         expected = "a whole number" if whole else "a number"
-        rule = "wrong-unit" if re.match(r"[-+.\d]+\s*[A-Za-z%]", scalar.text) else "wrong-type"
+        rule = "wrong-unit" if re.match(r"[-+.]*\d[.\d]*\s*[A-Za-z%]", scalar.text) else "wrong-type"
         message = f"{_name(parameter)} is '{scalar.text}', expected {expected} without a unit"
         raise ValueProblem(scalar.span, rule, message)
     number = Decimal(str(scalar.value))
@@ -122,7 +122,7 @@ def _bare_number(parameter: Parameter, scalar: Scalar) -> Decimal:
 def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:
     low, high = parameter.minimum, parameter.maximum
     if (low is not None and number < Decimal(str(low))) or (high is not None and number > Decimal(str(high))):
-        unit = f" {parameter.unit}" if parameter.unit else ""
+        unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
         if low is not None and high is not None:
             expected = f"{low:g} to {high:g}{unit}"
         else:
@@ -177,7 +177,8 @@ def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     for item in items:
         text = _text(parameter, item, root).text
         if "," in text:
-            raise ValueProblem(item.span, "wrong-value", f"{_name(parameter)}: '{text}' may not hold a comma")
+            message = f"{_name(parameter)}: '{text}' may not hold a comma"
+            raise ValueProblem(item.span, "wrong-value", message, "write two items: [left, right]")
         texts.append(text)
     return Value(",".join(texts))
 

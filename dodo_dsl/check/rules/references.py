@@ -15,7 +15,7 @@ from dodo_dsl.source import Entry, Scalar, Sequence
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Use
-from dodo_dsl.spec.values import ValueProblem
+from dodo_dsl.spec.values import ValueProblem, convert
 
 _MAP = "map.json"
 _MAX_BYTES = 20 << 20
@@ -32,17 +32,21 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def _among(context: Context, use: Use, manifest: Manifest, parameter: Parameter, entry: Entry) -> Iterator[Diagnostic]:
+    try:
+        convert(parameter, entry.value, context.spec.location.root)
+    except ValueProblem:
+        return
     source, _, key = parameter.among.partition(".")
     file = _file(context, use, manifest.parameters[source])
     if file is None:
         return
     names = _names(file, key)
     if isinstance(names, str):
-        yield Diagnostic(entry.value.span, "wrong-file", f"{file.name}: {names}", "see docs/maps.md")
+        yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", "see docs/maps.md")
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
     for item in items:
-        if isinstance(item, Scalar) and item.text not in names:
+        if isinstance(item, Scalar) and item.text not in names and "${matrix" not in item.text:
             message = f"there is no '{item.text}' among the {key} of {file.parent.name}/{file.name}"
             yield Diagnostic(item.span, "unknown-name", message, did_you_mean(item.text, names))
 
