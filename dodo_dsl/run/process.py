@@ -211,7 +211,8 @@ class ProcessBackend:
         for name, value in service.environment.items():
             own[name] = variables.get(name, "") if value is None else interpolate(value, variables)
         own = {name: told.get(name, with_cid_text(value, self.lane.cid)) for name, value in own.items()}
-        words = tuple(interpolate(word, variables) for word in service.command)
+        told_words = ((word, interpolate(word, variables)) for word in service.command)
+        words = tuple(value for word, value in told_words if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.lane.cid), self.lane.memory_prefix)
         environment = {**inherited, **own, "DODO_LANE": self.lane.name}
         return Command(service.name, "application", argv, environment, folder)
