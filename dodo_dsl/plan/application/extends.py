@@ -54,8 +54,8 @@ def _found(
         files.problem(word.span, f"there is no service '{base.name}' to extend", did_you_mean(base.name, entries))
         return None
     if base in chain or len(chain) > MAX_DEPTH:
-        way = "in a circle" if base in chain else f"over more than {MAX_DEPTH} services"
-        files.problem(word.span, f"'{chain[0].name}' extends '{base.name}' {way}")
+        way = " extends ".join(f"'{service.name}'" for service in (*chain, base))
+        files.problem(word.span, way if base in chain else f"'{chain[0].name}' extends more than {MAX_DEPTH} services")
         return None
     node = merge.settled(extended(files, base, entries[base.name].value, chain))
     return moved(node, base.folder, chain[-1].folder)

@@ -56,9 +56,14 @@ def plain(node: Node) -> Any:
         return {key: plain(entry.value) for key, entry in node.entries.items()}
     if isinstance(node, source.Sequence):
         return [plain(item) for item in node.items]
-    if isinstance(node.value, int) and node.text.isdigit() and node.text[:1] == "0":
-        return int(node.text, 8) if set(node.text) <= set("01234567") else node.value
-    return node.value
+    return _number(node.value, node.text) if isinstance(node.value, int) else node.value
+
+
+def _number(value: int, written: str) -> int | float:
+    """A whole number; beyond 64 bits compose knows it as a float only."""
+    if written[:1] == "0" and set(written) <= set("01234567"):
+        value = int(written, 8)
+    return value if -(1 << 63) <= value < 1 << 64 else float(value)
 
 
 def text(value: object) -> str:

@@ -48,12 +48,13 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_keys, _name, _words, _references, _namespaces, _mounts, _external, _hardware, _single):
+    for rule in (_name, _words, _references, _namespaces, _mounts, _external, _hardware, _single):
         yield from rule(written)
 
 
-def _keys(written: Written) -> Iterator[Diagnostic]:
-    for word, entry in written.node.entries.items():
+def unknown_keys(service: Node) -> Iterator[Diagnostic]:
+    """Keys for DoDo that DoDo does not know."""
+    for word, entry in service.entries.items() if isinstance(service, source.Mapping) else ():
         if word.startswith("x-dodo") and word not in KEYS:
             hint = did_you_mean(word, KEYS)
             yield Diagnostic(entry.key, "unknown-key", f"DoDo knows no key '{word}'", hint)
@@ -96,7 +97,7 @@ def _namespaces(written: Written) -> Iterator[Diagnostic]:
     if service.get("pid") == "host":
         yield _shared(written.place("pid"), "'pid: host' shows the processes of all tests", "remove it")
     if hazards.is_true(service.get("use_api_socket", False)):
-        yield _shared(written.place("use_api_socket"), "this hands over the Docker engine", _SOCKET_HINT)
+        yield _shared(written.place("use_api_socket"), "'use_api_socket' hands over the Docker engine", _SOCKET_HINT)
 
 
 def _mounts(written: Written) -> Iterator[Diagnostic]:

@@ -1,5 +1,6 @@
 """``read_application``: compose files as DoDo understands them, or what is wrong with them."""
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from dodo_dsl.plan.application.files import Files
 from dodo_dsl.plan.application.hazards import references
 from dodo_dsl.plan.application.load import load
 from dodo_dsl.plan.application.model import ApplicationSource, declared, environment, plain, text
-from dodo_dsl.plan.application.problems import Written, problems
+from dodo_dsl.plan.application.problems import Written, problems, unknown_keys
 from dodo_dsl.plan.variables import names
 from dodo_dsl.spec.schema import validate
 
@@ -28,6 +29,8 @@ def read_application(path: Path | Sequence[Path]) -> tuple[ApplicationSource | N
     if document is not None and not has_errors(found):
         found = [*found, *validate(document, "application")]
     services = document.get("services") if document else None
+    if isinstance(services, source.Mapping):
+        found = [*found, *itertools.chain.from_iterable(unknown_keys(e.value) for e in services.entries.values())]
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
     application = _application(paths[0].resolve(), document, services, files.variables)
