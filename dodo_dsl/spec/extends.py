@@ -44,7 +44,8 @@ def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, lis
     problems = [*found, *deeper]
     assert isinstance(below, Mapping), "a mapping resolves to one"
     inherited = Mapping(base.span, {key: entry for key, entry in below.entries.items() if key not in _OWN})
-    return _merge(inherited, node, problems), problems
+    own = Mapping(node.span, {key: entry for key, entry in node.entries.items() if key != KEY}, node.tag)
+    return _merge(inherited, own, problems), problems
 
 
 @functools.lru_cache(maxsize=256)

@@ -36,14 +36,19 @@ def _validator(name: str) -> Any:
             yield ValidationError(str(error))
 
     schema = json.loads((data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
+    schema.get("$defs", {}).get("use", {}).pop("allOf", None)  # for editors; here the rules say it, and better
     return extend(Draft202012Validator, {_UNIT: is_quantity})(schema)  # type: ignore[no-untyped-call]
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
     """All violations of ``schemas/<schema>.schema.json``; tags are refused as well."""
     found = list(_tags(node))
-    for error in _validator(schema).iter_errors(plain(node)):
-        found.extend(_TRANSLATORS.get(error.validator, _fallback)(error, _locate(node, error.absolute_path)))
+    validator = _validator(schema)
+    for error in validator.iter_errors(plain(node)):
+        place = _locate(node, error.absolute_path)
+        if not error.absolute_path:
+            place.about = validator.schema.get("properties", {})
+        found.extend(_TRANSLATORS.get(error.validator, _fallback)(error, place))
     return found
 
 
@@ -66,6 +71,7 @@ class _Place:
         self.node = node
         self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
         self.name = name
+        self.about: dict[str, Any] = {}
 
     def key(self, name: str) -> Span:
         entries = self.node.entries if isinstance(self.node, Mapping) else {}
@@ -98,7 +104,7 @@ def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
 def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
     # jsonschema reports each missing key by itself, in the order of the schema
     missing = next(n for n in error.validator_value if n not in error.instance and f"'{n}'" in error.message)
-    about = error.schema.get("properties", {}).get(missing, {})
+    about = (error.schema.get("properties") or place.about).get(missing, {})
     hint = about.get("description", "") if isinstance(about, dict) else ""
     yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
 
