@@ -157,7 +157,6 @@ def test_variables_nest(text: str, expected: str) -> None:
 
 
 KEYS = {
-    "image": st.text(max_size=8).filter(bool),
     "command": st.text(max_size=20) | st.lists(st.text(max_size=8) | st.integers() | st.booleans(), max_size=3),
     "environment": st.dictionaries(st.text(max_size=5), st.none() | st.text(max_size=8) | st.floats(), max_size=3)
     | st.lists(st.sampled_from(["CID", "CID=1", "A=--cid=3", "="]), max_size=3),
@@ -181,9 +180,9 @@ KEYS = {
         st.none() | st.text() | st.integers(), lambda x: st.lists(x) | st.dictionaries(st.text(), x)
     ),
 }
-SERVICES = st.fixed_dictionaries(
-    {"b": st.fixed_dictionaries({}, optional=KEYS)}, optional={"a": st.fixed_dictionaries({}, optional=KEYS)}
-)
+IMAGE = {"image": st.text(min_size=1, max_size=8)}
+SERVICE = st.fixed_dictionaries(IMAGE, optional=KEYS)
+SERVICES = st.fixed_dictionaries({"b": SERVICE}, optional={"a": SERVICE})
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)

@@ -64,6 +64,8 @@ def _name(written: Written) -> Iterator[Diagnostic]:
     name = written.name
     if name == SANDBOX or name.startswith("dodo-"):
         yield _bad(written.key, f"the name '{name}' is kept for DoDo's own services")
+    if not any(written.plain.get(key) for key in ("image", "build", "x-dodo-process")):
+        yield _bad(written.key, f"'{name}' has neither 'image' nor 'build', so nothing can be started")
 
 
 def _words(written: Written) -> Iterator[Diagnostic]:
