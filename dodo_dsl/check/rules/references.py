@@ -65,6 +65,8 @@ def _file(context: Context, use: Use, parameter: Parameter) -> Path | None:
 def _names(file: Path, key: str) -> tuple[str, ...] | str:
     """The names of the entries of a list in a JSON file, or what is wrong with the file."""
     try:
+        if file.exists() and not file.is_file():
+            return "this is no plain file"
         if file.stat().st_size > _MAX_BYTES:
             return f"larger than {_MAX_BYTES >> 20} MiB"
         document = json.loads(file.read_text(encoding="utf-8"))
