@@ -12,6 +12,7 @@ from dodo_dsl.cli import compile as compile_command
 from dodo_dsl.cli import doctor as doctor_command
 from dodo_dsl.cli import images as images_command
 from dodo_dsl.cli import list as list_command
+from dodo_dsl.cli import rec as rec_command
 from dodo_dsl.cli import report as report_command
 from dodo_dsl.cli import run as run_command
 from dodo_dsl.cli.exits import Exit
@@ -21,6 +22,7 @@ COMMANDS: dict[str, ModuleType] = {
     "run": run_command,
     "list": list_command,
     "report": report_command,
+    "rec": rec_command,
     "images": images_command,
     "doctor": doctor_command,
 }

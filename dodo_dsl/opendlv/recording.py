@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import recording_table
 from dodo_dsl.opendlv.damage import Damage
-from dodo_dsl.opendlv.envelope import MICROSECONDS, Envelope
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.recording_scan import Batch, Scanner
 from dodo_dsl.opendlv.recording_table import PADDING, Fact
 from dodo_dsl.opendlv.varints import Marks, Numbers
@@ -26,7 +26,15 @@ BATCH_BYTES = 16 << 20
 _NEAR = 1 << 16  # bytes between frames that are read rather than jumped over
 
 _INDEX = np.dtype(
-    [("offset", "<i8"), ("sampled", "<i8"), ("size", "<u4"), ("data_type", "<i4"), ("sender_stamp", "<u4")], align=False
+    [
+        ("offset", "<i8"),
+        ("sampled", "<i8"),
+        ("time", "<i8"),
+        ("size", "<u4"),
+        ("data_type", "<i4"),
+        ("sender_stamp", "<u4"),
+    ],
+    align=False,
 )
 
 
@@ -50,8 +58,9 @@ def read_envelopes(path: Path, damage: Callable[[Damage], None] | None = None) -
 class Recording:
     """A recording with an index: a context manager whose rows can be chosen, sorted and read in any order.
 
-    The index takes 28 bytes of memory a message; `index` has the columns offset, size (bytes), data_type,
-    sender_stamp and sampled (microseconds since the epoch), a row for each message in the order of the file.
+    The index takes 36 bytes of memory a message; `index` has the columns offset, size (bytes), data_type,
+    sender_stamp, sampled and time (microseconds since the epoch), a row for each message in the order of the file.
+    `time` is the sample time, or where that is zero when the message was received, or else sent.
     """
 
     def __init__(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
@@ -79,16 +88,16 @@ class Recording:
         end: int | None = None,
         sender_stamps: Collection[int] | None = None,
     ) -> Numbers:
-        """Rows in the order of the file: of some messages and senders, sampled from `start` and before `end`."""
+        """Rows in the order of the file: of some messages and senders, their `time` from `start` to before `end`."""
         chosen: Marks = np.ones(len(self.index), np.bool_)
         if messages is not None:
             chosen &= np.isin(self.index["data_type"], list(messages))
         if sender_stamps is not None:
             chosen &= np.isin(self.index["sender_stamp"], list(sender_stamps))
         if start is not None:
-            chosen &= self.index["sampled"] >= start
+            chosen &= self.index["time"] >= start
         if end is not None:
-            chosen &= self.index["sampled"] < end
+            chosen &= self.index["time"] < end
         return np.flatnonzero(chosen)
 
     def by_time(self, rows: Numbers | None = None) -> Numbers:
@@ -166,7 +175,9 @@ def _indexed(stream: BinaryIO, progress: Callable[[int], None] | None) -> tuple[
         part["offset"] = table[Fact.START] + batch.base
         part["size"] = table[Fact.END] - table[Fact.START]
         part["data_type"], part["sender_stamp"] = table[Fact.DATA_TYPE], table[Fact.SENDER_STAMP]
-        part["sampled"] = table[Fact.SAMPLED_S] * MICROSECONDS + table[Fact.SAMPLED_US]
+        sent, received, sampled = batch.times
+        part["sampled"] = sampled
+        part["time"] = np.where(sampled, sampled, np.where(received, received, sent))
         parts.append(part)
         if progress is not None:
             progress(scanner.position)

@@ -38,9 +38,10 @@ class Batch:
         return int(self.table.shape[1])
 
     @property
-    def sample_times(self) -> Numbers:
-        """Sample times in microseconds since the epoch."""
-        times: Numbers = self.table[Fact.SAMPLED_S] * MICROSECONDS + self.table[Fact.SAMPLED_US]
+    def times(self) -> Numbers:
+        """Sent, received and sample times in microseconds since the epoch: (3, frames)."""
+        parts = self.table[Fact.SENT_S : Fact.SENDER_STAMP]
+        times: Numbers = parts[::2] * MICROSECONDS + parts[1::2]
         return times
 
     def select(self, rows: Numbers) -> "Batch":
@@ -55,8 +56,7 @@ class Batch:
     def envelopes(self) -> Iterator[Envelope]:
         """The envelopes in the order of the rows."""
         table = self.table
-        times = table[Fact.SENT_S : Fact.SENDER_STAMP : 2] * MICROSECONDS + table[Fact.SENT_US : Fact.SENDER_STAMP : 2]
-        columns = (*table[Fact.DATA_TYPE : Fact.SENT_S], *times, table[Fact.SENDER_STAMP])
+        columns = (*table[Fact.DATA_TYPE : Fact.SENT_S], *self.times, table[Fact.SENDER_STAMP])
         data = self.data
         for kind, at, end, sent, received, sampled, stamp in zip(*(c.tolist() for c in columns), strict=True):
             yield Envelope(kind, data[at:end], sent, received, sampled, stamp)

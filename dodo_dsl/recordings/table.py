@@ -51,6 +51,13 @@ def write(
     return +undecodable
 
 
+def names(recording: Recording, messages: MessageSet, rows: Numbers) -> list[str]:
+    """The files that `write` makes of rows with known messages."""
+    index = recording.index[rows]
+    keys = np.unique(index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]).tolist()
+    return [f"{messages.name(key >> 32)}-{key & 0xFFFFFFFF}.csv" for key in keys]
+
+
 def _header(layout: Layout) -> str:
     return "".join(f"{name};" for name in (*TIMES, *(name for name, _ in payload_columns.names(layout)))) + "\n"
 
