@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.source import Entry, Scalar, Sequence
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Use
@@ -45,7 +45,7 @@ def _among(context: Context, use: Use, manifest: Manifest, parameter: Parameter,
         yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", "see docs/maps.md")
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
-    for item in items:
+    for item in items[:MAX_PROBLEMS]:
         if isinstance(item, Scalar) and item.text not in names and "${matrix" not in item.text:
             message = f"there is no '{item.text}' among the {key} of {file.parent.name}/{file.name}"
             yield Diagnostic(item.span, "unknown-name", message, did_you_mean(item.text, names))
