@@ -61,8 +61,9 @@ def test_a_model_that_is_seen_has_a_box_around_its_pixels(straight, x, y, z, yaw
     for number, box in found.items():
         rows, columns = np.nonzero(labels == number)
         left, right, top, bottom = edges(box)
-        assert left - 1 <= columns.min() and columns.max() + 1 <= right + 1
-        assert top - 1 <= rows.min() and rows.max() + 1 <= bottom + 1
+        seen = columns.min(), columns.max() + 1, rows.min(), rows.max() + 1
+        outside = np.array([left - seen[0], seen[1] - right, top - seen[2], seen[3] - bottom])
+        assert outside.max() < 1.5
         assert 0 < box.visible <= 1
 
 
@@ -98,7 +99,7 @@ def test_a_cut_model_has_a_cut_box_and_the_share_that_is_inside(cube_at):
     left = 2 * 320 / FOCAL  # where the picture ends at 2 m
     (box,) = boxes(cube_at([2.5, left, 0, 0]), Pose.at(0, 0, 0.5))
     assert box.left == 0
-    assert box.width == pytest.approx(FOCAL * 0.5 / 2, abs=1)
+    assert box.width == pytest.approx(320 - FOCAL * (left - 0.5) / 3, abs=0.01)  # its far right edge, at 3 m
     assert box.visible < 0.7
     assert boxes(cube_at([2.5, left, 0, 0]), Pose.at(0, 0, 0.5), Limits(0.8, 0)) == []
 
