@@ -1,7 +1,7 @@
 # The developer's front door. `make demo` and `make test` set up what they need.
 DODO := .venv/bin/dodo
 
-.PHONY: help demo test lint bench format goldens clean
+.PHONY: help demo test lint bench format goldens schema clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
@@ -9,12 +9,13 @@ help:
 	@echo "make bench    measure, beside a peer in the same run"
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
+	@echo "make schema   put what manifests say into the schema that editors read"
 	@echo "make clean    remove what was built"
 
 demo:
 	@scripts/setup
 	$(DODO) compile
-	$(DODO) run
+	$(DODO) run 'sil-closed-*'
 
 lint:
 	@scripts/setup dev
@@ -25,6 +26,7 @@ lint:
 
 test: lint
 	@scripts/install-compose
+	@scripts/install-gitlab-ci-local
 	@scripts/start-engine
 	.venv/bin/pytest
 
@@ -40,6 +42,10 @@ format:
 goldens:
 	@scripts/setup dev
 	.venv/bin/pytest -q tests/compiler --update-goldens
+
+schema:
+	@scripts/setup dev
+	@scripts/make-schema
 
 clean:
 	rm -rf .venv build dist generated dodo-report .pytest_cache .mypy_cache .ruff_cache .hypothesis

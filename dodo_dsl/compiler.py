@@ -1,11 +1,14 @@
 """The compiler from end to end: from paths to checked specs, and on to Plans."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl.check import check
-from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, ordered
+from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
+from dodo_dsl.emit.pipeline import pipeline_problems
+from dodo_dsl.emit.render import render_pipeline
+from dodo_dsl.emit.write import pipeline_folder
 from dodo_dsl.plan.application import ApplicationSource, read_application
 from dodo_dsl.plan.build import Compiled, build
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
@@ -34,20 +37,23 @@ class NoApplication(Exception):
     """Plans need an application, and neither the command line nor a deployment names one."""
 
 
-def load(paths: Sequence[Path], application: Path | None = None, start: Path | None = None) -> Checked:
-    """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any."""
+def load(paths: Sequence[Path], application: Sequence[Path] = (), start: Path | None = None) -> Checked:
+    """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
+
+    ``application`` are compose files that count instead of the deployment's.
+    """
     deployment, found = load_deployment(find_deployment(start or Path.cwd()))
-    manifests, manifest_problems = load_manifests()
+    manifests, manifest_problems = load_manifests(deployment.services)
     locations, empty = locate(paths, deployment.registry, _registries_above(paths))
     loaded = [load_spec(location) for location in locations]
-    specs = tuple(spec for spec, _ in loaded)
+    specs = tuple(spec for instances, _ in loaded for spec in instances)
     found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
-    found.extend(check(specs, manifests))
-    file = application or deployment.application
+    files = application or deployment.application
     source = None
-    if file is not None:
-        source, problems = read_application(file)
+    if files:
+        source, problems = read_application(files)
         found.extend(problems)
+    found.extend(check(specs, manifests, deployment, source.declared if source else None))
     return Checked(deployment, manifests, specs, tuple(ordered(found)), source, tuple(empty))
 
 
@@ -62,9 +68,10 @@ def plan(checked: Checked, out: Path) -> tuple[Compiled, tuple[Diagnostic, ...]]
     if checked.application is None:
         raise NoApplication
     compiled, problems = build(checked.specs, checked.manifests, checked.deployment, checked.application, out.resolve())
+    child = render_pipeline(compiled.suite, pipeline_folder(out))
+    files = {spec.slug: str(spec.path) for spec in checked.specs}
+    shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
+    for problem in pipeline_problems(compiled.suite, child.text):
+        span = replace(problem.span, file=shown.get(problem.span.file, problem.span.file))
+        problems.append(replace(problem, span=span))
     return compiled, tuple(ordered(problems))
-
-
-def place_of_nothing(path: Path) -> Diagnostic:
-    """The diagnostic for a path that holds no spec."""
-    return Diagnostic(Span(str(path)), "missing-file", f"there is no test at '{path}'", "specs end in .dodo.yml")

@@ -43,6 +43,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
     if diagnostics or style != "text":
         stdout.write(FORMATS[style](diagnostics))
+    if diagnostics and style == "text":
+        rules = {diagnostic.rule for diagnostic in diagnostics}
+        stdout.write(f"dodo explain {rules.pop() if len(rules) == 1 else 'RULE'} says more\n")
 
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

@@ -43,10 +43,11 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 def _tests(checked: Checked) -> list[dict[str, str]]:
     return [
         {
-            "name": spec.name or spec.location.stem,
+            "name": spec.title,
             "level": spec.level or "?",
             "kind": spec.kind or "?",
             "description": spec.description or "",
+            "slug": spec.slug,
             "file": shown_path(str(spec.path)),
         }
         for spec in checked.specs

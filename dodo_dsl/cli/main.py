@@ -10,8 +10,10 @@ from typing import TextIO
 from dodo_dsl import __version__
 from dodo_dsl.cli import compile as compile_command
 from dodo_dsl.cli import doctor as doctor_command
+from dodo_dsl.cli import explain as explain_command
 from dodo_dsl.cli import images as images_command
 from dodo_dsl.cli import list as list_command
+from dodo_dsl.cli import new as new_command
 from dodo_dsl.cli import rec as rec_command
 from dodo_dsl.cli import report as report_command
 from dodo_dsl.cli import run as run_command
@@ -21,6 +23,8 @@ COMMANDS: dict[str, ModuleType] = {
     "compile": compile_command,
     "run": run_command,
     "list": list_command,
+    "explain": explain_command,
+    "new": new_command,
     "report": report_command,
     "rec": rec_command,
     "images": images_command,

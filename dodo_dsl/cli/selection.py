@@ -20,26 +20,29 @@ def add_application(parser: argparse.ArgumentParser) -> None:
         "--application",
         metavar="FILE",
         type=Path,
-        help="the application's compose file (default: dodo.yml's)",
+        action="append",
+        default=[],
+        help="the application's compose file, or several that are merged (default: dodo.yml's)",
     )
 
 
-def existing_file(path: Path | None) -> Path | None:
-    """The path, or NoSuchTest with a sentence when there is no such file."""
-    if path is not None and not path.is_file():
-        raise NoSuchTest(f"there is no file '{path}', expected the application's compose file")
-    return path
+def existing_files(paths: Sequence[Path]) -> Sequence[Path]:
+    """The paths, or NoSuchTest with a sentence when there is no such file."""
+    for path in paths:
+        if not path.is_file():
+            raise NoSuchTest(f"there is no file '{path}', expected the application's compose file")
+    return paths
 
 
 def _is_path(word: str) -> bool:
     return "/" in word or word.endswith(SUFFIX) or Path(word).is_dir()
 
 
-def select(words: Sequence[str], levels: Sequence[str], application: Path | None) -> Checked:
+def select(words: Sequence[str], levels: Sequence[str], application: Sequence[Path]) -> Checked:
     """The checked specs that the words mean (all without any), kept to the levels; raises NoSuchTest."""
     paths = [Path(word) for word in words if _is_path(word)]
     names = [word for word in words if not _is_path(word)]
-    checked = load(paths, existing_file(application))
+    checked = load(paths, existing_files(application))
     if checked.empty:
         raise NoSuchTest(f"there is no test at '{checked.empty[0]}'; specs end in .dodo.yml")
     if names:
@@ -47,8 +50,8 @@ def select(words: Sequence[str], levels: Sequence[str], application: Path | None
         if paths:
             checked = load([*paths, *checked.deployment.registry], application)
         others = [spec for spec in checked.specs if spec.path not in given]
-        chosen = {spec.path for word in names for spec in _named(word, others)}
-        checked = _narrowed(checked, [spec for spec in checked.specs if spec.path in given | chosen])
+        chosen = {spec.slug for word in names for spec in _named(word, others)}
+        checked = _narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
     if levels:
         kept = tuple(s for s in checked.specs if s.level in levels)
         if not kept:
@@ -58,7 +61,8 @@ def select(words: Sequence[str], levels: Sequence[str], application: Path | None
 
 
 def _named(word: str, specs: Sequence[Spec]) -> list[Spec]:
-    found = [s for s in specs if fnmatch.fnmatchcase(s.location.stem, word)]
+    found = [s for s in specs if word in (s.location.stem, s.title, s.slug)]
+    found = found or [s for s in specs if any(fnmatch.fnmatchcase(n, word) for n in (s.location.stem, s.slug))]
     if not found:
         hint = did_you_mean(word, [s.location.stem for s in specs])
         raise NoSuchTest(f"there is no test '{word}'" + (f"; {hint}" if hint else ""))
@@ -67,13 +71,12 @@ def _named(word: str, specs: Sequence[Spec]) -> list[Spec]:
 
 def _narrowed(checked: Checked, specs: Sequence[Spec]) -> Checked:
     """The same with fewer specs; problems of other specs no longer count, those of other files do."""
-    kept = {str(s.path): s for s in specs}
-    dropped = {str(s.path) for s in checked.specs} - set(kept)
+    dropped = {str(s.path) for s in checked.specs} - {str(s.path) for s in specs}
     diagnostics = tuple(d for d in checked.diagnostics if d.span.file not in dropped)
     return Checked(
         checked.deployment,
         checked.manifests,
-        tuple(kept.values()),
+        tuple(specs),
         diagnostics,
         checked.application,
         checked.empty,

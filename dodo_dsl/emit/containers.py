@@ -18,6 +18,8 @@ class Container:
     volumes: tuple[str, ...]
     ready_file: str
     after: tuple[tuple[str, str], ...]
+    environment: tuple[tuple[str, str], ...]
+    devices: tuple[str, ...]
 
 
 def containers(plan: Plan, layer: str) -> list[Container]:
@@ -34,6 +36,8 @@ def containers(plan: Plan, layer: str) -> list[Container]:
             _volumes(plan, service),
             f"/tmp/dodo-ready-{service.name}",
             tuple(after),
+            _environment(plan, service),
+            service.devices,
         )
         for service in plan.layer(layer)
     ]
@@ -45,10 +49,15 @@ def _word(flag: Flag) -> str:
     return f"--{flag.name}={folder}{flag.value}".replace("$", "$$")
 
 
+def _environment(plan: Plan, service: Service) -> tuple[tuple[str, str], ...]:
+    messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
+    return (("DODO_SERVICE", service.name), *((("DODO_ODVD", messages),) if messages else ()))
+
+
 def _volumes(plan: Plan, service: Service) -> tuple[str, ...]:
     kinds = {flag.kind for flag in service.flags}
     volumes = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
-    if "path" in kinds:
+    if "path" in kinds or plan.messages:
         volumes.append(f"./files:{FILES}:ro")
     if "report" in kinds:
         volumes.append(f"report:{REPORT}")

@@ -1,21 +1,22 @@
 """Plans through the Jinja templates."""
 
 import functools
-import json
-import math
+import textwrap
 from dataclasses import dataclass
 from typing import Any
 
 import jinja2
+import orjson
 import yaml
 
 from dodo_dsl import data
 from dodo_dsl.emit.containers import containers
+from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
 
-CHILD = "child.gitlab-ci.yml"
-_STAGES = ("sil", "dil", "hil")
-_SPARE_MINUTES = 10
+_SERVICE_DEPTH = 2
+_MOST_BLOCKS = 10_000
+_BLOCKS: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -24,19 +25,6 @@ class File:
 
     path: str
     text: str
-
-
-@dataclass(frozen=True)
-class Job:
-    """A job of the child pipeline."""
-
-    name: str
-    stage: str
-    tag: str
-    gated: bool
-    minutes: int
-    interruptible: bool
-    script: str
 
 
 class _Dumper(yaml.SafeDumper):
@@ -49,13 +37,31 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _yaml_block(value: Any) -> str:
-    return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000).rstrip("\n")
+def _yaml_block(value: dict[str, Any], depth: int = 0) -> str:
+    """A compose file in block style. Tests of one application share most of it, so what lies deep is kept."""
+    parts = []
+    for key, below in value.items():
+        if isinstance(below, dict) and below and depth < _SERVICE_DEPTH:
+            head = _dumped({key: None}).removesuffix(" null")
+            parts.append(f"{head}\n{textwrap.indent(_yaml_block(below, depth + 1), '  ')}")
+        else:
+            parts.append(_dumped({key: below}))
+    return "\n".join(parts)
+
+
+def _dumped(value: dict[str, Any]) -> str:
+    key = repr(value)
+    if key not in _BLOCKS:
+        if len(_BLOCKS) >= _MOST_BLOCKS:
+            _BLOCKS.clear()
+        text: str = yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000)
+        _BLOCKS[key] = text.rstrip("\n")
+    return _BLOCKS[key]
 
 
 def _yaml(value: Any) -> str:
     """A scalar as JSON, which YAML reads as the same value whatever it holds."""
-    return json.dumps(value, ensure_ascii=False)
+    return orjson.dumps(value).decode()
 
 
 @functools.cache
@@ -99,29 +105,11 @@ def render_plan(plan: Plan) -> list[File]:
     return files
 
 
-def _jobs(suite: Suite, gated: bool, folder: str) -> list[Job]:
-    return [
-        Job(
-            name=plan.slug,
-            stage=plan.level,
-            tag=plan.tag,
-            gated=gated and plan.level == "hil",
-            minutes=math.ceil(plan.timeout_s / 60) + _SPARE_MINUTES,
-            interruptible=plan.level != "hil",
-            script=f"dodo run --compiled {folder}/{plan.slug} --report dodo-report",
-        )
-        for plan in suite.plans
-    ]
-
-
 def render_pipeline(suite: Suite, folder: str) -> File:
     """The child pipeline; ``folder`` is the output folder's name, as the parent's artifact has it."""
-    levels = {plan.level for plan in suite.plans}
-    gated = suite.gates and "hil" in levels and bool(levels & {"sil", "dil"})
-    stages = [s for s in _STAGES if s in levels]
-    if gated:
-        stages.insert(stages.index("hil"), "gate")
-    return File(CHILD, _render("child.gitlab-ci.yml.j2", stages=stages, gate=gated, jobs=_jobs(suite, gated, folder)))
+    child = pipeline(suite, folder)
+    text = _render("child.gitlab-ci.yml.j2", stages=child.stages, gate=child.gate, images=child.images, jobs=child.jobs)
+    return File(CHILD, text)
 
 
 def render(suite: Suite, folder: str) -> list[File]:

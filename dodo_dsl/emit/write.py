@@ -7,10 +7,10 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from dodo_dsl.emit.render import File, render
+from dodo_dsl.emit.render import File, render, render_pipeline, render_plan
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.files import Copy
 
@@ -44,14 +44,41 @@ def pipeline_folder(out: Path) -> str:
 
 def write(compiled: Compiled, out: Path) -> None:
     """Writes everything below ``out`` and removes tests of earlier compilations that are no longer there."""
-    for file in render(compiled.suite, pipeline_folder(out)):
+    _update(out, [render_pipeline(compiled.suite, pipeline_folder(out))])
+    for plan in compiled.suite.plans:
+        folder, files, copies = out / plan.slug, render_plan(plan), compiled.copies[plan.slug]
+        if folder.exists():
+            _update(out, files)
+            _write_copies(folder / FILES, copies)
+        else:
+            _write_new(folder, [(file.path.removeprefix(f"{plan.slug}/"), file.text) for file in files], copies)
+    for folder in _stale_folders(compiled, out):
+        shutil.rmtree(folder)
+
+
+def _update(out: Path, files: Iterable[File]) -> None:
+    for file in files:
         path = out / file.path
         if not path.is_file() or path.read_bytes() != file.text.encode():
             write_text(path, file.text)
-    for plan in compiled.suite.plans:
-        _write_copies(out / plan.slug / FILES, compiled.copies[plan.slug])
-    for folder in _stale_folders(compiled, out):
-        shutil.rmtree(folder)
+
+
+def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[Copy]) -> None:
+    """A test that is not there yet: its folder is filled beside its place and renamed as a whole."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    stage = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name[:40]}."))
+    try:
+        stage.chmod(0o755)
+        for name, text in files:
+            (stage / name).write_text(text, encoding="utf-8")
+        for parent in sorted({(stage / FILES / copy.target).parent for copy in copies}):
+            parent.mkdir(parents=True, exist_ok=True)
+        for copy in copies:
+            shutil.copyfile(copy.source, stage / FILES / copy.target)
+        stage.rename(folder)
+    except BaseException:
+        shutil.rmtree(stage, ignore_errors=True)
+        raise
 
 
 def _write_copies(folder: Path, wanted: Sequence[Copy]) -> None:
@@ -94,9 +121,11 @@ def differences(compiled: Compiled, out: Path) -> str:
 
 def _text_difference(file: File, out: Path) -> str:
     path = out / file.path
-    before = path.read_text(encoding="utf-8", errors="replace").splitlines(True) if path.is_file() else []
-    after = file.text.splitlines(True)
-    return "".join(difflib.unified_diff(before, after, f"a/{file.path}", f"b/{file.path}"))
+    before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    if before == file.text:
+        return ""
+    names = (f"a/{file.path}", f"b/{file.path}")
+    return "".join(difflib.unified_diff(before.splitlines(True), file.text.splitlines(True), *names))
 
 
 def _copy_differences(folder: Path, wanted: Sequence[Copy], out: Path) -> Iterator[str]:

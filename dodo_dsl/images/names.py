@@ -36,5 +36,6 @@ def choose(words: Sequence[str], names: Sequence[str], prefix: str, tag: str) ->
     """The images that words mean, all without any; raises NoSuchImage."""
     for word in words:
         if word not in names:
-            raise NoSuchImage(f"there is no image '{word}'; {did_you_mean(word, names)}")
+            hint = did_you_mean(word, names) or f"known: {', '.join(sorted(names))}"
+            raise NoSuchImage(f"there is no image '{word}'; {hint}")
     return [Image(name, f"{prefix}/{name}:{tag}") for name in names if name in words or not words]

@@ -1,7 +1,8 @@
 """From specs without errors to Plans."""
 
+import functools
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,11 +10,12 @@ from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
 from dodo_dsl.plan.files import Copy, FilesError, copies
-from dodo_dsl.plan.model import Flag, Place, Plan, Service, Suite
-from dodo_dsl.source import Entry
+from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
+from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.rig import EMULATED_FILE, Rig
 from dodo_dsl.spec.values import Value, convert, default_value
 
 RECORDER = "dodo-recorder"
@@ -36,21 +38,42 @@ def build(
     out: Path,
 ) -> tuple[Compiled, list[Diagnostic]]:
     """The Plans of specs that ``check`` found no errors in; ``out`` is the folder that they will be written below."""
-    ordered = sorted(specs, key=lambda s: s.name or "")
+    ordered = sorted(specs, key=lambda s: s.slug)
     try:
-        cids = addresses.cids([s.isolation for s in ordered], deployment.cids)
+        cids = _cids(ordered, deployment)
     except addresses.OutOfAddresses as error:
         span = Span(str(deployment.file)) if deployment.file else ordered[-1].span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
+    tree = functools.cache(copies)  # tests share maps and recordings
+
+    @functools.cache
+    def planned(cid: int, isolated: str, judges: tuple[str, ...], hardware: bool, privileged: bool) -> Application:
+        kept = {"hil": hardware, "privileged_allowed": privileged}
+        return plan_application(application, cid, isolated, out / "test", judges, **kept)
+
     builders = [
-        _Builder(spec, manifests, deployment, out, cid, index)
+        _Builder(spec, manifests, deployment, out, cid, index, tree, planned)
         for index, (spec, cid) in enumerate(zip(ordered, cids, strict=True))
     ]
-    plans = tuple(builder.plan(application) for builder in builders)
+    plans = tuple(builder.plan(application.spans) for builder in builders)
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
     return Compiled(Suite(plans, deployment.gates), files), problems
+
+
+def _cids(specs: Sequence[Spec], deployment: Deployment) -> list[int]:
+    """A CID for each instance: its rig's, or one of the deployment's range."""
+    rigs = [deployment.rig(spec.rig) if spec.rig else None for spec in specs]
+    free = [i for i, rig in enumerate(rigs) if rig is None or rig.cid is None]
+    given = addresses.cids([isolation(specs[i], rigs[i]) for i in free], deployment.cids)
+    by_index = dict(zip(free, given, strict=True))
+    return [by_index[i] if rig is None or rig.cid is None else rig.cid for i, rig in enumerate(rigs)]
+
+
+def isolation(spec: Spec, rig: Rig | None) -> str:
+    """What the spec writes, else what its rig needs, else a network of its own."""
+    return spec.isolation or (rig.isolation if rig else "network")
 
 
 class _Builder:
@@ -62,6 +85,8 @@ class _Builder:
         out: Path,
         cid: int,
         index: int,
+        tree: Callable[[Path, Path], list[Copy]],
+        application: Callable[[int, str, tuple[str, ...], bool, bool], Application],
     ) -> None:
         self.spec = spec
         self.manifests = manifests
@@ -69,42 +94,62 @@ class _Builder:
         self.out = out
         self.cid = cid
         self.index = index
+        self.rig = deployment.rig(spec.rig) if spec.rig else None
+        self.tree = tree
+        self.application = application
         self.files: set[Copy] = set()
         self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
+        self.shown: dict[str, str] = {}
 
-    def plan(self, application: ApplicationSource) -> Plan:
-        spec = self.spec
-        name = spec.name or spec.location.stem
+    def plan(self, application: Container[str]) -> Plan:
+        """The instance's Plan; ``application`` holds the names of the application's services."""
+        spec, rig = self.spec, self.rig
         services = (*self._recorder(), *(self._service(use) for use in spec.uses))
         self._names_apart(services, application)
         judges = tuple(s.name for s in services if s.judge)
-        for key in ("level", "kind", "timeout", "clock", "seed", "isolation"):
+        for key in ("name", "level", "kind", "timeout", "clock", "rig", "matrix", "seed", "isolation", "record"):
             if key in spec.spans:
                 self._place(key, spec.span(key))
-        on_network = spec.isolation == "network"
+        isolated = isolation(spec, rig)
+        hardware = rig is not None and not rig.is_emulated
+        privileged = rig is not None and rig.privileged
+        messages = self._messages()
         return Plan(
-            name=name,
-            slug=name,
+            name=spec.title,
+            slug=spec.slug,
             spec=self._shown(spec.path),
             description=spec.description or "",
             level=spec.level or "",
             kind=spec.kind or "",
             timeout_s=spec.timeout_s or 0.0,
             clock=spec.clock,
-            isolation=spec.isolation,
+            isolation=isolated,
             seed=spec.seed,
             cid=self.cid,
-            subnet=addresses.subnet(self.index, self.deployment.subnets) if on_network else "",
-            tag="sil" if spec.level in ("sil", "dil") else "hil-dynamic",
+            subnet=addresses.subnet(self.index, self.deployment.subnets) if isolated == "network" else "",
+            tag=rig.tag if rig else "sil",
             sandbox_image=self._image("sandbox"),
             services=services,
-            application=plan_application(application, self.cid, spec.isolation, self.out / name, judges),
+            application=self.application(self.cid, isolated, judges, hardware, privileged),
+            rig=rig.name if rig else "",
+            messages=messages,
             source_map=self.places,
         )
 
+    def _messages(self) -> tuple[str, ...]:
+        """The deployment's messages, copied beside the test for its services to read."""
+        targets = [f"messages/{number}-{path.name}" for number, path in enumerate(self.deployment.messages)]
+        self.files.update(Copy(t, path.resolve()) for t, path in zip(targets, self.deployment.messages, strict=True))
+        return tuple(targets)
+
     def _place(self, key: str, span: Span) -> None:
-        self.places[key] = Place(self._shown(Path(span.file)), span.line, span.column)
+        if span.file == EMULATED_FILE:
+            return  # built in, nobody wrote it
+        shown = self.shown.get(span.file)
+        if shown is None:
+            shown = self.shown[span.file] = self._shown(Path(span.file))
+        self.places[key] = Place(shown, span.line, span.column)
 
     def _shown(self, path: Path) -> str:
         """A spec's path as its repository has it; outside a deployment, as its registry does."""
@@ -117,13 +162,14 @@ class _Builder:
 
     def _recorder(self) -> list[Service]:
         manifest = self.manifests["rec-recorder"]
-        flags = (Flag("rec", RECORDING, "report"), Flag("cid", str(self.cid)))
+        frames = (Flag("frames", f"{self.spec.frames_hz:g}"),) if self.spec.frames_hz else ()
+        flags = (Flag("rec", RECORDING, "report"), *frames, Flag("cid", str(self.cid)))
         image = self._image(manifest.image)
         return [Service("environment", RECORDER, manifest.name, image, manifest.process, flags)]
 
-    def _names_apart(self, services: Sequence[Service], application: ApplicationSource) -> None:
+    def _names_apart(self, services: Sequence[Service], application: Container[str]) -> None:
         for service in services:
-            if service.name in application.spans:
+            if service.name in application:
                 use = next(u for u in self.spec.uses if u.name == service.name)
                 message = f"the application has a service '{service.name}' too"
                 self.problems.append(Diagnostic(use.span, "service-taken", message, "rename the one in the test"))
@@ -146,10 +192,17 @@ class _Builder:
             manifest.process,
             tuple(flags),
             judge=use.layer == "evaluation",
+            devices=self._devices(use, manifest),
         )
 
+    def _devices(self, use: Use, manifest: Manifest) -> tuple[str, ...]:
+        """The device files among what the manifest names; a rig's camera may be none (rpicam, a recording)."""
+        values = arguments.texts(self.spec, use, manifest, self.rig)
+        named = (values.get(device.strip("{}"), device) for device in manifest.devices)
+        return tuple(device for device in named if is_device(device))
+
     def _flag(self, use: Use, parameter: Parameter, key: str) -> Flag | None:
-        entry = use.parameters.get(parameter.name) or self._shared(use, parameter)
+        entry = arguments.written(self.spec, use, parameter, self.rig)
         root = self.spec.location.root
         value = convert(parameter, entry.value, root) if entry else default_value(parameter)
         if entry:
@@ -160,20 +213,11 @@ class _Builder:
             return self._file_flag(parameter, value, entry.key)
         return Flag(parameter.name, value.text, value.kind)
 
-    def _shared(self, use: Use, parameter: Parameter) -> Entry | None:
-        """The entry that another service gives to a shared parameter."""
-        if not parameter.shared:
-            return None
-        for other in self.spec.uses:
-            if other is not use and parameter.name in other.parameters:
-                return other.parameters[parameter.name]
-        return None
-
     def _file_flag(self, parameter: Parameter, value: Value, span: Span) -> Flag:
         path = value.path or Path()
         root = self.spec.location.root.resolve()
         try:
-            self.files.update(copies(path, root))
+            self.files.update(self.tree(path, root))
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         return Flag(parameter.name, path.relative_to(root).as_posix(), "path")

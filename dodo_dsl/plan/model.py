@@ -6,9 +6,12 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import orjson
+
 FORMAT = 1
 _SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+_DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 LAYERS = ("environment", "action", "evaluation", "application")
 
 FlagKind = Literal["text", "path", "memory", "report"]
@@ -25,7 +28,10 @@ class Flag:
 
 @dataclass(frozen=True)
 class Service:
-    """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts."""
+    """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts.
+
+    ``devices`` are device files of the machine that it needs.
+    """
 
     layer: str
     name: str
@@ -34,6 +40,7 @@ class Service:
     process: tuple[str, ...]
     flags: tuple[Flag, ...] = ()
     judge: bool = False
+    devices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,10 @@ class Place:
 
 @dataclass(frozen=True)
 class Plan:
-    """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation."""
+    """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation.
+
+    ``rig`` is empty below level hil; ``messages`` are ODVD files of the deployment, relative to ``files/``.
+    """
 
     name: str
     slug: str
@@ -87,6 +97,8 @@ class Plan:
     sandbox_image: str
     services: tuple[Service, ...]
     application: Application
+    rig: str = ""
+    messages: tuple[str, ...] = ()
     source_map: dict[str, Place] = field(default_factory=dict)
 
     def layer(self, name: str) -> tuple[Service, ...]:
@@ -106,8 +118,9 @@ class PlanError(ValueError):
 
 
 def to_json(plan: Plan) -> str:
-    document = {"dodo": "plan", "version": FORMAT, **dataclasses.asdict(plan)}
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    own = {field.name: getattr(plan, field.name) for field in dataclasses.fields(plan)}
+    document = {"dodo": "plan", "version": FORMAT, **own}
+    return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE).decode()
 
 
 def from_json(text: str) -> Plan:
@@ -121,6 +134,7 @@ def from_json(text: str) -> Plan:
         application["services"] = tuple(_application_service(s) for s in application["services"])
         application["changes"] = tuple(application["changes"])
         raw["application"] = Application(**application)
+        raw["messages"] = tuple(raw["messages"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
         plan = Plan(**raw)
         problem = _problem(plan)
@@ -133,7 +147,7 @@ def from_json(text: str) -> Plan:
 
 def _problem(plan: Plan) -> str:
     """What no compiled test holds; the types of JSON say nothing about themselves."""
-    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.application.folder)
+    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.rig, plan.application.folder)
     services: list[Service | ApplicationService] = [*plan.services, *plan.application.services]
     rules = {
         "slug": isinstance(plan.slug, str) and bool(_SLUG.fullmatch(plan.slug)),
@@ -143,9 +157,11 @@ def _problem(plan: Plan) -> str:
         "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
         "cid": isinstance(plan.cid, int) and 1 <= plan.cid <= 254,
         "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
+        "messages": all(_is_inside(path) for path in plan.messages),
         "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "a service's layer": all(s.layer in LAYERS for s in plan.services),
         "a flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
+        "a device": all(is_device(d) for s in plan.services for d in s.devices),
         "a word": all(isinstance(w, str) for s in services for w in s.process or ())
         and all(isinstance(w, str) for s in plan.application.services for w in s.command),
         "an environment": all(isinstance(s.environment, dict) for s in plan.application.services),
@@ -156,13 +172,22 @@ def _problem(plan: Plan) -> str:
 def _is_flag(flag: Flag) -> bool:
     kinds = ("text", "path", "memory", "report")
     plain = isinstance(flag.name, str) and isinstance(flag.value, str) and isinstance(flag.kind, str)
-    relative = ".." not in str(flag.value).split("/") and not str(flag.value).startswith("/")
-    inside = flag.kind not in ("path", "report") or relative
+    inside = flag.kind not in ("path", "report") or _is_inside(flag.value)
     return plain and flag.kind in kinds and inside
 
 
+def is_device(path: str) -> bool:
+    """Whether a text is the path of a device file below /dev."""
+    return bool(_DEVICE.fullmatch(path))
+
+
+def _is_inside(path: object) -> bool:
+    return isinstance(path, str) and ".." not in path.split("/") and not path.startswith("/")
+
+
 def _service(raw: dict[str, Any]) -> Service:
-    return Service(**{**raw, "process": tuple(raw["process"]), "flags": tuple(Flag(**f) for f in raw["flags"])})
+    words = {key: tuple(raw[key]) for key in ("process", "devices")}
+    return Service(**{**raw, **words, "flags": tuple(Flag(**f) for f in raw["flags"])})
 
 
 def _application_service(raw: dict[str, Any]) -> ApplicationService:

@@ -12,6 +12,7 @@ from typing import Any
 
 from dodo_dsl.plan.application import SANDBOX
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.trace import traced
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
 from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Ready, Unstartable
@@ -23,6 +24,7 @@ _PORT = 12175
 _BUILD_PROJECT = "dodo-build"
 _REPORT = "/dodo/report"
 _OVERLAP = "overlaps"
+_YIELDING = ("nice", "-n", "10")  # the set-up of one test leaves the processor to those that drive already
 _TELL = 'printf "%b" "$1" > "/dev/udp/$2/$3"'
 
 
@@ -63,7 +65,7 @@ class DockerBackend:
     async def open(self) -> None:
         code, out, problem = await self._compose("config", "--format", "json")
         if code:
-            raise BackendError(f"docker compose does not take the compiled test: {problem}")
+            raise BackendError(f"docker compose does not take the compiled test: {traced(self.plan, problem)}")
         self._config = json.loads(out)["services"]
         await self._provide_images()
         await self._create()
@@ -84,7 +86,7 @@ class DockerBackend:
         if subnet:
             environment["DODO_SUBNET"] = subnet
         process = await asyncio.create_subprocess_exec(
-            "docker", "compose", *words, cwd=self.folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
+            *_YIELDING, "docker", "compose", *words, cwd=self.folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
         )  # fmt: skip
         try:
@@ -131,7 +133,7 @@ class DockerBackend:
             if not code or _OVERLAP not in problem:
                 break
         if code:
-            raise BackendError(f"docker compose cannot create the test: {problem}")
+            raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
 
     def _find_containers(self) -> dict[str, Any]:
         found = self._client.containers.list(all=True, filters=self._filters())

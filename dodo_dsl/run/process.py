@@ -185,6 +185,7 @@ class ProcessBackend:
             "DODO_SERVICE": service.name,
             "DODO_READY_FILE": ready_file(self.lane.name, service.name),
             "DODO_LANE": self.lane.name,
+            "DODO_ODVD": os.pathsep.join(str(self.folder / "files" / path) for path in self.plan.messages),
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         return Command(service.name, service.layer, words, environment, self.folder, service.judge)

@@ -1,14 +1,19 @@
 """The deployment: ``dodo.yml`` at the root of a user's repository."""
 
 import ipaddress
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl import __version__, data
-from dodo_dsl.diagnostics import Diagnostic, has_errors
-from dodo_dsl.source import Entry, Mapping, Scalar, plain, read
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
+from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, plain, read
+from dodo_dsl.spec import rig
+from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.schema import validate
 
+_ODVD_PLACE = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+): (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
@@ -22,12 +27,19 @@ class Deployment:
     root: Path
     file: Path | None = None
     registry: tuple[Path, ...] = ()
-    application: Path | None = None
+    services: tuple[Path, ...] = ()
+    messages: tuple[Path, ...] = ()
+    application: tuple[Path, ...] = ()
     image_prefix: str = "dodo"
     image_tag: str = __version__
     cids: tuple[int, ...] = tuple(range(128, 255))
     subnets: ipaddress.IPv4Network = DEFAULT_SUBNETS
     gates: bool = True
+    rigs: dict[str, Rig] = field(default_factory=dict)
+
+    def rig(self, name: str) -> Rig | None:
+        """A rig of the deployment, or the emulated one."""
+        return rig.emulated() if name == rig.EMULATED else self.rigs.get(name)
 
 
 def find_deployment(start: Path) -> Path | None:
@@ -44,6 +56,8 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
     if path is None:
         return Deployment(Path.cwd(), registry=(data.registry(),)), []
     node, found = read(path)
+    if node is None and not found:
+        found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
         found = [*found, *validate(node, "deployment")]
     fallback = Deployment(path.parent, path, registry=(data.registry(),))
@@ -52,25 +66,37 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
     raw = plain(node)
     images = raw.get("images", {})
     problems: list[Diagnostic] = []
+    rigs = _rigs(node.entries.get("rigs"), problems)
+    reserved = {r.cid for r in rigs.values()}
     deployment = Deployment(
         root=path.parent,
         file=path,
-        registry=_registry(path.parent, node.entries.get("registry"), problems),
-        application=_application(path.parent, node.entries.get("application"), problems),
+        registry=_folders(path.parent, node.entries.get("registry"), problems) or (data.registry(),),
+        services=_folders(path.parent, node.entries.get("services"), problems),
+        messages=_files(path.parent, node.entries.get("messages"), problems),
+        application=_files(path.parent, node.entries.get("application"), problems),
         image_prefix=images.get("prefix", "dodo"),
         image_tag=images.get("tag", __version__),
-        cids=_cids(node.entries.get("cids"), problems),
+        cids=tuple(cid for cid in _cids(node.entries.get("cids"), problems) if cid not in reserved),
         subnets=_subnets(node.entries.get("subnets"), problems),
         gates=raw.get("gates", True),
+        rigs=rigs,
     )
+    _odvd(node.entries.get("messages"), deployment.messages, problems)
     return deployment, [*found, *problems]
 
 
-def _registry(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
-    if entry is None:
-        return (data.registry(),)
+def _texts(entry: Entry | None) -> Iterator[Scalar]:
+    """The texts of a list, or the one text that stands in its place."""
+    value = entry.value if entry else None
+    for item in value.items if isinstance(value, Sequence) else (value,):
+        if isinstance(item, Scalar):
+            yield item
+
+
+def _folders(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
     folders = []
-    for item in getattr(entry.value, "items", ()):
+    for item in _texts(entry):
         folder = data.registry() if item.text == SHIPPED else (root / item.text).resolve()
         if not folder.is_dir():
             problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'"))
@@ -78,14 +104,51 @@ def _registry(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tu
     return tuple(folders)
 
 
-def _application(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> Path | None:
-    if entry is None or not isinstance(entry.value, Scalar):
-        return None
-    path = root / entry.value.text
-    if not path.is_file():
-        problems.append(Diagnostic(entry.value.span, "missing-file", f"there is no file '{entry.value.text}'"))
-        return None
-    return path
+def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
+    files = []
+    for item in _texts(entry):
+        if (root / item.text).is_file():
+            files.append(root / item.text)
+        else:
+            problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'"))
+    return tuple(files)
+
+
+def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnostic]) -> None:
+    """What keeps the deployment's messages from being used."""
+    if not files or entry is None:
+        return
+    from dodo_dsl.opendlv.messages import MessageSet  # not before it is needed: it takes its time to load
+    from dodo_dsl.opendlv.odvd import OdvdError
+
+    try:
+        MessageSet.load(*files)
+    except OdvdError as error:
+        place = _ODVD_PLACE.fullmatch(str(error))
+        span, text = entry.key, str(error)
+        if place:
+            span, text = Span(place["file"], int(place["line"]), int(place["column"])), place["text"]
+        problems.append(Diagnostic(span, "wrong-messages", text))
+
+
+def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
+    rigs: dict[str, Rig] = {}
+    taken: dict[int, str] = {}
+    for name, written in entry.value.entries.items() if entry and isinstance(entry.value, Mapping) else ():
+        if not isinstance(written.value, Mapping):
+            continue
+        raw = plain(written.value)
+        found = Rig(name, raw["kind"], raw["cid"], written.value)
+        if name == rig.EMULATED:
+            message = f"the name '{name}' is that of the rig which every machine has"
+            problems.append(Diagnostic(written.key, "rig-name", message, "choose another"))
+        elif raw["cid"] in taken or raw["cid"] in RESERVED_CIDS:
+            owner = f"rig '{taken[raw['cid']]}'" if raw["cid"] in taken else "real cars"
+            message = f"CID {raw['cid']} is that of {owner}, every rig has one of its own"
+            problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
+        taken.setdefault(raw["cid"], name)
+        rigs[name] = found
+    return rigs
 
 
 def _cids(entry: Entry | None, problems: list[Diagnostic]) -> tuple[int, ...]:

@@ -1,13 +1,13 @@
 """Service manifests: what a service is, where it may stand, its parameters and its ports."""
 
 import functools
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl import data
-from dodo_dsl.diagnostics import Diagnostic, has_errors
-from dodo_dsl.source import plain, read
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, shown_path
+from dodo_dsl.source import Mapping, plain, read
+from dodo_dsl.spec import consistency
 from dodo_dsl.spec.schema import validate
 
 Value = str | int | float | bool | list[str | int | float] | None
@@ -15,7 +15,12 @@ Value = str | int | float | bool | list[str | int | float] | None
 
 @dataclass(frozen=True)
 class Parameter:
-    """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number."""
+    """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number.
+
+    ``rig`` is the dotted key of what the test's rig gives when nothing is written; ``among`` names the parameter and
+    the list of a JSON file (``map-path.obstacles``) whose entries' names are the values that can stand here;
+    ``within_timeout`` marks a duration that the test's timeout must leave room for.
+    """
 
     name: str
     type: str
@@ -27,6 +32,10 @@ class Parameter:
     minimum: float | None = None
     maximum: float | None = None
     choices: tuple[str, ...] = ()
+    rig: str = ""
+    among: str = ""
+    within_timeout: bool = False
+    example: Value = None
 
 
 @dataclass(frozen=True)
@@ -61,13 +70,22 @@ def _ports(raw: dict[str, list[str]] | None) -> Ports:
 def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
     """The manifest of a ``service.yml`` and what is wrong with it."""
     node, found = read(path)
+    if node is None and not found:
+        found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected a service")]
     if node is not None:
         found = [*found, *validate(node, "service")]
+    if isinstance(node, Mapping) and not has_errors(found):
+        found = [*found, *consistency.problems(node)]
     if node is None or has_errors(found):
         return None, found
     raw = plain(node)
     parameters = {
-        name: Parameter(name, **{**p, "choices": tuple(p.get("choices", ()))})
+        name: Parameter(
+            name,
+            within_timeout=p.get("within-timeout", False),
+            choices=tuple(p.get("choices", ())),
+            **{k: v for k, v in p.items() if k not in ("within-timeout", "choices")},
+        )
         for name, p in (raw.get("parameters") or {}).items()
     }
     manifest = Manifest(
@@ -86,16 +104,18 @@ def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
 
 
 @functools.cache
-def load_manifests(
-    folders: Iterable[Path] | None = None,
-) -> tuple[dict[str, Manifest], tuple[Diagnostic, ...]]:
-    """Every manifest ``<folder>/<service>/service.yml``, by service name; the shipped services by default."""
+def load_manifests(folders: tuple[Path, ...] = ()) -> tuple[dict[str, Manifest], tuple[Diagnostic, ...]]:
+    """Every manifest ``<folder>/<service>/service.yml``, by service name: the shipped ones and those of ``folders``."""
     manifests: dict[str, Manifest] = {}
     found: list[Diagnostic] = []
-    for folder in folders or (data.services(),):
+    for folder in (data.services(), *folders):
         for path in sorted(folder.glob("*/service.yml")):
             manifest, problems = load_manifest(path)
             found.extend(problems)
-            if manifest:
+            if manifest and manifest.name in manifests:
+                other = shown_path(str(manifests[manifest.name].folder))
+                message = f"the service '{manifest.name}' is in {other} already"
+                found.append(Diagnostic(Span(str(path)), "name-taken", message, "give it a name of its own"))
+            elif manifest:
                 manifests[manifest.name] = manifest
     return manifests, tuple(found)

@@ -11,6 +11,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.source import Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
 
+_UNIT = "x-unit"
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
     "array": "a list",
@@ -24,10 +25,18 @@ _TYPE_NAMES = {
 
 @functools.cache
 def _validator(name: str) -> Any:
-    from jsonschema import Draft202012Validator
+    from jsonschema import Draft202012Validator, ValidationError
+    from jsonschema.validators import extend
+
+    def is_quantity(_: Any, unit: str, instance: object, __: object) -> Iterator[Any]:
+        with_unit = isinstance(instance, str)
+        try:
+            quantity.convert(instance, unit) if with_unit else None
+        except quantity.QuantityError as error:
+            yield ValidationError(str(error))
 
     schema = json.loads((data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
-    return Draft202012Validator(schema)
+    return extend(Draft202012Validator, {_UNIT: is_quantity})(schema)  # type: ignore[no-untyped-call]
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
@@ -94,8 +103,8 @@ def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    if "x-unit" in error.schema:
-        yield from quantity_problem(place.node, error.schema["x-unit"])
+    if _UNIT in error.schema:
+        yield from _quantity(error, place)
         return
     wanted = error.validator_value
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
@@ -111,12 +120,11 @@ def _kind(value: object) -> str:
     return next((name for kind, name in kinds if isinstance(value, kind)), "null")
 
 
-def quantity_problem(node: Node, unit: str) -> Iterator[Diagnostic]:
-    """What keeps a value from being a quantity in ``unit``; nothing when it is one."""
+def _quantity(error: Any, place: _Place) -> Iterator[Diagnostic]:
     try:
-        quantity.convert(node.text if isinstance(node, Scalar) else None, unit)
-    except quantity.QuantityError as error:
-        yield Diagnostic(node.span, "wrong-unit", str(error), error.hint)
+        quantity.convert(place.node.text if isinstance(place.node, Scalar) else None, error.schema[_UNIT])
+    except quantity.QuantityError as problem:
+        yield Diagnostic(place.span, "wrong-unit", f"{place.name}: {problem}", problem.hint)
 
 
 def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -161,6 +169,7 @@ _TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
     "additionalProperties": _additional,
     "required": _required,
     "type": _type,
+    _UNIT: _quantity,
     "enum": _choices,
     "const": _const,
     "pattern": _pattern,

@@ -15,6 +15,7 @@ from dodo_dsl.spec.manifest import Parameter
 Kind = Literal["text", "path", "memory"]
 
 _MEMORY = re.compile(r"/?[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_MESSAGE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", re.ASCII)
 _MAX_TEXT = 4096
 
 
@@ -36,8 +37,31 @@ class ValueProblem(Exception):
 
 
 def convert(parameter: Parameter, node: Node, root: Path) -> Value:
-    """The flag's value; raises ValueProblem at the place of what does not fit."""
-    return _CONVERTERS[parameter.type](parameter, node, root)
+    """The flag's value; raises ValueProblem at the place of what does not fit.
+
+    The instances of a matrix share the nodes that do not depend on it, so what a node came to is kept with it.
+    """
+    key = (id(parameter), id(node), root)
+    known = _KNOWN.get(key)
+    if known is None:
+        if len(_KNOWN) >= _MOST_KNOWN:
+            _KNOWN.clear()
+        known = _KNOWN[key] = (parameter, node, _convert(parameter, node, root))
+    outcome = known[2]
+    if isinstance(outcome, ValueProblem):
+        raise outcome
+    return outcome
+
+
+def _convert(parameter: Parameter, node: Node, root: Path) -> "Value | ValueProblem":
+    try:
+        return _CONVERTERS[parameter.type](parameter, node, root)
+    except ValueProblem as problem:
+        return problem
+
+
+_MOST_KNOWN = 100_000
+_KNOWN: dict[tuple[int, int, Path], tuple[Parameter, Node, Value | ValueProblem]] = {}
 
 
 def default_value(parameter: Parameter) -> Value | None:
@@ -138,6 +162,15 @@ def _memory(parameter: Parameter, node: Node, _: Path) -> Value:
     return Value(scalar.text, "memory")
 
 
+def _message(parameter: Parameter, node: Node, _: Path) -> Value:
+    scalar = _scalar(parameter, node, "a message's name")
+    if not _MESSAGE.fullmatch(scalar.text):
+        message = f"{_name(parameter)} is '{scalar.text[:60]}', expected a message's full name"
+        hint = "for example opendlv.proxy.GroundSteeringRequest"
+        raise ValueProblem(scalar.span, "wrong-value", message, hint)
+    return Value(scalar.text)
+
+
 def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     items = node.items if isinstance(node, Sequence) else (node,)
     texts = []
@@ -179,5 +212,6 @@ _CONVERTERS: dict[str, Callable[[Parameter, Node, Path], Value]] = {
     "boolean": _boolean,
     "path": _path,
     "memory": _memory,
+    "message": _message,
     "list": _list,
 }

@@ -118,4 +118,4 @@ _CONVERTERS: dict[str, Callable[[str], Value]] = {
 
 
 def _expected(about: About) -> str:
-    return _KINDS[about["type"]] + (f" in {about['unit']}" if about.get("unit") else "")
+    return _KINDS[about["type"]] + (f" in{unit(about)}" if unit(about) else "")

@@ -41,8 +41,8 @@ def parameters(manifest: Mapping[str, Any]) -> dict[str, About]:
 
 
 def unit(about: About) -> str:
-    """`` Hz``, or nothing."""
-    return f" {about['unit']}" if about.get("unit") else ""
+    """`` Hz``, or nothing; shares, whose unit is 1, go without."""
+    return "" if about.get("unit") in (None, "", "1") else f" {about['unit']}"
 
 
 def bounds(about: About) -> str:

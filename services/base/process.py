@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
 
+from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, parse
@@ -71,7 +72,7 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
     try:
         ready.unlink(missing_ok=True)  # of one that was killed
         with ExitStack() as resources:
-            session = resources.enter_context(Session(flags["cid"]))
+            session = resources.enter_context(Session(flags["cid"], _messages()))
             service = build(Context(name, flags, session.messages, resources))
             code = BROKEN
             loop = Loop(role, service, session, clock or RealTimeClock(), flags["id"])
@@ -85,6 +86,11 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
         logging.critical("%s", text if expected else f"{type(error).__name__}: {text}", exc_info=bool(flags["verbose"]))
         return code if expected else BROKEN
     return DONE
+
+
+def _messages() -> MessageSet:
+    """The standard messages and those of the test's own ODVD files."""
+    return MessageSet.load(*(Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p))
 
 
 @contextmanager

@@ -112,7 +112,15 @@ def test_the_car_reaches_the_finish_with_room_to_spare(name: str, right: float, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["straight", "left-curve"])
+@pytest.mark.parametrize(("right", "yaw"), [(0.0, 0.0), (0.05, -8.0)])
+def test_the_car_drives_a_lap(right: float, yaw: float) -> None:
+    verdict = Loop("kiwi-track", right, yaw).run()
+    assert verdict.outcome == "passed", verdict.reason
+    assert margin(verdict) > 0.06
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["straight", "left-curve", "kiwi-track"])
 def test_a_slow_application_still_reaches_it(name: str) -> None:
     verdict = Loop(name, 0.02, 4.0, delay=80_000).run()
     assert verdict.outcome == "passed", verdict.reason

@@ -50,7 +50,7 @@ def test_names_are_those_of_the_manifests() -> None:
         "registry.example.org/dodo/collision:2",
     )
     assert [image.name for image in choose([], names, "dodo", "1")] == list(names)
-    with pytest.raises(NoSuchImage, match="known: base, collision"):
+    with pytest.raises(NoSuchImage, match="known: base, beacon"):
         choose(["zzz"], names, "dodo", "1")
 
 

@@ -16,7 +16,11 @@ from services.virtual_camera.render import Renderer
 from services.virtual_camera.scene import load_scene
 
 MAPS = data.registry() / "maps"
-NAMES = ["left-curve", "straight"]
+OPEN = ["left-curve", "rig-straight", "straight"]
+TRACKS = [*OPEN, "kiwi-track"]
+NAMES = sorted([*TRACKS, "static-rig"])
+STARTS = {"rig-straight": (-0.75, 0.0, 0.0)}
+"""Where a car starts: x, y (m) and heading (rad)."""
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +40,10 @@ def content(name: str) -> dict:
 def cones(name: str, colour: str) -> np.ndarray:
     (model,) = (m for m in content(name)["model"] if m["name"] == f"cone_{colour}")
     return np.array(model["instances"])[:, :2]
+
+
+def start(name: str) -> tuple[float, float, float]:
+    return STARTS.get(name, (0.0, 0.0, math.pi / 2))
 
 
 def obstacle(name: str, which: str) -> list[list[float]]:
@@ -62,28 +70,55 @@ def test_all_maps_are_tested():
     assert sorted(p.name for p in MAPS.iterdir() if p.is_dir() and p.name != "__pycache__") == NAMES
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRACKS)
 def test_cones_follow_each_other_closely_and_walls_run_through_them(name):
     for colour, side in (("yellow", "left"), ("blue", "right")):
         places = cones(name, colour)
         gaps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-        assert 0.2 < gaps.min() < gaps.max() < 0.31
+        assert 0.18 < gaps.min() < gaps.max() < 0.31
         wall = np.array(obstacle(name, side))
-        assert np.array_equal(wall[:, :2], places[:-1])
-        assert np.array_equal(wall[:, 2:], places[1:])
+        ends = np.vstack([places, places[:1]]) if name == "kiwi-track" else places
+        assert np.array_equal(wall[:, :2], ends[:-1])
+        assert np.array_equal(wall[:, 2:], ends[1:])
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_lane_is_half_a_metre_wide_and_begins_behind_the_start(name):
+@pytest.mark.parametrize("name", TRACKS)
+def test_the_lane_is_half_a_metre_wide(name):
     yellow, blue = cones(name, "yellow"), cones(name, "blue")
-    assert yellow[0] == pytest.approx([-0.25, -0.3])
-    assert blue[0] == pytest.approx([0.25, -0.3])
     across = np.linalg.norm(yellow[:, None] - blue[None], axis=2).min(axis=1)
-    assert across == pytest.approx(np.full(len(yellow), 0.5), abs=0.02)
+    assert across == pytest.approx(np.full(len(yellow), 0.5), abs=0.025)
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_an_open_track_begins_behind_the_start(name):
+    x, y, heading = start(name)
+    back = np.array([x, y]) - 0.3 * np.array([math.cos(heading), math.sin(heading)])
+    left = 0.25 * np.array([-math.sin(heading), math.cos(heading)])
+    assert cones(name, "yellow")[0] == pytest.approx(back + left)
+    assert cones(name, "blue")[0] == pytest.approx(back - left)
+
+
+def test_a_car_that_backs_up_hits_what_is_between_it_and_the_finish():
+    assert obstacle("kiwi-track", "finish") == [[-0.25, -0.8, 0.25, -0.8]]
+    assert obstacle("kiwi-track", "behind") == [[-0.25, -0.3, 0.25, -0.3]]
+    assert cones("kiwi-track", "red").tolist() == [[-0.33, -0.8], [0.33, -0.8]]
+
+
+def test_the_track_of_the_rig_fits_its_workspace_with_room_to_brake():
+    """1.9 x 1.4 m around 0; the vehicle's centre is 0.18 m behind its front, and brakes from 0.52 m/s within 0.27 m."""
+    x, *_ = start("rig-straight")
+    ((finish, *_),) = obstacle("rig-straight", "finish")
+    assert x > -0.9 + 0.1
+    assert finish - 0.18 + 0.52**2 / (2 * 0.5) < 0.95
 
 
 @pytest.mark.parametrize(
-    ("name", "finish", "ends"), [("straight", (0, 3), (0, 4)), ("left-curve", (-2, 2.5), (-3, 2.5))]
+    ("name", "finish", "ends"),
+    [
+        ("straight", (0, 3), (0, 4)),
+        ("left-curve", (-2, 2.5), (-3, 2.5)),
+        ("rig-straight", (0.55, 0), (1.55, 0)),
+    ],
 )
 def test_the_finish_lies_where_the_track_ends_with_red_cones_beside_it(name, finish, ends):
     ((x1, y1, x2, y2),) = obstacle(name, "finish")
@@ -106,24 +141,25 @@ def hues(image: np.ndarray, low: int, high: int) -> tuple[int, float]:
 @pytest.mark.parametrize("name", NAMES)
 def test_from_the_start_a_camera_sees_yellow_on_its_left_and_blue_on_its_right(name):
     renderer = Renderer(load_scene(MAPS / name), 640, 480, math.radians(48.8))
-    image = renderer.render(Pose.at(0, 0, 0.095, yaw=math.pi / 2))
+    x, y, heading = (0.0, 0.0, 0.0) if name == "static-rig" else start(name)
+    image = renderer.render(Pose.at(x, y, 0.095, yaw=heading))
     yellow, blue = hues(image, 20, 35), hues(image, 105, 125)
-    assert 300 < yellow[0] < 6000
-    assert 300 < blue[0] < 6000
+    assert 300 < yellow[0] < 8000
+    assert 300 < blue[0] < 8000
     assert yellow[1] < 320 < blue[1] or name == "left-curve"
     floor, sky = image[300:, :, :3].astype(float), image[:200, :, :3]
     assert floor[..., 0].std() > 3
     assert np.ptp(sky.reshape(-1, 3), axis=0).max() == 0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRACKS)
 def test_cones_are_seen_all_along_the_lane(name):
     """Halfway between each pair of cones, looking along the lane, both colours show until past the finish."""
     renderer = Renderer(load_scene(MAPS / name), 320, 240, math.radians(48.8))
     yellow, blue = cones(name, "yellow"), cones(name, "blue")
     nearest = blue[np.linalg.norm(yellow[:, None] - blue[None], axis=2).argmin(axis=1)]
     middle = (yellow + nearest) / 2
-    finish = 5 if name == "straight" else 4
+    finish = {"left-curve": 4, "kiwi-track": 1}.get(name, 5)
     for here, there in pairwise(middle[: -finish + 1]):
         yaw = math.atan2(there[1] - here[1], there[0] - here[0])
         image = renderer.render(Pose.at(here[0], here[1], 0.095, yaw=yaw))

@@ -1,9 +1,11 @@
 """Makes the maps beside this file: python tests_registry/maps/make_maps.py [FOLDER].
 
-A track starts at x = 0, y = 0 and runs along +y. Yellow cones stand on its left, blue ones on its
-right, and two large red ones beside the finish; the rows begin behind the start and go on past the
-finish, so that a car sees cones all the way. Obstacles: ``left`` and ``right`` are walls through the
-cones, ``finish`` is the line across the lane.
+Yellow cones stand on the left of a track, blue ones on its right, and two large red ones beside the
+finish. Obstacles: ``left`` and ``right`` are walls through the cones, ``finish`` is the line across the
+lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it says so; its rows begin behind
+the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
+the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that backs up to the finish.
+``static-rig`` is no track but a board with eight cones, seen from x = 0, y = 0 along +x.
 """
 
 import json
@@ -19,12 +21,14 @@ import numpy as np
 import numpy.typing as npt
 
 Point = tuple[float, float]
+Place = tuple[float, float, float]
 Pixels = npt.NDArray[np.integer]
 
 LANE = 0.5
 SPACING = 0.25
 BEHIND, BEYOND = 0.3, 1.0
 BESIDE = 0.08
+LEAD, BACK = 0.8, 0.3
 SIDES = 16
 PROFILE = [(0.012, 0.0), (0.012, 0.002), (0.009, 0.002), (0.0015, 0.034)]
 """Radius and height in m of the rings of corners that make a cone on its small base."""
@@ -50,15 +54,50 @@ class Section:
         return radius * math.sin(turned), radius * (1 - math.cos(turned)), turned
 
 
+@dataclass(frozen=True)
+class Track:
+    """A centre line; it starts at ``x``, ``y`` with ``heading`` (m, rad). A ``lap`` ends where it begins."""
+
+    sections: list[Section]
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = math.pi / 2
+    lap: bool = False
+
+    @property
+    def start(self) -> Place:
+        return self.x, self.y, self.heading
+
+
+def left(degrees: float, radius: float) -> Section:
+    """A bend; negative degrees turn right."""
+    return Section(radius * math.radians(abs(degrees)), math.radians(degrees))
+
+
+def kiwi_track() -> list[Section]:
+    """A lap with four left corners and, on its way back, an S that leads inwards and out again."""
+    corner, short, wave = left(90, 1.0), Section(0.5), 25.0
+    inwards = [Section(0.3), left(wave, 1.5), left(-2 * wave, 1.5), left(wave, 1.5), Section(0.3)]
+    straight = Section(2 * 0.3 + 4 * 1.5 * math.sin(math.radians(wave)))
+    return [straight, corner, short, corner, *inwards, corner, short, corner]
+
+
 TRACKS = {
-    "straight": [Section(3.0)],
-    "left-curve": [Section(1.0), Section(1.5 * math.pi / 2, math.pi / 2), Section(0.5)],
+    "straight": Track([Section(3.0)]),
+    "left-curve": Track([Section(1.0), Section(1.5 * math.pi / 2, math.pi / 2), Section(0.5)]),
+    "kiwi-track": Track(kiwi_track(), y=-LEAD, lap=True),
+    "rig-straight": Track([Section(1.3)], x=-0.75, heading=0.0),
 }
+BOARD = {
+    "yellow": [(0.30, 0.172), (0.36, 0.07), (0.52, 0.13), (0.56, -0.05)],
+    "blue": [(0.30, -0.08), (0.42, 0.072), (0.44, -0.18), (0.58, 0.04)],
+}
+"""Where the cones of the static rig stand: one at the edge of the picture, one partly behind another."""
 
 
-def poses(sections: list[Section], offset: float) -> Iterator[tuple[float, float, float]]:
+def poses(sections: list[Section], offset: float, start: Place) -> Iterator[Place]:
     """x, y and heading about every 25 cm along the row ``offset`` m left of the centre line."""
-    x, y, heading = 0.0, -BEHIND, math.pi / 2
+    x, y, heading = start
     for number, section in enumerate(sections):
         steps = max(1, round(section.along(offset) / SPACING))
         for step in range(min(number, 1), steps + 1):
@@ -69,9 +108,19 @@ def poses(sections: list[Section], offset: float) -> Iterator[tuple[float, float
         x, y, heading = centre[0], centre[1], at
 
 
-def row(sections: list[Section], offset: float) -> list[Point]:
+def ahead(place: Place, distance: float) -> Place:
+    x, y, heading = place
+    return x + distance * math.cos(heading), y + distance * math.sin(heading), heading
+
+
+def row(sections: list[Section], offset: float, start: Place) -> list[Point]:
     """Where cones stand, to a tenth of a millimetre."""
-    return [(round(x, 4) + 0.0, round(y, 4) + 0.0) for x, y, _ in poses(sections, offset)]
+    return [(round(x, 4) + 0.0, round(y, 4) + 0.0) for x, y, _ in poses(sections, offset, start)]
+
+
+def across(place: Place, reach: float) -> list[Point]:
+    """The two points ``reach`` m to the left and to the right of a place."""
+    return [row([Section(1.0)], side * reach, place)[0] for side in (1, -1)]
 
 
 def model(name: str, file: str, color: list[float], places: list[Point]) -> dict[str, object]:
@@ -82,27 +131,46 @@ def wall(name: str, places: list[Point]) -> dict[str, object]:
     return {"name": name, "lines": [[*start, *end] for start, end in pairwise(places)]}
 
 
-def track_map(track: list[Section]) -> dict[str, object]:
-    driven = [Section(BEHIND), *track]
-    rows = {side: row([*driven, Section(BEYOND)], side * LANE / 2) for side in (1, -1)}
-    finish = [row(driven, side * LANE / 2)[-1] for side in (1, -1)]
-    beside = [row(driven, side * (LANE / 2 + BESIDE))[-1] for side in (1, -1)]
-    floor = {
+def cones(yellow: list[Point], blue: list[Point]) -> list[dict[str, object]]:
+    return [
+        model("cone_yellow", "cone.obj", [1.0, 0.85, 0.0], yellow),
+        model("cone_blue", "cone.obj", [0.0, 0.15, 0.9], blue),
+    ]
+
+
+def floor(height: float = 0.0) -> dict[str, object]:
+    return {
         "name": "floor",
         "dimension": [10.0, 10.0, 0.2],
         "textureFile": "floor.png",
         "textureSize": [0.5, 0.5],
-        "instances": [[0.0, 0.0, -0.1, 0.0]],
+        "instances": [[0.0, 0.0, height - 0.1, 0.0]],
     }
-    return {
-        "model": [
-            model("cone_yellow", "cone.obj", [1.0, 0.85, 0.0], rows[1]),
-            model("cone_blue", "cone.obj", [0.0, 0.15, 0.9], rows[-1]),
-            model("cone_red", "finish-cone.obj", [0.9, 0.05, 0.05], beside),
-        ],
-        "block": [floor],
-        "obstacles": [wall("left", rows[1]), wall("right", rows[-1]), wall("finish", finish)],
+
+
+def track_map(track: Track) -> dict[str, object]:
+    begin = track.start if track.lap else ahead(track.start, -BEHIND)
+    driven = track.sections if track.lap else [Section(BEHIND), *track.sections]
+    beyond = [] if track.lap else [Section(BEYOND)]
+    rows = {side: row([*driven, *beyond], side * LANE / 2, begin) for side in (1, -1)}
+    *_, finish = poses(driven, 0.0, begin)
+    lines = [wall("left", rows[1]), wall("right", rows[-1]), wall("finish", across(finish, LANE / 2))]
+    if track.lap:
+        lines.append(wall("behind", across(ahead(track.start, LEAD - BACK), LANE / 2)))
+        rows = {side: places[:-1] for side, places in rows.items()}
+    red = model("cone_red", "finish-cone.obj", [0.9, 0.05, 0.05], across(finish, LANE / 2 + BESIDE))
+    return {"model": [*cones(rows[1], rows[-1]), red], "block": [floor()], "obstacles": lines}
+
+
+def board_map() -> dict[str, object]:
+    """The static rig: a board of 70 x 60 cm on the floor."""
+    board = {
+        "name": "board",
+        "dimension": [0.7, 0.6, 0.012],
+        "color": [0.78, 0.66, 0.52],
+        "instances": [[0.3, 0.0, -0.006, 0.0]],
     }
+    return {"model": cones(BOARD["yellow"], BOARD["blue"]), "block": [floor(-0.012), board], "obstacles": []}
 
 
 def as_json(value: object, indent: int = 0) -> str:
@@ -111,7 +179,7 @@ def as_json(value: object, indent: int = 0) -> str:
     if isinstance(value, dict):
         parts = [f"{inner}{json.dumps(key)}: {as_json(item, indent + 2)}" for key, item in value.items()]
         return "{\n" + ",\n".join(parts) + "\n" + " " * indent + "}"
-    if isinstance(value, list) and isinstance(value[0], list | dict):
+    if isinstance(value, list) and value and isinstance(value[0], list | dict):
         return "[\n" + ",\n".join(inner + as_json(item, indent + 2) for item in value) + "\n" + " " * indent + "]"
     return json.dumps(value)
 
@@ -150,12 +218,13 @@ def floor_picture() -> Pixels:
 
 
 def make(folder: Path) -> None:
-    for name, track in TRACKS.items():
+    for name, content in {**{n: track_map(t) for n, t in TRACKS.items()}, "static-rig": board_map()}.items():
         target = folder / name
         target.mkdir(parents=True, exist_ok=True)
-        (target / "map.json").write_text(as_json(track_map(track)) + "\n")
+        (target / "map.json").write_text(as_json(content) + "\n")
         (target / "cone.obj").write_text(cone_obj(1.0))
-        (target / "finish-cone.obj").write_text(cone_obj(2.0))
+        if name in TRACKS:
+            (target / "finish-cone.obj").write_text(cone_obj(2.0))
         packed = cv2.imencode(".png", floor_picture(), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1]
         (target / "floor.png").write_bytes(packed.tobytes())
 

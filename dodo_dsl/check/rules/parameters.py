@@ -36,6 +36,8 @@ def _missing(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnos
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters:
             continue
+        if parameter.rig and context.rig and context.rig.entry(parameter.rig):
+            continue
         givers = _givers(context, parameter.name) if parameter.shared else {}
         if len(givers) == 1:
             continue

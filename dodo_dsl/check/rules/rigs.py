@@ -1,0 +1,29 @@
+"""``rig-level``: hil tests name the rig that they run on, others have none; ``unknown-rig``: the deployment has it.
+
+``rig-isolation``: hardware is on the host's network.
+"""
+
+from collections.abc import Iterator
+
+from dodo_dsl.check.context import Context
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.spec.rig import EMULATED
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    spec = context.spec
+    if spec.level == "hil" and spec.rig is None:
+        message = "a hil test needs a rig to run on"
+        yield Diagnostic(spec.span("level"), "rig-level", message, "write 'rig: emulated', or name one of dodo.yml")
+    if spec.rig is None:
+        return
+    if spec.level in ("sil", "dil"):
+        message = f"a {spec.level} test needs no rig"
+        yield Diagnostic(spec.span("rig"), "rig-level", message, "remove it, or use level hil")
+    rig = context.rig
+    if rig is None:
+        hint = did_you_mean(spec.rig, [EMULATED, *context.deployment.rigs])
+        yield Diagnostic(spec.span("rig"), "unknown-rig", f"there is no rig '{spec.rig}'", hint)
+    elif not rig.is_emulated and spec.isolation == "network":
+        message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have a network of its own"
+        yield Diagnostic(spec.span("isolation"), "rig-isolation", message, "remove 'isolation'")

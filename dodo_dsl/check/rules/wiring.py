@@ -1,0 +1,73 @@
+"""Each message or memory that a service consumes has a producer in the test, or is asked of the application.
+
+``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
+message and sender stamp or of one memory, ``application-input`` (the application hears what nobody says).
+"""
+
+from collections.abc import Iterator
+
+from dodo_dsl.check.context import Context
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring, wire
+from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.spec.manifest import Manifest
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    known = list(context.known_uses())
+    if len(known) < len(context.spec.uses) or any(use.layer not in m.layers for use, m in known):
+        return  # what stands in a wrong place, or is unknown, is to be mended first
+    wiring = wire(context)
+    for end in wiring.heard:
+        if not end.port.optional and not wiring.producers(end.port) and not wiring.application_may_say(end.port):
+            yield _unfed(context, wiring, end)
+    yield from _twice(wiring)
+    yield from _unheard_of(wiring)
+
+
+def _unfed(context: Context, wiring: Wiring, end: End) -> Diagnostic:
+    rule = "no-sample" if end.layer == "evaluation" else "no-producer"
+    what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
+    if end.port.may_be_asked:
+        message = f"'{end.service}' needs {what}, which no service of the test and no service of the application sends"
+        hint = "list it under x-dodo.out of the application's service that sends it"
+    else:
+        message = f"'{end.service}' needs {what}, which no service of the test sends"
+        hint = _who_could(context, wiring, end)
+    if rule == "no-sample":
+        message += ", so it could never judge"
+    return Diagnostic(end.span, rule, message, hint)
+
+
+def _who_could(context: Context, wiring: Wiring, end: End) -> str:
+    """The way out: another sender stamp that is sent, or services that send such messages."""
+    stamps = sorted(str(e.port) for e in wiring.said if e.port.name == end.port.name)
+    if stamps:
+        return f"the test has {' and '.join(stamps)}"
+    names = sorted(m.name for m in context.manifests.values() if _sends(m, end.port.name))
+    return f"add a service that sends it: {', '.join(names)}" if names else ""
+
+
+def _sends(manifest: Manifest, name: str) -> bool:
+    return any(port.partition("/")[0] == name for port in manifest.messages.outputs)
+
+
+def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
+    first: dict[tuple[str, str, int | None], End] = {}
+    for end in (*wiring.said, *wiring.application_says):
+        if end.port.name == ANYTHING:
+            continue
+        key = (end.port.kind, end.port.name, end.port.stamp)
+        other = first.setdefault(key, end)
+        if other is not end and "application" not in (other.layer,):
+            who = f"the application's '{end.service}'" if end.layer == "application" else f"'{end.service}'"
+            message = f"'{other.service}' and {who} both send {end.port}"
+            hint = "give one of them another sender stamp" if end.port.kind == "message" else "name one otherwise"
+            yield Diagnostic(end.span, "two-producers", message, hint)
+
+
+def _unheard_of(wiring: Wiring) -> Iterator[Diagnostic]:
+    for end in wiring.application_hears:
+        own = any(end.port.hears(other.port) for other in wiring.application_says)
+        if not own and not wiring.producers(end.port) and not wiring.undeclared:
+            message = f"the application's '{end.service}' hears {end.port}, which nobody sends in this test"
+            yield Diagnostic(end.span, "application-input", message, severity="warning")

@@ -1,0 +1,156 @@
+"""dodo explain: what a rule means, or how a test is wired and what its application must give."""
+
+import argparse
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import TextIO
+
+from dodo_dsl import catalogue
+from dodo_dsl.check.context import Context
+from dodo_dsl.check.explanation import Asked, Explanation, Line, explain
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.compiler import Checked
+from dodo_dsl.diagnostics import did_you_mean, format_text, printable
+
+EXAMPLES = """examples:
+  dodo explain                       the rules, a line each
+  dodo explain wrong-unit            a rule: why it is so, what breaks it and what does not
+  dodo explain sil-closed-straight   a test: services, where values come from, who says and hears what
+  dodo explain 'sil-*' --json        several tests, for programs
+"""
+
+_MOST_ROWS = 100
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("word", nargs="?", metavar="TEST|RULE", help="a rule, or the name or path of a test")
+    parser.add_argument("--json", action="store_true", help="as JSON")
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    rules = catalogue.pages()
+    if options.word is None:
+        return _rules(options.json, stdout)
+    if options.word in rules:
+        page = rules[options.word]
+        stdout.write(json.dumps(asdict(page), indent=2) + "\n" if options.json else catalogue.text(page))
+        return Exit.OK
+    try:
+        checked = selection.select([options.word], (), options.application)
+    except selection.NoSuchTest as error:
+        near = did_you_mean(options.word, rules) if "-" in options.word else ""
+        stderr.write(f"dodo explain: {error}" + (f"; or the rule: {near}" if near else "") + "\n")
+        return Exit.USAGE
+    found = [explain(context) for context in _contexts(checked)]
+    stdout.write(json.dumps([asdict(e) for e in found], indent=2) + "\n" if options.json else _text(found))
+    stderr.write(format_text(checked.diagnostics))
+    return Exit.OK if checked.ok else Exit.USAGE
+
+
+def _rules(as_json: bool, stdout: TextIO) -> int:
+    pages = catalogue.pages().values()
+    if as_json:
+        stdout.write(json.dumps([asdict(page) for page in pages], indent=2) + "\n")
+    else:
+        stdout.write(_table([[page.name, page.summary] for page in pages], ""))
+    return Exit.OK
+
+
+def _contexts(checked: Checked) -> Iterator[Context]:
+    declared = checked.application.declared if checked.application else None
+    for spec in checked.specs:
+        yield Context(spec, checked.manifests, {}, checked.deployment, declared)
+
+
+def _text(found: Sequence[Explanation]) -> str:
+    """The instances of a file together: the first one whole, and what differs in the others."""
+    files: dict[str, list[Explanation]] = {}
+    for one in found:
+        files.setdefault(one.file, []).append(one)
+    return "\n".join(_file(instances) for instances in files.values())
+
+
+def _file(instances: Sequence[Explanation]) -> str:
+    first = instances[0]
+    parts = [_head(first), _services(first), _wiring(first), _differences(instances)]
+    others = {(e.wiring, e.asked): e for e in reversed(instances) if (e.wiring, e.asked) != (first.wiring, first.asked)}
+    parts += [f"{other.name}\n\n{_wiring(other)}" for other in reversed(others.values())]
+    return "\n".join(part for part in parts if part)
+
+
+def _head(one: Explanation) -> str:
+    rig = f", rig {one.rig}" if one.rig else ""
+    return f"{printable(one.name)} ({one.level}, {one.kind}{rig})\n{one.file}\n"
+
+
+def _services(one: Explanation) -> str:
+    lines = []
+    for service in one.services:
+        lines.append(f"{service.layer}: {service.name} ({service.uses})\n")
+        rows = [
+            [a.name, f"{a.value} {a.unit}".strip(), a.origin.replace(f"{one.file}:", "line ")]
+            for a in service.arguments
+        ]
+        lines.append(_table(rows, "  "))
+    return "".join(lines)
+
+
+def _wiring(one: Explanation) -> str:
+    rows = [[_port(line), ", ".join(line.says) or _unsaid(line, one), "->", ", ".join(line.hears) or _unheard(line)]
+            for line in one.wiring]  # fmt: skip
+    parts = ["who says what, and who hears it\n" + _table(rows, "  ")]
+    for title, required in (("the application must give", True), ("the application may give", False)):
+        asked = [a for a in one.asked if a.required is required]
+        if asked:
+            parts.append(
+                f"{title}\n"
+                + _table([[_port(a), f"to {', '.join(a.needed_by)}", _declared(a, one)] for a in asked], "  ")
+            )
+    return "\n".join(parts)
+
+
+def _port(line: Line | Asked) -> str:
+    return f"memory {line.port}" if line.kind == "memory" else line.port
+
+
+def _unheard(line: Line) -> str:
+    return "who opens it" if line.kind == "memory" else "nobody"
+
+
+def _unsaid(line: Line, one: Explanation) -> str:
+    return "the application" if any(line.port == a.port for a in one.asked) else "nobody"
+
+
+def _declared(asked: Asked, one: Explanation) -> str:
+    if not one.has_application:
+        return ""
+    if asked.declared_by:
+        return f"declared by {', '.join(asked.declared_by)}"
+    undeclared = ", ".join(one.undeclared)
+    return f"not declared; {undeclared} without x-dodo may" if undeclared else "not declared"
+
+
+def _differences(instances: Sequence[Explanation]) -> str:
+    """The values that are not the same in all instances, a row an instance."""
+    if len(instances) == 1:
+        return ""
+    values = [_values(one) for one in instances]
+    keys = [key for key in values[0] if len({v.get(key, "") for v in values}) > 1]
+    rows = [[one.name, *(f"{k}: {v.get(k, '')}" for k in keys)] for one, v in zip(instances, values, strict=True)]
+    rest = f"  ... {len(rows) - _MOST_ROWS} more\n" if len(rows) > _MOST_ROWS else ""
+    return f"the {len(rows)} instances, and what differs\n" + _table(rows[:_MOST_ROWS], "  ") + rest
+
+
+def _values(one: Explanation) -> dict[str, str]:
+    top = {"level": one.level, "kind": one.kind, "rig": one.rig}
+    return top | {f"{s.name}.{a.name}": f"{a.value} {a.unit}".strip() for s in one.services for a in s.arguments}
+
+
+def _table(rows: Sequence[Sequence[str]], indent: str) -> str:
+    """Columns padded to their widest cell, but no wider than 48; the last as it is."""
+    widths = [min(48, max(map(len, column))) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)
+    return "".join(f"{indent}{printable(line)}\n" for line in lines)

@@ -1,0 +1,131 @@
+"""The child pipeline: a job an instance, and what GitLab would refuse of it."""
+
+import math
+import shlex
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span
+from dodo_dsl.plan.model import Plan, Suite
+
+CHILD = "child.gitlab-ci.yml"
+EMULATED = "emulated"
+RULE = "pipeline-limit"
+
+MAX_NAME = 255
+MAX_BYTES = 5 << 20
+MAX_JOBS_FREE = 500
+MAX_JOBS_PARSED = 850
+
+_STAGES = ("sil", "dil", "hil")
+_SPARE_MINUTES = 10
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job of the child pipeline; ``rig`` is the resource that it alone may use, or empty."""
+
+    name: str
+    stage: str
+    tag: str
+    gated: bool
+    rig: str
+    minutes: int
+    interruptible: bool
+    script: str
+
+
+@dataclass(frozen=True)
+class Pipeline:
+    """The stages in order, whether a gate stands before hil, whether images are pulled, and the jobs."""
+
+    stages: tuple[str, ...]
+    gate: bool
+    images: bool
+    jobs: tuple[Job, ...]
+
+
+def pipeline(suite: Suite, folder: str) -> Pipeline:
+    """The jobs of a suite; ``folder`` is the output folder's name, as the parent's artifact has it."""
+    levels = {plan.level for plan in suite.plans}
+    gate = _gated(suite)
+    stages = [stage for stage in _STAGES if stage in levels]
+    if gate:
+        stages.insert(stages.index("hil"), "gate")
+    jobs = tuple(_job(plan, gate, folder) for plan in suite.plans)
+    return Pipeline(tuple(stages), gate, any(_needs_images(plan) for plan in suite.plans), jobs)
+
+
+def _gated(suite: Suite) -> bool:
+    levels = {plan.level for plan in suite.plans}
+    return suite.gates and "hil" in levels and bool(levels & {"sil", "dil"})
+
+
+def _needs_images(plan: Plan) -> bool:
+    return any(service.process is None for service in plan.application.services)
+
+
+def _job(plan: Plan, gate: bool, folder: str) -> Job:
+    rig = plan.rig
+    real = plan.level == "hil" and rig != EMULATED
+    return Job(
+        name=plan.slug,
+        stage=plan.level,
+        tag=plan.tag,
+        gated=gate and plan.level == "hil",
+        rig=rig if real else "",
+        minutes=math.ceil(plan.timeout_s / 60) + _SPARE_MINUTES,
+        interruptible=not real,
+        script=f"dodo run --compiled {shlex.quote(f'{folder}/{plan.slug}')} --report dodo-report $DODO_RUN_OPTIONS",
+    )
+
+
+def pipeline_problems(suite: Suite, text: str) -> list[Diagnostic]:
+    """What GitLab would refuse of the child pipeline ``text`` of a suite, at the test that is most to blame.
+
+    A job's name has at most 255 characters. The archive of an artifact that holds the YAML of a child pipeline has at
+    most 5 MB (``max_artifacts_content_include_size``). How many jobs a pipeline may have is unlimited on one's own
+    GitLab until somebody sets it, and 500, 1,500 or 2,000 on gitlab.com, by its tier. A YAML file may take 2 MB of
+    memory when parsed (``max_yaml_size_bytes``); a job takes 2.3 to 2.4 kB of that in Ruby. All of these but the first
+    can be raised, so that numbers of jobs are warnings. A job's at most 50 ``needs`` are never reached: the job
+    ``gate`` stands for all tests before it.
+
+    Sources: https://docs.gitlab.com/administration/cicd/limits/ and
+    https://docs.gitlab.com/user/gitlab_com/#cicd
+    """
+    return [*_names(suite), *_whole(suite, text)]
+
+
+def _names(suite: Suite) -> Iterator[Diagnostic]:
+    for plan in suite.plans:
+        if len(plan.slug) > MAX_NAME:
+            message = f"the job '{plan.slug[:40]}...' has a name of {len(plan.slug)} characters, more than {MAX_NAME}"
+            yield Diagnostic(_place(plan), RULE, message, "shorten the test's name, or the keys and values of 'matrix'")
+
+
+def _whole(suite: Suite, text: str) -> Iterator[Diagnostic]:
+    jobs, size = len(suite.plans) + _gated(suite), len(text.encode())
+    hint = "compile fewer tests into one pipeline, or a smaller 'matrix'"
+    if size > MAX_BYTES:
+        message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab takes 5 MB"
+        yield _largest(suite, message, hint, "error")
+    if jobs > MAX_JOBS_PARSED:
+        message = f"the child pipeline has {jobs} jobs, which take more than the 2 MB that GitLab reads by default"
+        yield _largest(suite, message, f"{hint}; an administrator can raise max_yaml_size_bytes", "warning")
+    elif jobs > MAX_JOBS_FREE:
+        message = f"the child pipeline has {jobs} jobs, gitlab.com takes 500 on its free tier and 1500 on Premium"
+        yield _largest(suite, message, f"{hint}; one's own GitLab takes any number by default", "warning")
+
+
+def _largest(suite: Suite, message: str, hint: str, severity: Severity) -> Diagnostic:
+    """The problem of a whole suite, at the spec with the most instances, the first of several."""
+    (spec, number), *_ = Counter(plan.spec for plan in suite.plans).most_common(1)
+    plan = next(plan for plan in suite.plans if plan.spec == spec)
+    whose = f"{message} ({number} of this test)" if number > 1 else message
+    return Diagnostic(_place(plan), RULE, whose, hint, severity)
+
+
+def _place(plan: Plan) -> Span:
+    place = plan.source_map.get("matrix") or plan.source_map.get("name")
+    return Span(place.file, place.line, place.column) if place else Span(plan.spec)

@@ -1,0 +1,88 @@
+"""``wrong-manifest``: what a manifest's schema cannot say, as it is about two places of the manifest at once."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.source import Mapping, Node, Scalar, plain, walk
+
+RULE = "wrong-manifest"
+RESERVED = ("cid", "help")
+
+_PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
+_NUMBERS = ("number", "integer")
+_TEXTS = ("string", "memory", "message")
+_DEFAULTS: dict[str, tuple[type, ...]] = {
+    "number": (int, float),
+    "integer": (int,),
+    "boolean": (bool,),
+    "list": (list,),
+    **dict.fromkeys(_TEXTS, (str,)),
+}
+
+
+def problems(node: Mapping) -> Iterator[Diagnostic]:
+    """Ports, defaults, bounds and references of a manifest that its schema found nothing wrong with."""
+    parameters = node.get("parameters")
+    entries = parameters.entries if isinstance(parameters, Mapping) else {}
+    types = {name: str(plain(entry.value)["type"]) for name, entry in entries.items()}
+    for key in ("messages", "memory", "devices"):
+        written = node.get(key)
+        if written is not None:
+            yield from _ports(written, types)
+    for name, entry in entries.items():
+        if name in RESERVED:
+            message = f"'--{name}' is a flag of every service, so no parameter can have its name"
+            yield Diagnostic(entry.key, RULE, message, "choose another name")
+        if isinstance(entry.value, Mapping):
+            yield from _parameter(name, entry.value, types)
+
+
+def _ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:
+    for scalar in walk(node):
+        if not isinstance(scalar, Scalar):
+            continue
+        for match in _PLACEHOLDER.finditer(scalar.text):
+            if match["name"] not in types:
+                message = f"'{scalar.text}' names the parameter '{match['name']}', which there is not"
+                yield Diagnostic(scalar.span, RULE, message, did_you_mean(match["name"], types))
+
+
+def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diagnostic]:
+    raw = plain(node)
+    kind = raw["type"]
+    for key, kinds in (("unit", ("number",)), ("minimum", _NUMBERS), ("maximum", _NUMBERS)):
+        if key in raw and kind not in kinds:
+            yield _misplaced(node, key, f"'{key}' is for numbers, but '{name}' is of type {kind}")
+    if "choices" in raw and kind not in ("string", "list"):
+        yield _misplaced(node, "choices", f"'choices' are for strings and lists, but '{name}' is of type {kind}")
+    if raw.get("within-timeout") and raw.get("unit") != "s":
+        yield _misplaced(node, "within-timeout", f"'{name}' is no duration", "give it 'unit: s'")
+    if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
+        yield _misplaced(node, "minimum", f"the minimum of '{name}' is larger than its maximum")
+    source = str(raw.get("among", "")).partition(".")[0]
+    if source and types.get(source) != "path":
+        message = f"'among' begins with '{source}', expected a parameter of type path"
+        yield _misplaced(node, "among", message, did_you_mean(source, [n for n, t in types.items() if t == "path"]))
+    yield from _default(name, node, raw)
+
+
+def _default(name: str, node: Mapping, raw: dict[str, Any]) -> Iterator[Diagnostic]:
+    if "default" not in raw:
+        return
+    kind, default = raw["type"], raw["default"]
+    if kind == "path":
+        yield _misplaced(node, "default", f"'{name}' is a path of a test, so it can have no default")
+        return
+    if not isinstance(default, _DEFAULTS[kind]) or (isinstance(default, bool) and kind != "boolean"):
+        yield _misplaced(node, "default", f"the default of '{name}' is no {kind}")
+    elif kind in _NUMBERS and not raw.get("minimum", default) <= default <= raw.get("maximum", default):
+        yield _misplaced(node, "default", f"the default of '{name}' is not between its minimum and its maximum")
+    elif kind == "string" and default not in raw.get("choices", [default]):
+        yield _misplaced(node, "default", f"the default of '{name}' is none of its choices")
+
+
+def _misplaced(node: Mapping, key: str, message: str, hint: str = "") -> Diagnostic:
+    span: Span = node.entries[key].key
+    return Diagnostic(span, RULE, message, hint)

@@ -1,0 +1,96 @@
+"""``extends``: a spec built on another one. Mappings merge deeply, scalars and lists replace, null removes."""
+
+import functools
+from pathlib import Path
+
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, shown_path
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, read
+
+KEY = "extends"
+MAX_CHAIN = 8
+
+_OWN = (KEY, "name")
+_USES = "uses"
+
+
+def resolve(node: Node, file: Path, root: Path) -> tuple[Node, list[Diagnostic]]:
+    """The spec with everything that it extends merged below it; spans keep the file that each value was written in.
+
+    ``root`` is the registry's, which no file of the chain may leave.
+    """
+    return _resolve(node, (file,), root.resolve())
+
+
+def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, list[Diagnostic]]:
+    if not isinstance(node, Mapping) or KEY not in node.entries:
+        return node, []
+    written = node.entries[KEY].value
+    if not isinstance(written, Scalar) or not isinstance(written.value, str):
+        return node, []  # the schema says so
+    path = (chain[-1].parent / written.text).resolve()
+    problem = _problem(written, path, chain, root)
+    if problem:
+        return node, [problem]
+    base, found = _read(path)
+    if not isinstance(base, Mapping):
+        if not found:
+            found = (Diagnostic(written.span, "extends-file", f"'{written.text}' holds no test"),)
+        return node, list(found)
+    below, deeper = _resolve(base, (*chain, path), root)
+    problems = [*found, *deeper]
+    assert isinstance(below, Mapping), "a mapping resolves to one"
+    inherited = Mapping(base.span, {key: entry for key, entry in below.entries.items() if key not in _OWN})
+    return _merge(inherited, node, problems), problems
+
+
+@functools.lru_cache(maxsize=256)
+def _read(path: Path) -> tuple[Node | None, tuple[Diagnostic, ...]]:
+    node, found = read(path)
+    return node, tuple(found)
+
+
+def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -> Diagnostic | None:
+    if not path.is_relative_to(root):
+        message = f"'{written.text}' leaves the registry"
+        return Diagnostic(written.span, "path-escape", message, "a test extends tests of its own registry")
+    if path in chain:
+        names = " extends ".join(p.name for p in (*chain[chain.index(path) :], path))
+        return Diagnostic(written.span, "extends-cycle", f"the test extends itself: {names}")
+    if len(chain) > MAX_CHAIN:
+        return Diagnostic(written.span, "extends-cycle", f"more than {MAX_CHAIN} tests extend one another")
+    if not path.is_file():
+        beside = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        message = f"there is no file '{written.text}' to extend"
+        return Diagnostic(written.span, "extends-file", message, did_you_mean(path.name, beside))
+    return None
+
+
+def _merge(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int = 0) -> Mapping:
+    entries = dict(base.entries)
+    for key, entry in child.entries.items():
+        under = entries.get(key)
+        if isinstance(entry.value, Scalar) and entry.value.value is None:
+            if entries.pop(key, None) is None:
+                problems.append(_nothing(key, entry.key, base))
+        elif under and isinstance(entry.value, Mapping) and isinstance(under.value, Mapping):
+            entries[key] = Entry(entry.key, _merged(under.value, entry.value, problems, depth))
+        else:
+            entries[key] = entry
+    return Mapping(child.span, entries, child.tag)
+
+
+def _merged(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int) -> Mapping:
+    """A service that uses another program than the base's starts afresh: the base's parameters are not for it."""
+    before, after = base.get(_USES), child.get(_USES)
+    if depth == 1 and after is not None and _text(before) != _text(after):
+        return child
+    return _merge(base, child, problems, depth + 1)
+
+
+def _text(node: Node | None) -> str | None:
+    return node.text if isinstance(node, Scalar) else None
+
+
+def _nothing(key: str, span: Span, base: Mapping) -> Diagnostic:
+    message = f"'{key}' is empty, which removes it, but {shown_path(base.span.file)} has none"
+    return Diagnostic(span, "extends-nothing", message, did_you_mean(key, base.entries))

@@ -1,0 +1,144 @@
+"""``matrix``: one spec, an instance for each choice of its values; ``${matrix.light}`` stands for the chosen one."""
+
+import itertools
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
+
+KEY = "matrix"
+MAX_INSTANCES = 2_000
+MAX_SLUG = 180
+
+_PLACEHOLDER = re.compile(r"\$\{matrix\.(?P<name>[a-z][a-z0-9-]*)\}")
+_ATTEMPT = re.compile(r"\$\{\s*matrix\b[^}]*\}?")
+_NOT_SLUG = re.compile(r"[^a-z0-9]+")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One value of each dimension, in the order in which the dimensions are written; empty without a matrix."""
+
+    values: tuple[tuple[str, Scalar], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """``[light=dark,speed=2]``"""
+        return f"[{','.join(f'{k}={v.text}' for k, v in self.values)}]" if self.values else ""
+
+    @property
+    def slug(self) -> str:
+        """``--light-dark--speed-2``"""
+        return "".join(f"--{k}-{_slug(v.text)}" for k, v in self.values)
+
+
+def _slug(text: str) -> str:
+    return _NOT_SLUG.sub("-", text.lower()).strip("-")
+
+
+def choices(node: Node) -> tuple[list[Choice], list[Diagnostic]]:
+    """Every choice of a spec's matrix (one, empty, without a matrix), and what is wrong with its values.
+
+    What the schema finds wrong with the matrix itself is left to it.
+    """
+    entry = node.entries.get(KEY) if isinstance(node, Mapping) else None
+    if entry is None or not isinstance(entry.value, Mapping):
+        return [Choice()], []
+    dimensions = {
+        name: [v for v in dimension.value.items if isinstance(v, Scalar) and v.value is not None]
+        for name, dimension in entry.value.entries.items()
+        if isinstance(dimension.value, Sequence)
+    }
+    found = [problem for name, values in dimensions.items() for problem in _alike(name, values)]
+    number = 1
+    for values in dimensions.values():
+        number *= len(values)
+    if number > MAX_INSTANCES:
+        message = f"the matrix has {number} instances, expected at most {MAX_INSTANCES}"
+        return [Choice()], [*found, Diagnostic(entry.key, "matrix-size", message)]
+    names = tuple(dimensions)
+    product = [Choice(tuple(zip(names, values, strict=True))) for values in itertools.product(*dimensions.values())]
+    if product and len(product[0].slug) > MAX_SLUG:
+        found.append(Diagnostic(entry.key, "matrix-size", "the names and values of the matrix are too long"))
+    return product or [Choice()], found
+
+
+def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
+    seen: dict[str, Scalar] = {}
+    for value in values:
+        slug = _slug(value.text)
+        if not slug:
+            message = f"'{value.text}' has no letter or digit to name an instance of '{name}' by"
+            yield Diagnostic(value.span, "matrix-value", message)
+        elif slug in seen:
+            message = f"'{value.text}' and '{seen[slug].text}' of '{name}' would both be called '{slug}'"
+            yield Diagnostic(value.span, "matrix-value", message)
+        seen.setdefault(slug, value)
+
+
+def placeholders(node: Node) -> set[str]:
+    """The dimensions that the values below a node ask for."""
+    return {m["name"] for n in walk(node) if isinstance(n, Scalar) for m in _PLACEHOLDER.finditer(n.text)}
+
+
+def problems(node: Mapping) -> Iterator[Diagnostic]:
+    """Placeholders that mean no dimension, and dimensions that nothing asks for."""
+    entry = node.entries.get(KEY)
+    dimensions = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
+    used: set[str] = set()
+    for key, part in node.entries.items():
+        if key == KEY:
+            continue
+        for scalar in walk(part.value):
+            if isinstance(scalar, Scalar) and "${" in scalar.text:
+                used |= {m["name"] for m in _PLACEHOLDER.finditer(scalar.text)}
+                yield from _unknown(scalar, dimensions)
+    for name, dimension in dimensions.items():
+        if name not in used:
+            message = f"nothing asks for ${{matrix.{name}}}, so its instances are all the same"
+            yield Diagnostic(dimension.key, "matrix-unused", message, severity="warning")
+
+
+def _unknown(scalar: Scalar, dimensions: dict[str, Entry]) -> Iterator[Diagnostic]:
+    for attempt in _ATTEMPT.finditer(scalar.text):
+        match = _PLACEHOLDER.fullmatch(attempt[0])
+        if match is None:
+            message = f"'{attempt[0][:60]}' is no placeholder, expected one such as ${{matrix.light}}"
+            yield Diagnostic(scalar.span, "matrix-unknown", message)
+        elif match["name"] not in dimensions:
+            hint = did_you_mean(match["name"], dimensions) if dimensions else "write 'matrix:' with its values"
+            yield Diagnostic(scalar.span, "matrix-unknown", f"the matrix has no '{match['name']}'", hint)
+
+
+def substitute(node: Node, choice: Choice) -> Node:
+    """The node with the choice's values in place of the placeholders; what has none stays the same object."""
+    return _substitute(node, dict(choice.values)) if choice.values else node
+
+
+def _substitute(node: Node, values: dict[str, Scalar]) -> Node:
+    if isinstance(node, Scalar):
+        return _scalar(node, values)
+    if isinstance(node, Sequence):
+        items = tuple(_substitute(item, values) for item in node.items)
+        same = all(a is b for a, b in zip(items, node.items, strict=True))
+        return node if same else Sequence(node.span, items, node.tag)
+    entries = {}
+    changed = False
+    for key, entry in node.entries.items():
+        value = _substitute(entry.value, values)
+        changed = changed or value is not entry.value
+        entries[key] = entry if value is entry.value else Entry(entry.key, value)
+    return Mapping(node.span, entries, node.tag) if changed else node
+
+
+def _scalar(node: Scalar, values: dict[str, Scalar]) -> Scalar:
+    if "${" not in node.text:
+        return node
+    whole = _PLACEHOLDER.fullmatch(node.text)
+    if whole:
+        chosen = values.get(whole["name"])
+        return Scalar(node.span, chosen.value, chosen.text, node.tag) if chosen else node
+    text = _PLACEHOLDER.sub(lambda m: values[m["name"]].text if m["name"] in values else m[0], node.text)
+    return Scalar(node.span, text, text, node.tag)

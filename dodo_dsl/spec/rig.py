@@ -1,0 +1,64 @@
+"""Rigs: the hardware that a deployment has, and the emulated one that every machine has."""
+
+import functools
+from dataclasses import dataclass
+
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, parse
+
+EMULATED = "emulated"
+EMULATED_FILE = "the emulated rig"
+
+_EMULATED = """
+kind: dynamic
+serial: emulated
+camera: {source: emulated, width: 640, height: 480}
+"""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig; ``kind`` is static or dynamic, ``cid`` the one reserved for it, None for the emulated one."""
+
+    name: str
+    kind: str
+    cid: int | None
+    node: Mapping
+
+    @property
+    def is_emulated(self) -> bool:
+        return self.name == EMULATED
+
+    @property
+    def tag(self) -> str:
+        """The GitLab runner's: the emulated rig runs wherever simulations do."""
+        return "sil" if self.is_emulated else f"hil-{self.kind}"
+
+    @property
+    def isolation(self) -> str:
+        """Hardware is reached through the host; what is emulated needs none of it."""
+        return "network" if self.is_emulated else "host"
+
+    @property
+    def privileged(self) -> bool:
+        """Whether the deployment lets an application's privileged services be so on this rig."""
+        node = self.node.get("privileged")
+        return isinstance(node, Scalar) and node.value is True
+
+    def entry(self, key: str) -> Entry | None:
+        """What the rig has at a dotted key such as ``camera.width``."""
+        node: Node = self.node
+        entry = None
+        for part in key.split("."):
+            entry = node.entries.get(part) if isinstance(node, Mapping) else None
+            if entry is None:
+                return None
+            node = entry.value
+        return entry
+
+
+@functools.cache
+def emulated() -> Rig:
+    """The rig whose firmware runs in a simulator."""
+    node, _ = parse(_EMULATED, EMULATED_FILE)
+    assert isinstance(node, Mapping)
+    return Rig(EMULATED, "dynamic", None, node)

@@ -1,0 +1,98 @@
+"""A pipeline as a runner runs it: gitlab-ci-local with the deployment's template, its artifact, its child, real tests.
+
+It ends with 0 whatever a child ends with, so that the child is run by its own file too.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from dodo_dsl import data
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+PROGRAMS = CACHE / "dodo/gitlab-ci-local/node_modules/.bin"
+TESTS = ("sil-closed-left-curve", "sil-closed-straight")
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """A repository with the shipped simulations, the example application, and the pipeline of `dodo new`."""
+    if not (PROGRAMS / "gitlab-ci-local").exists() or not shutil.which("rsync"):
+        pytest.skip("gitlab-ci-local or rsync is not installed; scripts/install-gitlab-ci-local installs them")
+    skipped = shutil.ignore_patterns("__pycache__", "hil-*", "dil-*", "recordings")
+    shutil.copytree(ROOT / "tests_registry", tmp_path / "tests", ignore=skipped)
+    shutil.copytree(ROOT / "examples/kiwi", tmp_path / "kiwi", ignore=skipped)
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\n")
+    run(tmp_path, sys.executable, "-m", "dodo_dsl", "new", "--deployment")
+    for words in (["init", "-q", "-b", "main"], ["remote", "add", "origin", "git@gitlab.example.org:team/tests.git"]):
+        run(tmp_path, "git", *words)
+    commit(tmp_path)
+    return tmp_path
+
+
+def commit(folder: Path) -> None:
+    run(folder, "git", "add", "-A")
+    run(folder, "git", "-c", "user.name=Test", "-c", "user.email=test@example.org", "commit", "-qm", "Change")
+
+
+def run(folder: Path, *command: str) -> None:
+    subprocess.run(command, cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True)
+
+
+def pipeline(folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
+    """gitlab-ci-local with the `dodo` of these tests' environment; its state stays in the repository's folder."""
+    path = os.pathsep.join([str(PROGRAMS), str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder / ".leases")}
+    command = ["gitlab-ci-local", "--home", str(folder / ".home"), "--concurrency", "1", *words]
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300
+    )
+
+
+def artifact(folder: Path, job: str, name: str) -> Path:
+    return folder / ".gitlab-ci-local/artifacts" / job / name
+
+
+def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> None:
+    result = pipeline(repository)
+    assert result.returncode == 0, result.stdout[-4000:] + result.stderr[-2000:]
+    assert (repository / "gl-code-quality-report.json").read_text().strip() == "[]"
+    assert artifact(repository, "pipeline", "generated/child.gitlab-ci.yml").is_file()
+    for name in TESTS:
+        (case,) = ElementTree.parse(artifact(repository, name, "dodo-report/junit.xml")).iter("testcase")
+        assert (case.get("name"), case.get("classname")) == (name, "sil")
+        assert [child.tag for child in case if child.tag in ("failure", "error", "skipped")] == [], result.stdout[
+            -4000:
+        ]
+        assert artifact(repository, name, "dodo-report/metrics.txt").is_file()
+
+
+def test_a_failing_application_fails_its_job(repository: Path) -> None:
+    """It steers the other way, hits a wall, and the job's exit code says so; the report is kept."""
+    steering = repository / "kiwi/steering.py"
+    right, wrong = "groundSteering=", "groundSteering=-"
+    assert right in steering.read_text()
+    steering.write_text(steering.read_text().replace(right, wrong))
+    commit(repository)
+    run(repository, sys.executable, "-m", "dodo_dsl", "compile", "sil-closed-straight")
+    child = repository / "generated/child.gitlab-ci.yml"
+    result = pipeline(repository, "--file", str(child.relative_to(repository)), "--variable", "PARENT_PIPELINE_ID=1")
+    assert result.returncode == 1, result.stdout[-4000:] + result.stderr[-2000:]
+    assert "FAIL" in result.stdout
+    (case,) = ElementTree.parse(artifact(repository, "sil-closed-straight", "dodo-report/junit.xml")).iter("testcase")
+    failure = case.find("failure")
+    assert failure is not None
+    assert "wall" in str(failure.get("message"))
+
+
+def test_the_template_that_is_installed_is_the_one_that_runs(repository: Path) -> None:
+    written = repository / ".gitlab/dodo/deployment.gitlab-ci.yml"
+    assert written.read_bytes() == (data.templates() / "gitlab/deployment.gitlab-ci.yml").read_bytes()

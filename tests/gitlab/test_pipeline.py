@@ -1,0 +1,123 @@
+"""The child pipeline: what its jobs say, and what GitLab would refuse of it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.emit.pipeline import pipeline_problems
+from dodo_dsl.emit.render import render_pipeline
+from dodo_dsl.plan.model import Place, Plan, Suite
+
+OnRig = Callable[[str, str], Plan]
+
+
+def child(*plans: Plan, gates: bool = True, folder: str = "generated") -> dict[str, Any]:
+    return dict(yaml.safe_load(render_pipeline(Suite(plans, gates), folder).text))
+
+
+def problems(*plans: Plan, text: str = "") -> list[Diagnostic]:
+    return pipeline_problems(Suite(plans), text or render_pipeline(Suite(plans), "generated").text)
+
+
+def test_a_simulation_is_a_job(plan: Plan) -> None:
+    job = child(plan)[plan.slug]
+    assert (job["stage"], job["tags"], job["interruptible"]) == ("sil", ["sil"], True)
+    assert job["rules"] == [{"when": "on_success"}]
+    assert job["needs"] == [{"pipeline": "$PARENT_PIPELINE_ID", "job": "compile"}]
+    assert job["timeout"] == "11 minutes"
+    assert job["artifacts"]["when"] == "always"
+    assert job["artifacts"]["reports"] == {"junit": "dodo-report/junit.xml", "metrics": "dodo-report/metrics.txt"}
+    assert "resource_group" not in job
+
+
+def test_hil_waits_for_a_gate_behind_all_others(plan: Plan, on_rig: OnRig) -> None:
+    made = child(plan, replace(plan, slug="dil", level="dil"), on_rig("hil", "kiwi"))
+    assert made["stages"] == ["sil", "dil", "gate", "hil"]
+    assert "needs" not in made["gate"], "a job without needs waits for all stages before its own"
+    assert made["hil"]["needs"][1:] == ["gate"]
+    assert made["dil"]["needs"][1:] == []
+
+
+def test_without_gates_or_others_hil_waits_for_nothing(plan: Plan, on_rig: OnRig) -> None:
+    for made in (child(plan, on_rig("hil", "kiwi"), gates=False), child(on_rig("hil", "kiwi"))):
+        assert "gate" not in made
+        assert "gate" not in made["stages"]
+        assert len(made["hil"]["needs"]) == 1
+
+
+def test_a_rig_is_for_one_test_at_a_time_and_never_cancelled(on_rig: OnRig) -> None:
+    made = child(on_rig("real", "kiwi"), on_rig("model", "emulated"))
+    assert (made["real"]["resource_group"], made["real"]["tags"]) == ("kiwi", ["hil-dynamic"])
+    assert made["real"]["interruptible"] is False
+    assert "resource_group" not in made["model"]
+    assert made["model"]["tags"] == ["sil"]
+
+
+def test_only_failures_of_runners_are_tried_again(plan: Plan) -> None:
+    assert child(plan)["default"]["retry"]["when"] == ["runner_system_failure", "stuck_or_timeout_failure"]
+
+
+def test_tests_of_images_log_in_to_the_registry(plan: Plan) -> None:
+    (first, *others) = plan.application.services
+    services = (replace(first, process=None), *others)
+    made = child(replace(plan, application=replace(plan.application, services=services)))
+    assert made["variables"] == {"DODO_REGISTRY": "$CI_REGISTRY"}
+    assert "variables" not in child(plan)
+    assert "--password-stdin" in made["default"]["before_script"][0]
+
+
+def test_a_folder_is_one_word_to_the_shell(plan: Plan) -> None:
+    (line,) = child(plan, folder="out $(touch x)")[plan.slug]["script"]
+    assert line.startswith(f"dodo run --compiled 'out $(touch x)/{plan.slug}' ")
+
+
+def test_gitlab_accepts_it(plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]) -> None:
+    suite = Suite((plan, on_rig("hil-real", "kiwi"), on_rig("hil-model", "emulated")))
+    file = render_pipeline(suite, "generated")
+    (tmp_path / file.path).write_text(file.text)
+    accepted(tmp_path / file.path)
+
+
+def test_a_common_pipeline_has_no_problem(plan: Plan) -> None:
+    assert problems(*(replace(plan, slug=f"{plan.slug}--n-{n}") for n in range(500))) == []
+
+
+def test_long_job_names_are_errors_at_the_matrix(plan: Plan) -> None:
+    places = {"name": Place(plan.spec, 3, 7), "matrix": Place(plan.spec, 8, 9)}
+    (problem,) = problems(plan, replace(plan, slug="a" * 256, source_map=places))
+    assert (problem.severity, problem.rule) == ("error", "pipeline-limit")
+    assert (problem.span.file, problem.span.line, problem.span.column) == (plan.spec, 8, 9)
+    assert "has a name of 256 characters, more than 255" in problem.message
+    assert problems(replace(plan, slug="a" * 255)) == []
+
+
+def test_a_file_over_5_mb_is_an_error(plan: Plan) -> None:
+    assert problems(plan, text="#" * (5 << 20)) == []
+    (problem,) = problems(plan, text="#" * ((5 << 20) + 1))
+    assert (problem.severity, problem.message) == ("error", "the child pipeline has 5.0 MB, GitLab takes 5 MB")
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [(501, "501 jobs, gitlab.com takes 500 on its free tier"), (851, "851 jobs, which take more than the 2 MB")],
+)
+def test_many_jobs_are_a_warning_at_the_test_with_most_instances(plan: Plan, number: int, said: str) -> None:
+    small = replace(plan, spec="small/small.dodo.yml", slug="small")
+    many = [replace(plan, slug=f"{plan.slug}--n-{n}") for n in range(number - 1)]
+    (problem,) = problems(small, *many, text="stages: [sil]")
+    assert (problem.severity, problem.span.file) == ("warning", plan.spec)
+    assert said in problem.message
+    assert problem.message.endswith(f"({number - 1} of this test)")
+
+
+def test_the_gate_counts_and_needs_stay_few(plan: Plan, on_rig: OnRig) -> None:
+    plans = [replace(plan, slug=f"sil-{n}") for n in range(499)]
+    assert problems(*plans, replace(plan, slug="last")) == []
+    (problem,) = problems(*plans, on_rig("hil", "kiwi"))
+    assert "has 501 jobs" in problem.message
+    assert len(child(*plans, on_rig("hil", "kiwi"))["hil"]["needs"]) == 2

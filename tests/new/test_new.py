@@ -1,0 +1,140 @@
+"""``dodo new``: what it writes compiles at once, and nothing that is there changes."""
+
+from io import StringIO
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dodo_dsl.cli.main import main
+
+
+def dodo(*words: str) -> tuple[int, str, str]:
+    stdout, stderr = StringIO(), StringIO()
+    code = main(words, stdout, stderr)
+    return code, stdout.getvalue(), stderr.getvalue()
+
+
+@pytest.fixture
+def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def repository(empty: Path) -> Path:
+    code, out, err = dodo("new", "--deployment")
+    assert (code, err) == (0, ""), out
+    return empty
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("level", "kind"), [(None, None), ("sil", "closed-loop"), ("sil", "open-loop"), ("hil", "closed-loop")]
+)
+def test_a_new_test_compiles_at_once(repository: Path, level: str | None, kind: str | None) -> None:
+    options = [*(("--level", level) if level else ()), *(("--kind", kind) if kind else ())]
+    code, out, err = dodo("new", "my-test", *options)
+    assert (code, err) == (0, "")
+    assert "wrote tests/my-test/my-test.dodo.yml\n" in out
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+    spec = yaml.safe_load((repository / "tests/my-test/my-test.dodo.yml").read_text())
+    assert (spec["level"], spec["kind"]) == (level or "sil", kind or "closed-loop")
+    assert (repository / "tests/my-test/README.md").read_text().startswith("# my-test\n")
+    assert dodo("compile")[0] == 0
+
+
+def test_a_new_test_may_extend_another(repository: Path) -> None:
+    assert dodo("new", "first")[0] == dodo("new", "second", "--extends", "first")[0] == 0
+    assert dodo("compile", "--check") == (0, "2 tests checked: no problems\n", "")
+    spec = yaml.safe_load((repository / "tests/second/second.dodo.yml").read_text())
+    assert spec["extends"] == "../first/first.dodo.yml"
+
+
+def test_editors_find_the_schema(repository: Path) -> None:
+    dodo("new", "first")
+    line = (repository / "tests/first/first.dodo.yml").read_text().splitlines()[0]
+    schema = repository / "tests/first" / line.partition("$schema=")[2]
+    assert '"title": "DoDo test"' in schema.read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["First"], "'First' cannot name a test, expected lower-case letters and digits in words joined by"),
+        (["../first"], "'../first' cannot name a test"),
+        (["a" * 61], "at most 60 characters"),
+        (["variables"], "'variables' is a keyword of GitLab's pipelines"),
+        (["there"], "there is a test 'there' already; names are unique over all registries"),
+        (["half"], "there is a file 'tests/half/README.md' already; nothing was written"),
+        (["new", "--extends", "their"], "there is no test 'their' to extend; did you mean 'there'?"),
+        (["new", "--extends", "there", "--level", "hil"], "write no --level or --kind"),
+        (["new", "--level", "dil"], "a dil test cannot be closed-loop"),
+        (["new", "--level", "dil", "--kind", "open-loop"], "a dil test replays a recording of yours"),
+        (["new", "--kind", "perception"], "a perception test needs the true boxes"),
+        (["new", "--level", "hil", "--kind", "open-loop"], "a hil test begins closed-loop; open-loop ones are"),
+        (["--deployment", "--level", "hil"], "--level, --kind and --extends belong to a test"),
+    ],
+    ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
+)
+def test_what_cannot_be_begun_is_said_and_writes_nothing(repository: Path, words: list[str], said: str) -> None:
+    assert dodo("new", "there")[0] == 0
+    (repository / "tests/half").mkdir()
+    (repository / "tests/half/README.md").write_text("mine")
+    before = contents(repository)
+    code, out, err = dodo("new", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("dodo new: ")
+    assert said in err
+    assert err.count("\n") == 1
+    assert contents(repository) == before
+
+
+def test_outside_a_deployment_it_says_the_way(empty: Path) -> None:
+    code, _, err = dodo("new", "first")
+    assert (code, list(empty.iterdir())) == (2, [])
+    assert err == "dodo new: there is no dodo.yml here or above; dodo new --deployment writes one\n"
+
+
+def test_a_deployment_without_folders_of_its_own_is_said(empty: Path) -> None:
+    (empty / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:"]\n')
+    code, _, err = dodo("new", "first")
+    assert (code, err) == (2, "dodo new: dodo.yml names no folder of this repository under 'registry'\n")
+
+
+def test_shipped_tests_are_not_extended_from_elsewhere(repository: Path) -> None:
+    deployment = repository / "dodo.yml"
+    deployment.write_text(deployment.read_text().replace("[tests]", '[tests, "dodo:"]'))
+    code, _, err = dodo("new", "first", "--extends", "sil-closed-straight")
+    assert (code, err) == (2, "dodo new: 'sil-closed-straight' ships with DoDo; copy it to extend it\n")
+
+
+def test_a_deployment_is_written_once(repository: Path) -> None:
+    before = contents(repository)
+    code, out, err = dodo("new", "--deployment")
+    assert (code, err) == (0, "")
+    assert out.endswith("\nnothing to write\n")
+    assert out.count("left as it is: ") == len(before)
+    assert contents(repository) == before
+
+
+def test_a_deployment_takes_the_compose_file_that_is_there(empty: Path) -> None:
+    (empty / "compose.yml").write_text("services: {app: {image: example}}\n")
+    (empty / ".gitlab-ci.yml").write_text("build: {script: [make]}\n")
+    before = contents(empty)
+    code, out, _ = dodo("new", "--deployment")
+    assert code == 0
+    assert before.items() <= contents(empty).items()
+    assert not (empty / "docker-compose.yml").exists()
+    assert yaml.safe_load((empty / "dodo.yml").read_text())["application"] == "compose.yml"
+    assert "include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml" in out
+
+
+def test_the_image_of_a_pipeline_reaches_the_compose_file(repository: Path) -> None:
+    dodo("new", "first")
+    assert dodo("compile")[0] == 0
+    application = (repository / "generated/first/application.compose.yml").read_text()
+    assert "${DODO_IMAGE_APPLICATION:-registry.example.org/group/application:latest}" in application
