@@ -158,7 +158,7 @@ class Recording:
         data = b"".join((*pieces, PADDING))
         if len(data) != at + len(PADDING):
             raise RecordingError(f"{self.path} has become shorter while it was read")
-        table = recording_table.read_frames(data, starts.tolist(), (starts + sizes).tolist())
+        table = recording_table.read_frames(data, starts.tolist(), (starts + sizes).tolist(), known=True)
         if table.shape[1] != len(rows):
             raise RecordingError(f"{self.path} has changed while it was read")
         back = np.empty(len(rows), np.int64)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import varints
-from dodo_dsl.opendlv.envelope import HEADER_BYTES, FrameError, decode_parts
+from dodo_dsl.opendlv.envelope import HEADER_BYTES, MAGIC, FrameError, decode_body, decode_parts, encode_body
 from dodo_dsl.opendlv.varints import Marks, Numbers
 
 PADDING = bytes(128)  # what a reader of the last frame may look at beyond it
@@ -44,21 +44,24 @@ def empty() -> Table:
     return np.zeros((len(Fact), 0), np.int64)
 
 
-def read_frames(data: bytes, starts: list[int], ends: list[int]) -> Table:
-    """The rows of frames up to the first that holds no envelope; `data` ends with PADDING."""
+def read_frames(data: bytes, starts: list[int], ends: list[int], known: bool = False) -> Table:
+    """The rows of frames up to the first that holds no envelope; `data` ends with PADDING.
+
+    `known` frames were read before and are not doubted again.
+    """
     if len(starts) < FEW:
-        rows = one_by_one(data, starts, ends)
+        rows = _one_by_one(data, starts, ends, known)
         return np.array(rows, np.int64).T if rows else empty()
     table, usual = _at_once(data, np.array(starts, np.int64), np.array(ends, np.int64))
     for row in np.flatnonzero(~usual).tolist():
-        found = one_by_one(data, starts[row : row + 1], ends[row : row + 1])
+        found = _one_by_one(data, starts[row : row + 1], ends[row : row + 1], known)
         if not found:
             return table[:, :row]
         table[:, row] = found[0]
     return table
 
 
-def one_by_one(data: bytes, starts: list[int], ends: list[int]) -> list[tuple[int, ...]]:
+def _one_by_one(data: bytes, starts: list[int], ends: list[int], known: bool) -> list[tuple[int, ...]]:
     """Rows up to the first frame that holds no envelope."""
     rows = []
     for start, end in zip(starts, ends, strict=True):
@@ -67,6 +70,8 @@ def one_by_one(data: bytes, starts: list[int], ends: list[int]) -> list[tuple[in
         try:
             kind, payload, times, stamp = decode_parts(data[start + HEADER_BYTES : end])
         except FrameError:
+            break
+        if not known and _is_doubtful(data, start, end):
             break
         at = data.find(payload, start + HEADER_BYTES, end)
         rows.append((start, end, kind, at, at + len(payload), *times, stamp))
@@ -105,6 +110,17 @@ def _at_once(data: bytes, starts: Numbers, ends: Numbers) -> tuple[Table, Marks]
     usual &= (length > 0) & (stamp < _MAX_UINT32) & (at + 1 + length == ends)
     table[Fact.SENDER_STAMP] = stamp
     return table, usual
+
+
+def _is_doubtful(data: bytes, start: int, end: int) -> bool:
+    """Whether a frame was cut and took bytes of the next ones, which happen to make an envelope with its own.
+
+    Such a one has a header inside, none behind it, and is not as libcluon writes it.
+    """
+    if end + len(PADDING) >= len(data) or data.startswith(MAGIC, end) or data.find(MAGIC, start + 1, end) < 0:
+        return False
+    body = data[start + HEADER_BYTES : end]
+    return encode_body(decode_body(body)) != body
 
 
 def _begins_well(data: bytes, at: int, end: int) -> bool:
