@@ -70,7 +70,8 @@ def _explain(checked: Checked, name: str, stdout: TextIO, stderr: TextIO) -> int
     for parameter in manifest.parameters.values():
         default = "" if parameter.default is None else f", default {parameter.default}"
         facts = "required" if parameter.required else f"{parameter.type}{default}"
-        stdout.write(f"  {parameter.name}: {facts} {parameter.unit}".rstrip() + f"\n      {parameter.help}\n")
+        unit = parameter.unit.replace("1", "")  # of a share, nothing is written
+        stdout.write(f"  {parameter.name}: {facts} {unit}".rstrip() + f"\n      {parameter.help}\n")
     for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):
         for way, names in (("in", ports.inputs), ("out", ports.outputs)):
             if names:

@@ -13,6 +13,8 @@ from dodo_dsl import data
 from dodo_dsl.emit.containers import containers
 from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
+from dodo_dsl.plan.variables import dotenv_line
+from dodo_dsl.source import resolve
 
 _SERVICE_DEPTH = 2
 _MOST_BLOCKS = 10_000
@@ -35,6 +37,14 @@ class _Dumper(yaml.SafeDumper):
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
+
+
+def _text(dumper: _Dumper, value: str) -> yaml.ScalarNode:
+    """A text, in quotes where YAML 1.2 would take it for something else."""
+    return dumper.represent_scalar("tag:yaml.org,2002:str", value, None if isinstance(resolve(value), str) else "'")
+
+
+_Dumper.add_representer(str, _text)
 
 
 def _yaml_block(value: dict[str, Any], depth: int = 0) -> str:
@@ -72,7 +82,7 @@ def _templates() -> jinja2.Environment:
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
         keep_trailing_newline=True,
     )
-    environment.filters.update(yaml=_yaml, yaml_block=_yaml_block)
+    environment.filters.update(yaml=_yaml, yaml_block=_yaml_block, dotenv=dotenv_line)
     return environment
 
 

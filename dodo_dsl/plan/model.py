@@ -53,16 +53,21 @@ class ApplicationService:
     environment: dict[str, str | None] = field(default_factory=dict)
     takes_cid: bool = False
     takes_memory: bool = False
+    env_files: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Application:
-    """The application; ``folder`` is its compose file's folder, relative to the compiled test's."""
+    """The application; ``folder`` is its compose file's folder, relative to the compiled test's.
+
+    ``variables`` are those of its ``.env``, as compose interpolates them.
+    """
 
     folder: str
     services: tuple[ApplicationService, ...]
     compose: dict[str, Any] = field(default_factory=dict)
     changes: tuple[str, ...] = ()
+    variables: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -165,6 +170,8 @@ def _problem(plan: Plan) -> str:
         "a word": all(isinstance(w, str) for s in services for w in s.process or ())
         and all(isinstance(w, str) for s in plan.application.services for w in s.command),
         "an environment": all(isinstance(s.environment, dict) for s in plan.application.services),
+        "a variable": all(isinstance(v, str) for v in plan.application.variables.values()),
+        "a file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
 
@@ -192,6 +199,5 @@ def _service(raw: dict[str, Any]) -> Service:
 
 def _application_service(raw: dict[str, Any]) -> ApplicationService:
     process = raw["process"]
-    return ApplicationService(
-        **{**raw, "process": None if process is None else tuple(process), "command": tuple(raw["command"])}
-    )
+    words = {"process": None if process is None else tuple(process), "command": tuple(raw["command"])}
+    return ApplicationService(**{**raw, **words, "env_files": tuple(raw["env_files"])})

@@ -104,7 +104,7 @@ class DockerBackend:
 
     async def _provide_images(self) -> None:
         application = {s.name for s in self.plan.application.services}
-        built = [name for name, s in self._config.items() if "build" in s]
+        built = [name for name, s in self._config.items() if "build" in s and "@" not in s.get("image", "")]
         own = {s["image"] for name, s in self._config.items() if name not in application}
         foreign = {s["image"] for name, s in self._config.items() if name in application and name not in built}
         for note in await self._pulls.provide(own, foreign, self._say):

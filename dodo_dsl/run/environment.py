@@ -6,9 +6,12 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from dodo_dsl.plan import variables
+
 _VARIABLE = re.compile(
     r"\$(?:(?P<escaped>\$)|(?P<bare>[A-Za-z_][A-Za-z0-9_]*)"
-    r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>[^}]*))?\})"
+    r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>.*))?\})",
+    re.DOTALL,
 )
 
 
@@ -16,37 +19,42 @@ class MissingVariable(ValueError):
     """A variable that must be set (``${NAME:?why}``) is not."""
 
 
-def interpolate(text: str, variables: Mapping[str, str]) -> str:
-    """``$NAME``, ``${NAME}``, ``${NAME:-default}``, ``${NAME:?error}``, ``${NAME:+other}`` and ``$$`` as in compose."""
+def interpolate(text: str, known: Mapping[str, str]) -> str:
+    """``$NAME``, ``${NAME}``, ``${NAME:-default}``, ``${NAME:?error}``, ``${NAME:+other}`` and ``$$`` as in compose.
 
-    def value(match: re.Match[str]) -> str:
-        if match["escaped"]:
-            return "$"
-        name = match["bare"] or match["name"]
-        found = variables.get(name)
-        present = bool(found) if match["colon"] else found is not None
-        if match["operator"] == "+":
-            return match["word"] if present else ""
-        if present:
-            return found or ""
-        if match["operator"] == "?":
-            raise MissingVariable(f"variable {name} is not set: {match['word'] or 'it is required'}")
-        return match["word"] if match["operator"] == "-" else found or ""
-
-    return _VARIABLE.sub(value, text)
+    Defaults may hold variables in turn.
+    """
+    parts, place = [], 0
+    while (dollar := text.find("$", place)) >= 0:
+        end = variables.end_of_variable(text, dollar)
+        match = _VARIABLE.fullmatch(text, dollar, end)
+        parts += [text[place:dollar], _value(match, known) if match else text[dollar:end]]
+        place = end
+    return "".join([*parts, text[place:]])
 
 
-def dotenv(path: Path) -> dict[str, str]:
-    """The ``NAME=value`` lines of a ``.env`` file, quotes stripped; empty when there is none."""
+def _value(match: re.Match[str], known: Mapping[str, str]) -> str:
+    if match["escaped"]:
+        return "$"
+    name = match["bare"] or match["name"]
+    found, word = known.get(name), match["word"] or ""
+    present = bool(found) if match["colon"] else found is not None
+    if match["operator"] == "+":
+        return interpolate(word, known) if present else ""
+    if present:
+        return found or ""
+    if match["operator"] == "?":
+        raise MissingVariable(f"variable {name} is not set: {word or 'it is required'}")
+    return interpolate(word, known) if match["operator"] == "-" else found or ""
+
+
+def dotenv(path: Path, known: Mapping[str, str]) -> dict[str, str]:
+    """The variables of a ``.env`` file, each as it is with those before it and ``known``; empty when there is none."""
     if not path.is_file():
         return {}
-    found = {}
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        name, sign, value = line.strip().removeprefix("export ").partition("=")
-        if sign and not name.startswith("#"):
-            value = value.strip()
-            quoted = len(value) > 1 and value[0] == value[-1] and value[0] in "'\""
-            found[name.strip()] = value[1:-1] if quoted else value
+    found: dict[str, str] = {}
+    for name, value in variables.dotenv(path.read_text(encoding="utf-8", errors="replace")).items():
+        found[name] = interpolate(value, {**found, **known})
     return found
 
 

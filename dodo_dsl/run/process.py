@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import data
-from dodo_dsl.plan.argv import CID_VARIABLES, memory_name, with_cid, with_memory_prefix
+from dodo_dsl.plan.argv import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.plan.model import ApplicationService, Flag, Plan, Service
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
@@ -202,13 +202,17 @@ class ProcessBackend:
     def _application_command(self, service: ApplicationService) -> Command:
         folder = (self.folder / self.plan.application.folder).resolve()
         inherited = base_environment()
-        variables = {**dotenv(folder / ".env"), **inherited}
-        own = {
-            name: inherited.get(name, "") if value is None else interpolate(value, variables)
-            for name, value in service.environment.items()
-        }
-        own.update({name: str(self.lane.cid) for name in CID_VARIABLES if name in own})
-        words = tuple(interpolate(word, variables) for word in service.command)
+        told = {name: str(self.lane.cid) for name in CID_VARIABLES}
+        variables = {**dotenv(folder / ".env", inherited), **inherited}
+        variables.update({name: cid for name, cid in told.items() if name in self.plan.application.variables})
+        own: dict[str, str] = {}
+        for path in service.env_files:
+            own.update(dotenv(folder / Path(interpolate(path, variables)).expanduser(), variables))
+        for name, value in service.environment.items():
+            own[name] = variables.get(name, "") if value is None else interpolate(value, variables)
+        own = {name: told.get(name, with_cid_text(value, self.lane.cid)) for name, value in own.items()}
+        told_words = ((word, interpolate(word, variables)) for word in service.command)
+        words = tuple(value for word, value in told_words if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.lane.cid), self.lane.memory_prefix)
         environment = {**inherited, **own, "DODO_LANE": self.lane.name}
         return Command(service.name, "application", argv, environment, folder)

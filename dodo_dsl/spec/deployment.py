@@ -8,15 +8,17 @@ from pathlib import Path
 
 from dodo_dsl import __version__, data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, plain, read
+from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.schema import validate
 
-_ODVD_PLACE = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+): (?P<text>.+)", re.DOTALL)
+_ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
+_FROM_HERE = "paths count from the folder of dodo.yml"
+_NETWORK = "for example 10.213.0.0/16"
 DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 
@@ -97,20 +99,22 @@ def _texts(entry: Entry | None) -> Iterator[Scalar]:
 def _folders(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
     folders = []
     for item in _texts(entry):
-        folder = data.registry() if item.text == SHIPPED else (root / item.text).resolve()
-        if not folder.is_dir():
-            problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'"))
-        folders.append(folder)
+        folder = data.registry() if item.text == SHIPPED else path_of(root, item.text)
+        if folder is None or not folder.is_dir():
+            problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'", _FROM_HERE))
+        else:
+            folders.append(folder)
     return tuple(folders)
 
 
 def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
     files = []
     for item in _texts(entry):
-        if (root / item.text).is_file():
+        path = path_of(root, item.text)
+        if path is not None and path.is_file():
             files.append(root / item.text)
         else:
-            problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'"))
+            problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'", _FROM_HERE))
     return tuple(files)
 
 
@@ -127,7 +131,7 @@ def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnosti
         place = _ODVD_PLACE.fullmatch(str(error))
         span, text = entry.key, str(error)
         if place:
-            span, text = Span(place["file"], int(place["line"]), int(place["column"])), place["text"]
+            span, text = Span(place["file"], int(place["line"] or 1), int(place["column"] or 1)), place["text"]
         problems.append(Diagnostic(span, "wrong-messages", text))
 
 
@@ -168,7 +172,7 @@ def _subnets(entry: Entry | None, problems: list[Diagnostic]) -> ipaddress.IPv4N
     try:
         network = ipaddress.IPv4Network(entry.value.text)
     except ValueError as error:
-        problems.append(Diagnostic(entry.value.span, "wrong-value", f"no IPv4 network: {error}"))
+        problems.append(Diagnostic(entry.value.span, "wrong-value", f"no IPv4 network: {error}", _NETWORK))
         return DEFAULT_SUBNETS
     if network.prefixlen > 28:
         message = f"'{entry.value.text}' is too small, every test needs a /28"

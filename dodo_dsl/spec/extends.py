@@ -4,7 +4,7 @@ import functools
 from pathlib import Path
 
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, shown_path
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, read
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, path_of, read
 
 KEY = "extends"
 MAX_CHAIN = 8
@@ -21,13 +21,19 @@ def resolve(node: Node, file: Path, root: Path) -> tuple[Node, list[Diagnostic]]
     return _resolve(node, (file,), root.resolve())
 
 
+def is_text(node: Node) -> bool:
+    """Whether what is extended can be read as a path, or nothing is."""
+    written = node.get(KEY) if isinstance(node, Mapping) else None
+    return written is None or (isinstance(written, Scalar) and isinstance(written.value, str))
+
+
 def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, list[Diagnostic]]:
-    if not isinstance(node, Mapping) or KEY not in node.entries:
-        return node, []
-    written = node.entries[KEY].value
-    if not isinstance(written, Scalar) or not isinstance(written.value, str):
+    written = node.get(KEY) if isinstance(node, Mapping) else None
+    if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not is_text(node):
         return node, []  # the schema says so
-    path = (chain[-1].parent / written.text).resolve()
+    path = path_of(chain[-1].parent, written.text)
+    if path is None:
+        return node, [Diagnostic(written.span, "extends-file", f"'{written.text[:60]}' is no path")]
     problem = _problem(written, path, chain, root)
     if problem:
         return node, [problem]
@@ -40,7 +46,8 @@ def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, lis
     problems = [*found, *deeper]
     assert isinstance(below, Mapping), "a mapping resolves to one"
     inherited = Mapping(base.span, {key: entry for key, entry in below.entries.items() if key not in _OWN})
-    return _merge(inherited, node, problems), problems
+    own = Mapping(node.span, {key: entry for key, entry in node.entries.items() if key != KEY}, node.tag)
+    return _merge(inherited, own, problems), problems
 
 
 @functools.lru_cache(maxsize=256)
@@ -58,6 +65,10 @@ def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -
         return Diagnostic(written.span, "extends-cycle", f"the test extends itself: {names}")
     if len(chain) > MAX_CHAIN:
         return Diagnostic(written.span, "extends-cycle", f"more than {MAX_CHAIN} tests extend one another")
+    if path.is_dir():
+        specs = sorted(p.name for p in path.glob("*.dodo.yml"))[:6]
+        hint = f"write '{written.text}/{specs[0]}'" if len(specs) == 1 else ""
+        return Diagnostic(written.span, "extends-file", f"'{written.text}' is a folder, expected a test's file", hint)
     if not path.is_file():
         beside = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         message = f"there is no file '{written.text}' to extend"

@@ -113,8 +113,9 @@ def load_manifests(folders: tuple[Path, ...] = ()) -> tuple[dict[str, Manifest],
             manifest, problems = load_manifest(path)
             found.extend(problems)
             if manifest and manifest.name in manifests:
-                other = shown_path(str(manifests[manifest.name].folder))
-                message = f"the service '{manifest.name}' is in {other} already"
+                other = manifests[manifest.name].folder
+                where = "among DoDo's own" if other.parent == data.services() else f"in {shown_path(str(other))}"
+                message = f"the service '{manifest.name}' is {where} already"
                 found.append(Diagnostic(Span(str(path)), "name-taken", message, "give it a name of its own"))
             elif manifest:
                 manifests[manifest.name] = manifest

@@ -57,11 +57,13 @@ def choices(node: Node) -> tuple[list[Choice], list[Diagnostic]]:
         number *= len(values)
     if number > MAX_INSTANCES:
         message = f"the matrix has {number} instances, expected at most {MAX_INSTANCES}"
-        return [Choice()], [*found, Diagnostic(entry.key, "matrix-size", message)]
+        hint = "choose fewer values, or write several tests that extend this one"
+        return [Choice()], [*found, Diagnostic(entry.key, "matrix-size", message, hint)]
     names = tuple(dimensions)
     product = [Choice(tuple(zip(names, values, strict=True))) for values in itertools.product(*dimensions.values())]
     if product and len(product[0].slug) > MAX_SLUG:
-        found.append(Diagnostic(entry.key, "matrix-size", "the names and values of the matrix are too long"))
+        message = f"names and values make folders' names longer than {MAX_SLUG} characters: '{product[0].slug[:40]}...'"
+        found.append(Diagnostic(entry.key, "matrix-size", message, "shorten them, or use fewer of them"))
     return product or [Choice()], found
 
 

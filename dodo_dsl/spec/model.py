@@ -1,11 +1,13 @@
 """A spec as it was written: fields that are missing or of a wrong type are None and stand in the diagnostics."""
 
+import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, read
 from dodo_dsl.spec import extends, matrix, quantity
 from dodo_dsl.spec.matrix import Choice
@@ -13,6 +15,8 @@ from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.schema import validate
 
 LAYERS = ("environment", "action", "evaluation")
+MAX_SERVICES = 100
+"""Of a layer, as the schema has it."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
     ``isolation`` is None where the spec leaves it to the rig, ``frames_hz`` is 0 where no frames are recorded.
+    ``is_whole`` is False where services could not be read, so that what is missing says nothing.
     """
 
     location: Location
@@ -47,6 +52,7 @@ class Spec:
     uses: tuple[Use, ...] = ()
     choice: Choice = field(default_factory=Choice)
     spans: dict[str, Span] = field(default_factory=dict)
+    is_whole: bool = True
 
     @property
     def path(self) -> Path:
@@ -74,6 +80,7 @@ def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
             found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
         return [Spec(location)], found
     node, problems = extends.resolve(node, location.path, location.root)
+    is_whole = not has_errors(problems) and extends.is_text(node)
     found = [*found, *problems]
     choices, problems = matrix.choices(node)
     found.extend(problems)
@@ -86,11 +93,16 @@ def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
         instance = matrix.substitute(node, choice)
         assert isinstance(instance, Mapping)
         if number == 0 or not checked_by_rules:
-            found.extend(validate(instance, "dodo"))
-        spec, problems = _spec(location, instance, choice)
+            found.extend(d for d in validate(instance, "dodo") if is_whole or not _is_missing(d, node))
+        spec, problems = _spec(location, instance, choice, is_whole)
         found.extend(problems)
         specs.append(spec)
     return specs, found
+
+
+def _is_missing(diagnostic: Diagnostic, node: Node) -> bool:
+    """Whether a key is missing in the test itself, which may well stand in what it extends."""
+    return diagnostic.rule == "missing-key" and diagnostic.span == node.span
 
 
 def _only_in_parameters(node: Mapping) -> bool:
@@ -125,16 +137,21 @@ def _timeout(node: Node | None) -> tuple[float | None, list[Diagnostic]]:
     return seconds, []
 
 
+def _seed(node: Node | None) -> int:
+    value = node.value if isinstance(node, Scalar) else None
+    return int(value) if isinstance(value, int | float) and math.isfinite(value) else 0
+
+
 def _frames(node: Node | None) -> float:
     return (_number(node.get("frames"), "Hz") if isinstance(node, Mapping) else None) or 0.0
 
 
-def _spec(location: Location, node: Mapping, choice: Choice) -> tuple[Spec, list[Diagnostic]]:
+def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> tuple[Spec, list[Diagnostic]]:
     def text(key: str, default: Any = None) -> Any:
         value = node.get(key)
         return value.value if isinstance(value, Scalar) and isinstance(value.value, str) else default
 
-    seed = node.get("seed")
+    uses = tuple(_uses(node))
     timeout, found = _timeout(node.get("timeout"))
     spec = Spec(
         location,
@@ -146,13 +163,20 @@ def _spec(location: Location, node: Mapping, choice: Choice) -> tuple[Spec, list
         clock=text("clock", "realtime"),
         rig=text("rig"),
         isolation=text("isolation"),
-        seed=int(seed.value) if isinstance(seed, Scalar) and isinstance(seed.value, int | float) else 0,
+        seed=_seed(node.get("seed")),
         frames_hz=_frames(node.get("record")),
-        uses=tuple(_uses(node)),
+        uses=uses,
         choice=choice,
         spans={key: entry.value.span for key, entry in node.entries.items()},
+        is_whole=is_whole and len(uses) == _written_services(node),
     )
     return spec, found
+
+
+def _written_services(node: Mapping) -> int:
+    """How many services are written, a layer that is no mapping being one that cannot be read."""
+    layers = [layer for name in LAYERS if (layer := node.get(name)) is not None]
+    return sum(len(layer.entries) if isinstance(layer, Mapping) else 1 for layer in layers)
 
 
 def _uses(node: Mapping) -> Iterator[Use]:
@@ -160,7 +184,7 @@ def _uses(node: Mapping) -> Iterator[Use]:
         services = node.get(layer)
         if not isinstance(services, Mapping):
             continue
-        for name, entry in services.entries.items():
+        for name, entry in itertools.islice(services.entries.items(), MAX_SERVICES):
             if not isinstance(entry.value, Mapping):
                 continue
             uses, parameters = entry.value.get("uses"), entry.value.get("with")

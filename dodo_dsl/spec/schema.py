@@ -1,6 +1,7 @@
 """JSON Schema errors as diagnostics at the line and column of the value they mean."""
 
 import functools
+import itertools
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -8,7 +9,7 @@ from typing import Any
 
 from dodo_dsl import data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
-from dodo_dsl.source import Mapping, Node, Scalar, Sequence, plain
+from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
 
 _UNIT = "x-unit"
@@ -36,20 +37,26 @@ def _validator(name: str) -> Any:
             yield ValidationError(str(error))
 
     schema = json.loads((data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
+    schema.get("$defs", {}).get("use", {}).pop("allOf", None)  # for editors; here the rules say it, and better
     return extend(Draft202012Validator, {_UNIT: is_quantity})(schema)  # type: ignore[no-untyped-call]
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
     """All violations of ``schemas/<schema>.schema.json``; tags are refused as well."""
     found = list(_tags(node))
-    for error in _validator(schema).iter_errors(plain(node)):
-        found.extend(_TRANSLATORS.get(error.validator, _fallback)(error, _locate(node, error.absolute_path)))
+    validator = _validator(schema)
+    for error in itertools.islice(validator.iter_errors(plain(node)), MAX_PROBLEMS):
+        place = _locate(node, error.absolute_path)
+        if not error.absolute_path:
+            place.about = validator.schema.get("properties", {})
+        found.extend(_TRANSLATORS.get(error.validator, _fallback)(error, place))
     return found
 
 
 def _tags(node: Node) -> Iterator[Diagnostic]:
     if node.tag:
-        yield Diagnostic(node.span, "yaml-tag", f"tag '{node.tag}' has no meaning here", "remove it; values are plain")
+        tag = node.tag.replace("tag:yaml.org,2002:", "!!")
+        yield Diagnostic(node.span, "yaml-tag", f"tag '{tag}' has no meaning here", "remove it; values are plain")
     if isinstance(node, Mapping):
         for entry in node.entries.values():
             yield from _tags(entry.value)
@@ -65,6 +72,7 @@ class _Place:
         self.node = node
         self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
         self.name = name
+        self.about: dict[str, Any] = {}
 
     def key(self, name: str) -> Span:
         entries = self.node.entries if isinstance(self.node, Mapping) else {}
@@ -89,15 +97,15 @@ def _shown(value: object) -> str:
 
 def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
     known = error.schema.get("properties", {})
-    for name in error.instance:
-        if name not in known:
-            yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
+    unknown = (name for name in error.instance if name not in known)
+    for name in itertools.islice(unknown, MAX_PROBLEMS):
+        yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
 
 
 def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
     # jsonschema reports each missing key by itself, in the order of the schema
     missing = next(n for n in error.validator_value if n not in error.instance and f"'{n}'" in error.message)
-    about = error.schema.get("properties", {}).get(missing, {})
+    about = (error.schema.get("properties") or place.about).get(missing, {})
     hint = about.get("description", "") if isinstance(about, dict) else ""
     yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
 
@@ -110,8 +118,9 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
     message = f"{place.name} {found}, expected {' or '.join(names)}"
-    hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and _kind(error.instance) != "object" else ""
-    yield Diagnostic(place.span, "wrong-type", message, hint if error.instance is not None else "")
+    is_scalar = isinstance(error.instance, int | float)
+    hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
+    yield Diagnostic(place.span, "wrong-type", message, hint)
 
 
 def _kind(value: object) -> str:
@@ -136,7 +145,7 @@ def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{place.name} is {_shown(error.instance)}, expected {error.validator_value}"
-    yield Diagnostic(place.span, "wrong-value", message)
+    yield Diagnostic(place.span, "wrong-value", message, error.schema.get("description", ""))
 
 
 def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -147,18 +156,25 @@ def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
     hint = ""
     if isinstance(error.instance, str):
         plain_name = re.sub(r"[^a-z0-9]+", "-", error.instance.lower()).strip("-")
-        hint = f"for example '{plain_name[:40]}'" if plain_name and plain_name != error.instance else ""
+        fits = re.search(error.schema.get("pattern", ""), plain_name[:40])
+        hint = f"for example '{plain_name[:40]}'" if fits and plain_name not in ("", error.instance) else ""
     yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} cannot stand here, expected {expected}", hint)
 
 
 def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
     low, high = error.schema.get("minimum"), error.schema.get("maximum")
-    message = f"{place.name} is {error.instance}, expected {low} to {high}"
+    message = f"{place.name} is {_shown(error.instance)[1:-1]}, expected {low} to {high}"
     yield Diagnostic(place.span, "out-of-range", message)
 
 
 def _too_few(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected at least one entry")
+    expected = "a text" if isinstance(error.instance, str) else "at least one entry"
+    yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected {expected}")
+
+
+def _too_many(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    message = f"{place.name} has {len(error.instance)} entries, expected at most {error.validator_value}"
+    yield Diagnostic(place.span, "too-large", message)
 
 
 def _fallback(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -176,6 +192,8 @@ _TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
     "maxLength": _pattern,
     "minimum": _bounds,
     "maximum": _bounds,
+    "maxProperties": _too_many,
+    "maxItems": _too_many,
     "minProperties": _too_few,
     "minItems": _too_few,
     "minLength": _too_few,

@@ -1,11 +1,11 @@
 """Makes the tables beside this file: python tests_registry/targets/make_targets.py [FOLDER].
 
 A table has a row every 0.1 s: where the beacon is (``x``, ``y`` in m, ``yaw`` in rad) and the steering request in rad
-that is reasonable there (``groundSteering``). The beacon drives at SPEED, on ``left-curve`` along the centre line of the
-track, on ``straight`` askew from the left half of the lane into the right one. The steering is no application's: it
-leads from where the beacon is onto the centre line LOOK m ahead (the circle of pure pursuit), for Kiwi's wheelbase and
-the gain with which the car takes a request. LOOK is where a driver sees both rows: the camera sees cones 0.25 m beside
-it from 0.41 m on, and the nearest of a row, 0.25 m apart, is on the average half a gap farther.
+that is reasonable there (``groundSteering``). The beacon drives at SPEED, on ``left-curve`` along the centre line of
+the track, on ``straight`` askew from the left half of the lane into the right one. The steering is no application's:
+it leads from where the beacon is onto the centre line LOOK m ahead (the circle of pure pursuit), for Kiwi's wheelbase
+and the gain with which the car takes a request. LOOK is where a driver sees both rows: the camera sees cones 0.25 m
+beside it from 0.41 m on, and the nearest of a row, 0.25 m apart, is on the average half a gap farther.
 """
 
 import importlib.util

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.spec import arguments
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Use
 from dodo_dsl.spec.values import ValueProblem, convert
@@ -16,6 +17,7 @@ from dodo_dsl.spec.values import ValueProblem, convert
 def check(context: Context) -> Iterator[Diagnostic]:
     for use, manifest in context.known_uses():
         yield from _written(context, use, manifest)
+        yield from _taken(context, use, manifest)
         yield from _missing(context, use, manifest)
 
 
@@ -32,6 +34,16 @@ def _written(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnos
             yield problem.diagnostic
 
 
+def _taken(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnostic]:
+    """Values of the rig or of another service that do not fit here."""
+    for parameter in manifest.parameters.values():
+        if (parameter.rig or parameter.shared) and parameter.name not in use.parameters:
+            try:
+                arguments.value(context.spec, use, parameter, context.rig)
+            except ValueProblem as problem:
+                yield problem.diagnostic
+
+
 def _missing(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnostic]:
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters:
@@ -43,6 +55,8 @@ def _missing(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnos
             continue
         message = f"service '{manifest.name}' needs parameter '{parameter.name}': {parameter.help}"
         hint = f"write '{parameter.name}: ...' under 'with'"
+        if parameter.rig and context.rig:
+            hint += f", or give the rig '{context.rig.name}' its '{parameter.rig}'"
         if len(givers) > 1:
             hint = f"{' and '.join(givers.values())} give different values, so write the one that counts"
         yield Diagnostic(use.span, "missing-parameter", message, hint)

@@ -14,7 +14,11 @@ from dodo_dsl.spec.manifest import Manifest
 
 def check(context: Context) -> Iterator[Diagnostic]:
     known = list(context.known_uses())
-    if len(known) < len(context.spec.uses) or any(use.layer not in m.layers for use, m in known):
+    if (
+        not context.spec.is_whole
+        or len(known) < len(context.spec.uses)
+        or any(use.layer not in m.layers for use, m in known)
+    ):
         return  # what stands in a wrong place, or is unknown, is to be mended first
     wiring = wire(context)
     for end in wiring.heard:
@@ -60,8 +64,9 @@ def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
         other = first.setdefault(key, end)
         if other is not end and "application" not in (other.layer,):
             who = f"the application's '{end.service}'" if end.layer == "application" else f"'{end.service}'"
-            message = f"'{other.service}' and {who} both send {end.port}"
-            hint = "give one of them another sender stamp" if end.port.kind == "message" else "name one otherwise"
+            does, what = ("send", "sender stamp") if end.port.kind == "message" else ("write the memory", "name")
+            message = f"'{other.service}' and {who} both {does} {end.port}"
+            hint = f"give one of them another {what}"
             yield Diagnostic(end.span, "two-producers", message, hint)
 
 

@@ -1,0 +1,53 @@
+"""One service of the copy: its content, what a test is like, and what was changed."""
+
+from collections.abc import Mapping, MutableSequence
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a test is like; ``waits`` are the services of DoDo that the application starts after.
+
+    ``names`` are the application's services that start, ``containers`` their names by ``container_name``.
+    """
+
+    cid: int
+    isolation: str
+    waits: tuple[str, ...]
+    names: frozenset[str]
+    containers: Mapping[str, str]
+    hil: bool = False
+    privileged_allowed: bool = False
+
+    @property
+    def own_network(self) -> bool:
+        return self.isolation == "network"
+
+
+@dataclass(frozen=True)
+class Copy:
+    """A service that is changed in place."""
+
+    name: str
+    service: dict[str, Any]
+    setting: Setting
+    changes: MutableSequence[str]
+
+    def note(self, change: str) -> None:
+        line = "".join(c if c.isprintable() else "?" for c in f"{self.name}: {change}")
+        self.changes.append(line if len(line) <= 200 else line[:197] + "...")
+
+    def remove(self, key: str, why: str = "") -> Any:
+        """Takes a key away and says so."""
+        value = self.service.pop(key, None)
+        if value is not None:
+            self.note(f"{key} removed{', ' if why else ''}{why}")
+        return value
+
+    def keep_items(self, key: str, items: list[Any]) -> None:
+        """What is left of a list or a mapping; nothing left means no key."""
+        if items:
+            self.service[key] = items
+        else:
+            self.service.pop(key, None)

@@ -1,0 +1,99 @@
+"""The application as it was written, and what its services say that they hear and say."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import source
+from dodo_dsl.diagnostics import Span
+from dodo_dsl.source import Node, Scalar
+
+SANDBOX = "sandbox"
+KEYS = ("x-dodo", "x-dodo-process")
+
+Word = tuple[str, Span]
+
+
+@dataclass(frozen=True)
+class Declared:
+    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp``, with its place."""
+
+    inputs: tuple[Word, ...]
+    outputs: tuple[Word, ...]
+    answers: tuple[Word, ...]
+    done: Word | None
+    readers: int
+    span: Span
+
+
+@dataclass(frozen=True)
+class ApplicationSource:
+    """Compose files, merged; all mappings by service, and only of services that start.
+
+    ``services`` and ``rest`` (every other top-level key) have paths relative to ``folder``. ``spans`` has the place of
+    each service's name, ``declared`` None for a service without x-dodo. ``dropped`` says why a service does not start,
+    ``containers`` which service has a ``container_name``, ``variables`` what the files' ``.env`` sets.
+    """
+
+    path: Path
+    services: Mapping[str, source.Mapping]
+    rest: Mapping[str, Node]
+    spans: Mapping[str, Span]
+    declared: Mapping[str, Declared | None]
+    dropped: Mapping[str, str] = field(default_factory=dict)
+    containers: Mapping[str, str] = field(default_factory=dict)
+    variables: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Path:
+        return self.path.parent
+
+
+def plain(node: Node) -> Any:
+    """As ``source.plain``, with numbers as compose reads them: ``0440`` is octal."""
+    if isinstance(node, source.Mapping):
+        return {key: plain(entry.value) for key, entry in node.entries.items()}
+    if isinstance(node, source.Sequence):
+        return [plain(item) for item in node.items]
+    return _number(node.value, node.text) if isinstance(node.value, int) else node.value
+
+
+def _number(value: int, written: str) -> int | float:
+    """A whole number; beyond 64 bits compose knows it as a float only."""
+    if written[:1] == "0" and set(written) <= set("01234567"):
+        value = int(written, 8)
+    return value if -(1 << 63) <= value < 1 << 64 else float(value)
+
+
+def text(value: object) -> str:
+    """A YAML value as compose writes it into a container's environment."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
+
+
+def environment(raw: Any) -> dict[str, str | None]:
+    """``environment`` as a map; None takes the value from DoDo's own environment."""
+    if isinstance(raw, list):
+        pairs = (str(item).partition("=") for item in raw)
+        return {name: value if sign else None for name, sign, value in pairs}
+    return {str(k): None if v is None else text(v) for k, v in (raw or {}).items()}
+
+
+def declared(service: source.Mapping) -> Declared | None:
+    """What a service says of itself; None without ``x-dodo``."""
+    entry = service.entries.get("x-dodo")
+    if entry is None or not isinstance(entry.value, source.Mapping):
+        return None
+    words = {key: tuple((s.text, s.span) for s in scalars(e.value)) for key, e in entry.value.entries.items()}
+    inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))
+    readers = entry.value.get("readers")
+    count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 1
+    return Declared(inputs, outputs, answers, done[0] if done else None, count, entry.key)
+
+
+def scalars(node: Node | None) -> list[Scalar]:
+    """The texts of a list, or the text itself."""
+    nodes = node.items if isinstance(node, source.Sequence) else (node,)
+    return [n for n in nodes if isinstance(n, Scalar) and isinstance(n.value, str)]

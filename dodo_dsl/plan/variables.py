@@ -1,0 +1,98 @@
+"""Variables in compose files, ``${NAME:-default}``, found without giving them values; and ``.env`` files."""
+
+import re
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_LINE = re.compile(r"\s*(?:export\s+)?(?P<name>[A-Za-z_][A-Za-z0-9_.-]*)[ \t]*[=:][ \t]*")
+_ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "$": "$$"}
+
+
+def end_of_variable(text: str, start: int) -> int:
+    """Where the variable that begins at the ``$`` of ``start`` ends; braces nest, ``$$`` is no variable."""
+    if text[start + 1 : start + 2] == "$":
+        return start + 2
+    if text[start + 1 : start + 2] != "{":
+        match = _NAME.match(text, start + 1)
+        return match.end() if match else start + 1
+    depth = 0
+    for place in range(start + 1, len(text)):
+        depth += {"{": 1, "}": -1}.get(text[place], 0)
+        if depth == 0:
+            return place + 1
+    return len(text)
+
+
+def split_outside(text: str, sign: str) -> list[str]:
+    """Parts of a text between signs that stand in no variable: ``${A:-b:c}:d`` has two between colons."""
+    parts, begin, place = [], 0, 0
+    while place < len(text):
+        if text[place] == "$":
+            place = end_of_variable(text, place)
+            continue
+        if text[place] == sign:
+            parts.append(text[begin:place])
+            begin = place + 1
+        place += 1
+    return [*parts, text[begin:]]
+
+
+def names(text: str) -> set[str]:
+    """The variables that a text speaks of, those in defaults included."""
+    found: set[str] = set()
+    place = text.find("$")
+    while place >= 0:
+        match = _NAME.match(text, place + 1 + (text[place + 1 : place + 2] == "{"))
+        if match:
+            found.add(match[0])
+        escaped = text[place + 1 : place + 2] == "$"
+        place = text.find("$", place + (2 if escaped else 1))
+    return found
+
+
+def dotenv(text: str) -> dict[str, str]:
+    """The variables of a ``.env`` file as compose reads it; a ``$`` that is meant as one is doubled.
+
+    Names without a value, and lines that mean nothing, are passed over.
+    """
+    found, place = {}, 0
+    while place < len(text):
+        line_end = _or_end(text, text.find("\n", place))
+        match = _LINE.match(text, place, line_end)
+        if match is None or text[place:line_end].lstrip().startswith("#"):
+            place = line_end + 1
+            continue
+        found[match["name"]], place = _value(text, match.end(), line_end)
+    return found
+
+
+def _or_end(text: str, place: int) -> int:
+    return len(text) if place < 0 else place
+
+
+def _value(text: str, start: int, line_end: int) -> tuple[str, int]:
+    """A value and where the next line begins."""
+    quote = text[start : start + 1]
+    if quote not in ("'", '"'):
+        return re.split(r"(?:^|\s)#", text[start:line_end], maxsplit=1)[0].strip(), line_end + 1
+    characters, place = [], start + 1
+    while place < len(text) and text[place] != quote:
+        step = _character(text, place, quote)
+        characters.append(step[0])
+        place += step[1]
+    return "".join(characters), _or_end(text, text.find("\n", place)) + 1
+
+
+def _character(text: str, place: int, quote: str) -> tuple[str, int]:
+    """What stands for the character at a place inside quotes, and how long that was written."""
+    character, following = text[place], text[place + 1 : place + 2]
+    if quote == "'":
+        return ("'", 2) if text[place : place + 2] == "\\'" else ("$$" if character == "$" else character, 1)
+    if character == "\\" and following in ('"', "\\", *_ESCAPES):
+        return _ESCAPES.get(following, following), 2
+    return character, 1
+
+
+def dotenv_line(name: str, value: str) -> str:
+    """``NAME="value"`` as ``dotenv`` reads it."""
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
+    return f'{name}="{escaped}"'

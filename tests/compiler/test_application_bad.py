@@ -1,0 +1,28 @@
+"""Each bad application is a pair of files: the compose file, and what is said of it."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.diagnostics import format_text, ordered
+from dodo_dsl.plan.application import read_application
+
+FOLDER = Path(__file__).parent / "applications" / "bad"
+CASES = sorted(p.stem for p in FOLDER.glob("*.yml"))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_diagnostics(case: str, monkeypatch: pytest.MonkeyPatch, update_goldens: bool) -> None:
+    monkeypatch.chdir(FOLDER)
+    source, problems = read_application(Path(f"{case}.yml"))
+    text = format_text(ordered(problems))
+    expected = FOLDER / f"{case}.out"
+    if update_goldens:
+        expected.write_text(text)
+    assert text == expected.read_text()
+    assert text
+    assert (source is None) == any(p.severity == "error" for p in problems)
+
+
+def test_every_expectation_has_its_file() -> None:
+    assert sorted(p.stem for p in FOLDER.glob("*.out")) == CASES

@@ -1,0 +1,51 @@
+"""What the process backend makes of an application's service: its words, its variables, and where they come from."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.plan.application import plan_application, read_application
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.process import Lane, ProcessBackend
+
+COMPOSE = """\
+services:
+  planner:
+    image: team/planner
+    command: run --cid=${CID} --rate=${RATE} --greeting=${GREETING} ${NOTHING} session=${CID}
+    env_file: [car.env, {path: private.env, required: false}]
+    environment:
+      LEVEL: debug
+      FROM_OUTSIDE:
+      FLAGS: --cid=111 --rate=${RATE:-${NOTHING:-3}}
+    x-dodo-process: [python, planner.py]
+"""
+
+
+def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FROM_OUTSIDE", "here")
+    (tmp_path / "docker-compose.yml").write_text(COMPOSE)
+    (tmp_path / ".env").write_text("CID=111\nRATE=20\nGREETING='costs $5'\n")
+    (tmp_path / "car.env").write_text("WHEELBASE=0.257\nLEVEL=info\nOD4SESSION_CID=111\nTWICE=${RATE}${RATE}\n")
+    source, problems = read_application(tmp_path / "docker-compose.yml")
+    assert source is not None, problems
+    folder = tmp_path / "generated" / "t"
+    application = plan_application(source, 140, "host", folder, ())
+    common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox", ())
+    plan = Plan("t", "t", "t.dodo.yml", *common, application)
+    backend = ProcessBackend(plan, folder, tmp_path / "report", "host", Lane(150))
+    (command,) = [backend._application_command(service) for service in application.services]
+    assert command.argv == (
+        *("python", "planner.py", "run", "--cid=150", "--rate=20", "--greeting=costs $5"),
+        "session=150",
+    )
+    expected = {
+        "LEVEL": "debug",
+        "FROM_OUTSIDE": "here",
+        "FLAGS": "--cid=150 --rate=20",
+        "WHEELBASE": "0.257",
+        "OD4SESSION_CID": "150",
+        "TWICE": "2020",
+    }
+    assert {name: command.environment.get(name) for name in expected} == expected
+    assert command.folder == tmp_path
