@@ -50,7 +50,8 @@ class Camera:
         return Envelope(self._messages.id(MESSAGE), payload, sent, sent, sample_time, self._sender_stamp)
 
     def restart(self) -> None:
-        """Begin with a picture that stands alone, as what came before is not in the recording."""
+        """Begin with the next picture, one that stands alone, as what came before is not in the recording."""
+        self._source.skip()
         self._encoder = None
 
     def close(self) -> None:

@@ -3,6 +3,7 @@
 import logging
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
@@ -88,10 +89,18 @@ class Source:
             with self._memory.lock(PATIENCE):
                 time = self._memory.sample_time()
                 return (bytes(self._memory.buffer), time) if self._is_due(time) else None
-        except SharedMemoryError:
-            self.close()
-            self._retry = now + RETRY
+        except SharedMemoryError as error:
+            _log.debug("no picture of '%s': %s", self.wanted.name, error)
+            if not self._is_there():
+                self.close()
+                self._retry = now + RETRY
             return None
+
+    def skip(self) -> None:
+        """Leave the picture that is there now."""
+        if self._memory is not None:
+            with suppress(SharedMemoryError), self._memory.lock(PATIENCE):
+                self._last, self._due = self._memory.sample_time(), None
 
     def close(self) -> None:
         """Let go of the memory."""
@@ -99,13 +108,27 @@ class Source:
             self._memory.close()
             self._memory = None
 
+    def _is_there(self) -> bool:
+        """Whether the memory was only locked for long, and not removed."""
+        if self._memory is None:
+            return False
+        try:
+            self._memory.readers_waiting()
+        except SharedMemoryError:
+            return False
+        return True
+
     def _found(self, now: int) -> bool:
         if now < self._retry:
             return False
-        self._memory = self._attach(self.wanted.name)
-        with self._memory.lock(PATIENCE):
-            self._last = self._memory.sample_time()
-        self._due = None
+        memory = self._attach(self.wanted.name)
+        try:
+            with memory.lock(PATIENCE):
+                self._last, self._due = memory.sample_time(), None
+        except SharedMemoryError:
+            memory.close()
+            raise
+        self._memory = memory
         return True
 
     def _is_due(self, time: int) -> bool:
