@@ -62,7 +62,7 @@ class Player:
     def take(self) -> tuple[int, int] | None:
         """The next entry that is due, by number, and the test time at which it was; None when there is none."""
         if self.ended and self._rewinds and self.playing:
-            self._elapsed -= self._due[-1]
+            self._elapsed = self._elapsed - self._due[-1] if self._due[-1] else 0
             self.position, self.jumped = 0, True
             return None  # a round an update at most: a part may last no time at all
         if self.ended:
