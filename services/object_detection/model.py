@@ -42,7 +42,7 @@ class Judge:
         """The test begins; only the first call counts."""
         if self._begun:
             return
-        self._begun, self._zero, self._now = True, now, now
+        self._begun, self._zero, self._now = True, now, max(now, self._now)
         self._score = Score()
         self._passed_over |= self._judged
         self._judged.clear()

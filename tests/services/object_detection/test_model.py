@@ -306,3 +306,14 @@ def test_the_first_verdict_stands() -> None:
     first = decided(it)
     detect(it, 2, Thing("red", FAR))
     assert decided(it, 99) is first
+
+
+def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
+    it = Judge(BOARD, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
+    it.update(BEGIN + 5 * SECOND)
+    it.begin(BEGIN)
+    detect(it, 1, YELLOW)
+    at(it, 5.9)
+    it.detect(Mark(SECOND, 1), 7, BLUE.box)
+    it.detect(Mark(SECOND, 1), 7, BLUE.label)
+    assert decided(it).outcome == "passed"

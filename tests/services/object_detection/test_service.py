@@ -83,7 +83,7 @@ def test_flags_that_leave_something_open_are_refused(truth: Path, words: tuple[s
 
 def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
     now = time.time_ns() // 1000
-    words = (f"--cid={cid}", f"--truth={truth}", "--max-delay=0.1", *LIMITS)
+    words = (f"--cid={cid}", f"--truth={truth}", *LIMITS)
     with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
         say(session, "dodo.TestBegin", sample_time=now)
         for frame in range(20):
@@ -103,7 +103,7 @@ def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
 
 def test_a_live_truth_on_the_bus(cid: int, tmp_path: Path) -> None:
     now = time.time_ns() // 1000
-    words = (f"--cid={cid}", "--truth-sender=9", "--frame-sender=9", "--max-delay=0.1", *LIMITS)
+    words = (f"--cid={cid}", "--truth-sender=9", "--frame-sender=9", *LIMITS)
     with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
         say(session, "dodo.TestBegin", sample_time=now)
         for frame in range(3):
