@@ -11,7 +11,7 @@ import pytest
 
 from tests.services.process import PATIENCE, ROOT
 
-SERVICES = ["beacon"]
+SERVICES = ["beacon", "dynamic_model"]
 
 
 def example(service: str) -> list[str]:
