@@ -14,8 +14,8 @@ NEEDED, POSSIBLE = ("x", "y"), ("x", "y", "z", "yaw", "time")
 def read_table(path: Path, height: float) -> list[Point]:
     """The way points of a CSV file with a header; ``height`` (m) counts where there is no column z.
 
-    Columns x, y and z in m, yaw in rad, time in s; blank lines and such that begin with # are passed over. Raises
-    WayError with file and line.
+    Columns x, y and z in m, yaw in rad, time in s; others are for others. Blank lines and such that begin with # are
+    passed over. Raises WayError with file and line.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -45,11 +45,10 @@ def _cells(place: str, line: str) -> list[str]:
 
 def _columns(place: str, cells: Sequence[str]) -> list[str]:
     for name in cells:
-        if name not in POSSIBLE:
-            close = difflib.get_close_matches(name, POSSIBLE, 1)
-            hint = f", did you mean '{close[0]}'?" if close else f", expected {', '.join(POSSIBLE)}"
-            raise WayError(f"{place}: there is no column '{name}'{hint}")
-        if cells.count(name) > 1:
+        close = difflib.get_close_matches(name.lower(), POSSIBLE, 1, cutoff=0.75)
+        if close and name not in POSSIBLE:
+            raise WayError(f"{place}: there is no column '{name}', did you mean '{close[0]}'?")
+        if name in POSSIBLE and cells.count(name) > 1:
             raise WayError(f"{place}: the column '{name}' is there twice")
     missing = [name for name in NEEDED if name not in cells]
     if missing:
@@ -60,7 +59,9 @@ def _columns(place: str, cells: Sequence[str]) -> list[str]:
 def _point(place: str, columns: Sequence[str], cells: Sequence[str], height: float) -> Point:
     if len(cells) != len(columns):
         raise WayError(f"{place}: {len(cells)} values, expected {len(columns)}: {', '.join(columns)}")
-    values = {name: _number(f"{place}: {name}", text) for name, text in zip(columns, cells, strict=True)}
+    values = {
+        name: _number(f"{place}: {name}", text) for name, text in zip(columns, cells, strict=True) if name in POSSIBLE
+    }
     return _from(place, values, height)
 
 

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.beacon.table import read_points, read_table
-from services.beacon.way import WayError
+from services.beacon.way import Way, WayError
+from tests.services.process import ROOT
 
 
 def table(folder: Path, text: str) -> Path:
@@ -27,13 +28,26 @@ def test_a_column_z_counts_more_than_the_height(tmp_path: Path) -> None:
     assert (point.z, point.yaw, point.time) == (3, None, None)
 
 
+def test_columns_for_others_are_left_to_them(tmp_path: Path) -> None:
+    (point,) = read_table(table(tmp_path, "x,y,groundSteering,note\n1,2,0.1,slowly\n"), height=0)
+    assert (point.x, point.y) == (1, 2)
+
+
+def test_the_tables_of_the_registry_are_ways() -> None:
+    paths = sorted((ROOT / "tests_registry" / "targets").glob("*.csv"))
+    assert paths
+    for path in paths:
+        assert Way(read_table(path, height=0), speed=1).duration > 1
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("", " is empty, expected a header with the columns x and y"),
         ("x,z\n", ":1: the column 'y' is missing"),
         ("x,y,times\n", ":1: there is no column 'times', did you mean 'time'?"),
-        ("x;y\n0;0\n", ":1: there is no column 'x;y', "),
+        ("x;y\n0;0\n", ":1: the column 'x' is missing"),
+        ("X,y\n", ":1: there is no column 'X', did you mean 'x'?"),
         ("x,y,x\n", ":1: the column 'x' is there twice"),
         ("x,y\n1,2\n1,2,3\n", ":3: 3 values, expected 2: x, y"),
         ("x,y\n\n1,two\n", ":3: y: 'two' is no finite number"),
