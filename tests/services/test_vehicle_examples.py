@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.services.gantry.fakerig import FakeRig
 from tests.services.process import PATIENCE, ROOT
 
 SERVICES = ["beacon", "dynamic_model"]
@@ -43,6 +44,13 @@ def ends_cleanly(process: "subprocess.Popen[str]") -> None:
     finally:
         process.kill()
         process.communicate()
+
+
+def test_the_gantrys_example_runs(cid: int, tmp_path: Path) -> None:
+    with FakeRig(tmp_path / "rig") as rig:
+        words = [w.replace("/dev/ttyACM0", str(rig.path)) for w in example("gantry")]
+        ends_cleanly(start(words, cid, tmp_path))
+        assert rig.last() == "STOP"
 
 
 @pytest.mark.parametrize("service", SERVICES)
