@@ -12,7 +12,7 @@ import pytest
 from tests.services.gantry.fakerig import FakeRig
 from tests.services.process import PATIENCE, ROOT
 
-SERVICES = ["beacon", "dynamic_model"]
+SERVICES = ["beacon", "camera", "dynamic_model"]
 
 
 def example(service: str) -> list[str]:
