@@ -76,6 +76,9 @@ class Loop:
                     return
                 handler(message, envelope.sample_time)
 
-    def _send(self, output: Message | Output, now: int) -> None:
+    def _send(self, output: Message | Output | Envelope, now: int) -> None:
+        if isinstance(output, Envelope):
+            self.session.send_envelope(output)
+            return
         message, stamp = output if isinstance(output, Output) else (output, self.sender_stamp)
         self.session.send(message, now, stamp)

@@ -12,7 +12,7 @@ import pytest
 from tests.services.gantry.fakerig import FakeRig
 from tests.services.process import PATIENCE, ROOT
 
-SERVICES = ["beacon", "camera", "dynamic_model"]
+SERVICES = ["beacon", "camera", "dynamic_model", "integrator"]
 
 
 def example(service: str) -> list[str]:
