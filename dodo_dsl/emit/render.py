@@ -91,7 +91,7 @@ def _render(template: str, **values: object) -> str:
 
 
 def render_plan(plan: Plan) -> list[File]:
-    """The compose layers, the anchor that keeps compose in the test's folder, ``.env`` and ``test.json`` of one test."""
+    """The compose layers, ``compose.yaml`` that keeps compose in the folder, ``.env`` and ``test.json`` of one test."""
     names = {layer: f"{layer}.compose.yml" for layer in LAYERS}
     own_network = plan.isolation == "network"
     files = [
