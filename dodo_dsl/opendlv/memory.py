@@ -4,6 +4,7 @@ SysV is the default: a segment without header holds the data, semaphores are mut
 content is that of the token file in /tmp. CLUON_SHAREDMEMORY_POSIX=1 selects POSIX: one object holds all of it.
 """
 
+import errno
 import os
 import time
 from collections.abc import Iterator
@@ -108,15 +109,15 @@ class SharedMemory:
         """
         try:
             return self._segment.wait(timeout) is Result.DONE
-        except OSError:
-            raise self._removed() from None
+        except OSError as error:
+            raise self._failed(error) from None
 
     def readers_waiting(self) -> int:
         """How many processes wait for a notification at this moment."""
         try:
             return self._segment.readers_waiting()
-        except OSError:
-            raise self._removed() from None
+        except OSError as error:
+            raise self._failed(error) from None
 
     def close(self) -> None:
         """Let go; the creator wakes all that wait and removes everything."""
@@ -139,27 +140,33 @@ class SharedMemory:
     def _wake(self) -> None:
         try:
             self._segment.wake()
-        except OSError:
-            raise self._removed() from None
+        except OSError as error:
+            raise self._failed(error) from None
 
     def _take(self, timeout: float) -> Result:
         try:
             return self._segment.lock(timeout)
-        except OSError:
-            raise self._removed() from None
+        except OSError as error:
+            raise self._failed(error) from None
 
     def _release(self) -> None:
         try:
             self._segment.unlock()
-        except OSError:
-            raise self._removed() from None
+        except OSError as error:
+            raise self._failed(error) from None
 
     def _need_lock(self) -> None:
         if not self._locked:
             raise SharedMemoryError(f"shared memory `{self.name}` must be locked for its time stamp")
 
-    def _removed(self) -> SharedMemoryError:
-        return SharedMemoryError(f"shared memory `{self.name}` was removed by its creator")
+    def _failed(self, error: OSError) -> SharedMemoryError:
+        reasons = {
+            errno.ETIMEDOUT: "can notify no more: a reader was killed while it waited",
+            errno.ENOTRECOVERABLE: "can be locked no more: its holder was killed",
+        }
+        return SharedMemoryError(
+            f"shared memory `{self.name}` {reasons.get(error.errno or 0, 'was removed by its creator')}"
+        )
 
 
 def _wants_posix() -> bool:

@@ -4,8 +4,10 @@ The time stamp of the content is the object's own time of modification. Nothing 
 """
 
 import fcntl
+import math
 import mmap
 import os
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Self
@@ -15,7 +17,7 @@ from dodo_dsl.opendlv.semaphore import Result
 from dodo_dsl.opendlv.tokenfile import MAX_NAME, SharedMemoryError
 
 FOLDER = Path("/dev/shm")  # where the C library's shm_open keeps its objects
-_PATIENCE = 5.0
+_SLICE = 0.1  # seconds
 _FLAGS = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
@@ -86,19 +88,27 @@ class PosixSegment:
         self._header.unlock()
 
     def wait(self, timeout: float | None) -> Result:
-        """Wait for a notification; raises OSError when the creator has removed the memory."""
-        while not self._header.lock(_PATIENCE if timeout is None else timeout):
-            if timeout is not None:
-                return Result.TIMEOUT
+        """Wait for a notification; raises OSError when the creator has removed the memory.
+
+        Python looks for signals, and whether the memory is still there, ten times a second.
+        """
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        while True:
+            left = min(_SLICE, end - time.monotonic())
+            done = self._header.lock(left) and self._waited(min(_SLICE, end - time.monotonic()))
+            if os.fstat(self.token).st_nlink == 0:
+                raise FileNotFoundError
+            if done or time.monotonic() >= end:
+                return Result.DONE if done else Result.TIMEOUT
+
+    def _waited(self, timeout: float) -> bool:
         try:
-            done = self._header.wait(timeout)
+            return self._header.wait(timeout)
         finally:
             self._header.unlock()
-        if done and os.fstat(self.token).st_nlink == 0:
-            raise FileNotFoundError
-        return Result.DONE if done else Result.TIMEOUT
 
     def wake(self) -> None:
+        """Wake all that wait; raises TimeoutError where one of them was killed."""
         self._header.notify_all()
 
     def readers_waiting(self) -> int:
@@ -113,7 +123,8 @@ class PosixSegment:
         with suppress(FileNotFoundError):
             if os.path.samestat(self.path.stat(), os.fstat(self.token)):
                 self.path.unlink()
-        self.wake()
+        with suppress(TimeoutError):
+            self.wake()
 
 
 def _remove_orphan(path: Path) -> None:

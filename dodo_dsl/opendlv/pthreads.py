@@ -9,6 +9,7 @@ import ctypes
 import errno
 import os
 import platform
+import re
 import time
 
 CLOCK_MONOTONIC = 1
@@ -17,11 +18,13 @@ _CONDITION_BYTES = 48
 MUTEX_AT = 8
 CONDITION_AT = MUTEX_AT + _MUTEX_BYTES
 HEADER_BYTES = CONDITION_AT + _CONDITION_BYTES
-_WAITERS_AT = CONDITION_AT + 36  # glibc's __wrefs: eight for each waiter
 _SHARED, _ROBUST = 1, 1
-_SLICE = 0.1  # seconds after which Python looks for signals
+_PATIENCE = 1.0
 
 _libc = ctypes.CDLL(None)
+_NEW_LAYOUT = tuple(map(int, re.findall(r"\d+", platform.libc_ver()[1])[:2])) >= (2, 41)
+_REFERENCES_AT = 16  # in the condition: two counts of woken waiters
+_WAITERS_AT = 28 if _NEW_LAYOUT else 36
 
 
 class _Time(ctypes.Structure):
@@ -36,7 +39,7 @@ class Header:
         address = ctypes.addressof(self._bytes)
         self._mutex, self._condition = ctypes.c_void_p(address + MUTEX_AT), ctypes.c_void_p(address + CONDITION_AT)
         self._size = ctypes.c_uint32.from_buffer(self._bytes)
-        self._waiters = ctypes.c_uint32.from_buffer(self._bytes, _WAITERS_AT)
+        self._numbers = (ctypes.c_uint32 * (_CONDITION_BYTES // 4)).from_buffer(self._bytes, CONDITION_AT)
 
     @property
     def size(self) -> int:
@@ -65,25 +68,33 @@ class Header:
         """Let go of the mutex."""
         _call("pthread_mutex_unlock", self._mutex)
 
-    def wait(self, timeout: float | None) -> bool:
+    def wait(self, timeout: float) -> bool:
         """Wait for a notification with the mutex held; False when `timeout` seconds are over."""
-        end = None if timeout is None else time.monotonic() + timeout
-        while True:
-            left = _SLICE if end is None else min(_SLICE, end - time.monotonic())
-            until = ctypes.byref(_deadline(left))
-            code = _libc.pthread_cond_timedwait(self._condition, self._mutex, until)
-            if self._taken(code):
-                return True
-            if end is not None and time.monotonic() >= end:
-                return False
+        until = ctypes.byref(_deadline(timeout))
+        return self._taken(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
 
     def notify_all(self) -> None:
-        """Wake all that wait."""
+        """Wake all that wait; raises TimeoutError where that would block as a waiter was killed.
+
+        Before 2.41, glibc counts those that were woken before and waits for them to leave; a killed one never does.
+        """
+        patience = time.monotonic() + _PATIENCE
+        while self._leaving():
+            if time.monotonic() > patience:
+                raise TimeoutError(errno.ETIMEDOUT, "a waiter was killed")
+            time.sleep(0.0005)
         _call("pthread_cond_broadcast", self._condition)
 
     def waiters(self) -> int:
         """How many wait at this moment."""
-        return self._waiters.value >> 3
+        return int(self._numbers[_WAITERS_AT // 4]) >> 3  # glibc counts by eights
+
+    def _leaving(self) -> int:
+        """How many that were woken before have not left yet (glibc's __g_refs by the lowest bit of __wseq)."""
+        if _NEW_LAYOUT:
+            return 0
+        first = self._numbers[0] & 1 ^ 1
+        return int(self._numbers[_REFERENCES_AT // 4 + first]) >> 1
 
     def _taken(self, code: int) -> bool:
         if code == errno.EOWNERDEAD:

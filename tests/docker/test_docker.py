@@ -219,8 +219,9 @@ def test_kept_project_stays_until_it_is_taken_down(tmp_path: Path) -> None:
 
 
 def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
-    """``cd DIR/<slug> && docker compose up``: the verdict stands in the evaluator's log."""
+    """``cd DIR/<slug> && docker compose up``: the verdict stands in the log, whatever lies above."""
     out = tmp_path / "generated"
+    (tmp_path / "docker-compose.yml").write_text("services: {stranger: {image: stranger}}\n")
     subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", "-o", str(out)], cwd=ROOT, check=True)
     folder = out / "sil-closed-straight"
     up = ["docker", "compose", "up", "--exit-code-from", "track"]

@@ -233,3 +233,29 @@ def test_an_object_that_libcluon_did_not_make(memory_name: str) -> None:
             SharedMemory.attach(memory_name)
     finally:
         path.unlink()
+
+
+def _wait_for_ever(name: str) -> None:
+    with SharedMemory.attach(name) as memory:
+        while True:
+            memory.wait(None)
+
+
+def test_a_killed_reader_blocks_nobody(mode: str, memory_name: str) -> None:
+    context = multiprocessing.get_context("spawn")
+    with SharedMemory.create(memory_name, 1) as memory:
+        failure = ""
+        for _ in range(3):
+            process = context.Process(target=_wait_for_ever, args=(memory_name,))
+            process.start()
+            before = memory.readers_waiting()
+            until_waiting(memory, before + 1)
+            process.kill()
+            process.join(20.0)
+            try:
+                memory.notify_all()
+            except SharedMemoryError as error:
+                failure = str(error)
+                break
+    told = f"shared memory `{memory_name}` can notify no more: a reader was killed while it waited"
+    assert failure == ("" if mode == "sysv" else told)
