@@ -11,15 +11,13 @@ from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
 from dodo_dsl.plan.files import Copy, FilesError, copies
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
+from dodo_dsl.plan.recorder import MANIFEST, recorder
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import EMULATED_FILE, Rig
 from dodo_dsl.spec.values import Value, convert, default_value
-
-RECORDER = "dodo-recorder"
-RECORDING = "test.rec"
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,8 @@ class _Builder:
     def plan(self, application: Container[str]) -> Plan:
         """The instance's Plan; ``application`` holds the names of the application's services."""
         spec, rig = self.spec, self.rig
-        services = (*self._recorder(), *(self._service(use) for use in spec.uses))
+        image = self._image(self.manifests[MANIFEST].image)
+        services = (recorder(spec, self.manifests, rig, image, self.cid), *(self._service(use) for use in spec.uses))
         self._names_apart(services, application)
         judges = tuple(s.name for s in services if s.judge)
         for key in ("name", "level", "kind", "timeout", "clock", "rig", "matrix", "seed", "isolation", "record"):
@@ -159,14 +158,6 @@ class _Builder:
     def _image(self, image: str) -> str:
         bare = "/" not in image and ":" not in image
         return f"{self.deployment.image_prefix}/{image}:{self.deployment.image_tag}" if bare else image
-
-    def _recorder(self) -> list[Service]:
-        manifest = self.manifests["rec-recorder"]
-        can = "frames" in manifest.parameters
-        frames = (Flag("frames", f"{self.spec.frames_hz:g}"),) if self.spec.frames_hz and can else ()
-        flags = (Flag("rec", RECORDING, "report"), *frames, Flag("cid", str(self.cid)))
-        image = self._image(manifest.image)
-        return [Service("environment", RECORDER, manifest.name, image, manifest.process, flags)]
 
     def _names_apart(self, services: Sequence[Service], application: Container[str]) -> None:
         for service in services:
