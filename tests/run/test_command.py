@@ -120,6 +120,15 @@ def test_fails_with_exit_code_1_and_a_junit_failure(desk: Desk) -> None:
     assert "hit wall left" in (desk.folder / "report" / "index.html").read_text()
 
 
+def test_losses_of_messages_are_noted_below_the_test(desk: Desk) -> None:
+    lost = 'print(\'{"dodo": "lost", "messages": 5}\', flush=True)\n'
+    process = desk.start(desk.bench.plan(judge=READY + lost + "time.sleep(0.3)\n" + PASS))
+    out, _ = process.communicate(timeout=30)
+    note = "service 'judge' lost 5 messages, as its receive buffer was full: its verdict is about the others"
+    assert (process.returncode, f"        note: {note}\n" in out) == (0, True), out
+    assert desk.results()[0]["notes"] == [note]
+
+
 def test_error_has_exit_code_3_and_is_a_junit_error(desk: Desk) -> None:
     process = desk.start(desk.bench.plan(judge=READY))
     process.communicate(timeout=30)
