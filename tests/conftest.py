@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.faults import Book
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-goldens", action="store_true", help="write expected output instead of comparing")
@@ -25,6 +27,12 @@ def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture
 def update_goldens(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--update-goldens"))
+
+
+@pytest.fixture
+def book(update_goldens: bool) -> Book:
+    """Takes faults and what became of them, for their page."""
+    return Book(update_goldens)
 
 
 @pytest.fixture
