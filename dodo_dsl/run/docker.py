@@ -61,6 +61,7 @@ class DockerBackend:
         self._out_of_memory: set[str] = set()
         self._events: Any = None
         self._closing = False
+        self.left_behind = False
 
     async def open(self) -> None:
         code, out, problem = await self._compose("config", "--format", "json")
@@ -278,14 +279,27 @@ class DockerBackend:
         return kept
 
     def _take_down(self) -> None:
+        """What cannot be removed, as the engine has gone, is left to the next run."""
         from docker.errors import DockerException
 
-        with contextlib.suppress(DockerException, OSError):
+        try:
             stop_project(self._client, self.project)
             for container in self._containers.values():
                 if self._records(container):
-                    copy_out(container, f"{_REPORT}/.", self.report)
+                    self._copy_report(container)
             remove_project(self._client, self.project)
+        except (DockerException, OSError):
+            self.left_behind = True
+            self._say("the engine does not take it down: the next run does, or dodo doctor --clean")
+
+    def _copy_report(self, container: Any) -> None:
+        from docker.errors import DockerException
+
+        try:
+            copy_out(container, f"{_REPORT}/.", self.report)
+        except (DockerException, OSError) as error:
+            why = getattr(error, "strerror", None) or error
+            self._say(f"the report misses files of {container.labels[SERVICE_LABEL]}: {why}")
 
     def _records(self, container: Any) -> bool:
         name = container.labels[SERVICE_LABEL]
