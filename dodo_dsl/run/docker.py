@@ -179,8 +179,9 @@ class DockerBackend:
         self._queue.put_nowait(Exited(name, code, name in self._out_of_memory))
 
     async def start(self, layer: str) -> dict[str, bool]:
-        own = [s.name for s in self.plan.layer(layer)]
-        names = own or [s.name for s in self.plan.application.services if s.name in self._containers]
+        names = [s.name for s in self.plan.layer(layer)]
+        if layer == "application":
+            names = [s.name for s in self.plan.application.services if s.name in self._containers]
         judges = {s.name for s in self.plan.services if s.judge}
         for name in names:
             self._outputs[name] = Output(
