@@ -150,7 +150,7 @@ class DockerBackend:
         except Exception as error:  # noqa: BLE001  (whatever ends the stream, the engine is out of sight)
             why = f"the Docker engine went away: {error}"
         else:
-            why = "the Docker engine ended its events"
+            why = "the Docker engine went away: its events ended"
         if not self._closing:
             self._tell(self._queue.put_nowait, Lost(why))
 
