@@ -11,7 +11,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.run import engine
 from dodo_dsl.run.lanes import namespaces_refusal
 from tests.faults import Book
-from tests.run.helpers import FAIL, PASS, READY, WAIT, Bench
+from tests.run.helpers import BEGUN, DRIVES, FAIL, PASS, READY, WAIT, Bench
 
 SHARES = """
 from dodo_dsl.opendlv.memory import SharedMemory
@@ -44,7 +44,7 @@ class Fault:
     environment: str = READY + WAIT
 
 
-NEIGHBOUR = Fault("", "passed", "it drove", judge=READY + "time.sleep(2)\n" + PASS, application=SHARES + WAIT)
+NEIGHBOUR = Fault("", "passed", "it drove", judge=DRIVES, application=SHARES + WAIT)
 FAULTS = {
     "neighbour": NEIGHBOUR,
     "killed": Fault(
@@ -57,35 +57,38 @@ FAULTS = {
         "A service of DoDo's is killed",
         "error",
         "service 'camera' of layer environment was killed by SIGKILL after",
-        environment=READY + "time.sleep(1)\nos.kill(os.getpid(), 9)",
+        environment=READY + BEGUN + "os.kill(os.getpid(), 9)",
     ),
     "no-verdict": Fault(
-        "An evaluator ends without a verdict", "error", "evaluator 'judge' ended without a verdict after", judge=READY
+        "An evaluator ends without a verdict",
+        "error",
+        "evaluator 'judge' ended without a verdict after",
+        judge=READY + BEGUN,
     ),
     "two-verdicts": Fault(
         "An evaluator gives two verdicts",
         "error",
         "evaluator 'judge' gave 2 verdicts, expected one",
-        judge=READY + "time.sleep(1)\n" + PASS + FAIL,
+        judge=READY + BEGUN + PASS + FAIL,
     ),
     "malformed": Fault(
         "An evaluator gives a malformed verdict",
         "error",
         "the verdict of evaluator 'judge' is malformed: its outcome is \"maybe\", expected passed or failed",
-        judge=READY + MAYBE + WAIT,
+        judge=READY + BEGUN + MAYBE + WAIT,
     ),
     "many-lines": Fault(
         "The application logs 10,000 lines a second",
         "passed",
         "it drove",
-        judge=READY + "time.sleep(3)\n" + PASS,
+        judge=READY + BEGUN + "time.sleep(2)\n" + PASS,
         application=LINES_A_SECOND,
     ),
     "long-line": Fault(
         "The application logs a line of 5 MB",
         "passed",
         "it drove",
-        judge=READY + LONG_LINE + "time.sleep(1)\n" + PASS,
+        judge=READY + LONG_LINE + BEGUN + PASS,
         application=LONG_LINE + 'print("after")\n' + WAIT,
     ),
 }
