@@ -4,6 +4,7 @@ import contextlib
 import os
 import random
 import socket
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -33,6 +34,19 @@ def update_goldens(request: pytest.FixtureRequest) -> bool:
 def book(update_goldens: bool) -> Book:
     """Takes faults and what became of them, for their page."""
     return Book(update_goldens)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A folder on a disk of 64 KiB."""
+    folder = tmp_path / "small"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
+    result = subprocess.run(mount, capture_output=True, text=True, check=False)
+    if result.returncode:
+        pytest.skip(f"a small disk cannot be made here: {result.stderr.strip() or 'no mount'}")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
 
 
 @pytest.fixture

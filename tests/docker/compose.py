@@ -3,12 +3,13 @@
 import asyncio
 import json
 import subprocess
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from dodo_dsl import __version__
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.model import Plan, to_json
+from dodo_dsl.plan.model import Flag, Plan, to_json
 from dodo_dsl.run.backends import Containers, Job
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
@@ -33,16 +34,19 @@ class Crate:
         application: str = WAIT,
         environment: str = READY + WAIT,
         timeout_s: float = 60.0,
+        report: Path | None = None,
         **app: Any,
     ) -> Job:
         """A test of three scripts; ``app`` are keys of the application's service in its compose file."""
         plan = self.bench.plan(judge, STARTED + application, environment, f"{self.mark}-{slug}", timeout_s)
+        camera, evaluator = plan.services
+        plan = replace(plan, services=(replace(camera, flags=(Flag("rec", "test.rec", "report"),)), evaluator))
         folder = self.bench.folder / "compiled" / plan.slug
         folder.mkdir(parents=True)
         (folder / "test.json").write_text(to_json(plan))
         (folder / ".env").write_text(f"COMPOSE_PROJECT_NAME={plan.slug}\n")
         (folder / "docker-compose.yml").write_text(json.dumps(self._compose(plan, app)))
-        return Job(plan, folder, self.bench.folder / "report" / plan.slug)
+        return Job(plan, folder, (report or self.bench.folder / "report") / plan.slug)
 
     def _compose(self, plan: Plan, app: dict[str, Any]) -> dict[str, Any]:
         def service(name: str) -> dict[str, Any]:
@@ -57,12 +61,17 @@ class Crate:
 
         sandbox = {"image": f"dodo/sandbox:{__version__}", "command": ["sleep", "infinity"], "init": True}
         flags = {"command": ["--cid=111", "--name=video0.argb"]}
-        services = {name: service(name) for name in ("camera", "judge")}
+        records = {"volumes": [*service("camera")["volumes"], "report:/dodo/report"]}
         subnet = {"subnet": "${DODO_SUBNET:-10.213.240.0/28}"}
         return {
-            "services": {**services, "sandbox": sandbox, "app": {**service("app"), **flags, **app}},
+            "services": {
+                "camera": {**service("camera"), **records},
+                "judge": service("judge"),
+                "sandbox": sandbox,
+                "app": {**service("app"), **flags, **app},
+            },
             "networks": {"default": {"ipam": {"config": [subnet]}}},
-            "volumes": {"tmp": {}},
+            "volumes": {"tmp": {}, "report": {}},
         }
 
     def run(self, *jobs: Job) -> dict[str, Outcome]:

@@ -11,13 +11,14 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.run import engine
 from dodo_dsl.run.backends import Job
 from tests.docker.broken_registry import TRIES, BrokenRegistry
 from tests.docker.compose import Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
 from tests.run.desk import ROOT, wait_for
-from tests.run.helpers import DRIVES, Bench
+from tests.run.helpers import DRIVES, READY, WAIT, Bench
 from tests.run.test_faults import FAULTS, NEIGHBOUR
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("images")]
@@ -104,13 +105,33 @@ def test_faults_at_once(crate: Crate, book: Book) -> None:
         book.record(name, "docker", outcomes[slug].outcome, outcomes[slug].reason)
 
 
+def test_service_that_never_gets_ready(crate: Crate, book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "READY_PATIENCE_S", 2.0)
+    (outcome,) = crate.run(crate.job("never-ready", environment=WAIT)).values()
+    assert outcome.reason == "service 'camera' was not ready within 2 s"
+    book.record("A service never gets ready", "docker", outcome.outcome, outcome.reason)
+
+
+def test_disk_with_the_report_is_full(crate: Crate, small_disk: Path, book: Book) -> None:
+    """A recording that does not fit stays behind with its volume's other files, and the volume goes."""
+    writes = 'open("/dodo/report/test.rec", "wb").write(bytes(200_000))\n'
+    job = crate.job("full", judge=DRIVES, environment=writes + READY + WAIT, report=small_disk)
+    run = start(crate, job)
+    out = wait_for(run, "the report misses files of camera: No space left on device")
+    rest, _ = run.communicate(timeout=60)
+    assert run.returncode == 3, out + rest
+    (unwritten,) = re.findall(rf"^'{small_disk}' (cannot take the whole report: .*)$", rest, re.MULTILINE)
+    (reason,) = re.findall(r"^PASSED +\S+  (.*?) \(set-up", rest, re.MULTILINE)
+    book.record("The disk with the report is full", "docker", "passed", f"{reason}; 'dodo-report' {unwritten}")
+
+
 def test_engine_that_goes_away(crate: Crate, book: Book) -> None:
     """To this run it has gone; what the run cannot take down any more, the next one does."""
-    engine = engine_socket()
-    if engine is None:
+    socket = engine_socket()
+    if socket is None:
         pytest.skip("the engine is not reached by a socket of this machine")
     job = crate.job("cut")
-    with EngineProxy(engine, crate.bench.folder / "engine.sock") as proxy:
+    with EngineProxy(socket, crate.bench.folder / "engine.sock") as proxy:
         run = start(crate, job, **proxy.variables)
         wait_for(run, "running")
         neighbour = start(crate, crate.job("beside", judge=DRIVES))
@@ -123,7 +144,7 @@ def test_engine_that_goes_away(crate: Crate, book: Book) -> None:
     assert len([name for name in left if f"-{job.plan.slug}-" in name]) > 4
     second = start(crate, crate.job("again", judge=DRIVES))
     said = wait_for(second, "removed what a killed run left: ")
-    assert f"{job.plan.slug}: 6 containers, networks and volumes" in said
+    assert f"{job.plan.slug}: 7 containers, networks and volumes" in said
     assert told(second, "PASSED") == "it drove"
     book.record("The engine goes away in the middle of a test", "docker", "error", reason)
 

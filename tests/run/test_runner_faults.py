@@ -3,8 +3,6 @@
 import os
 import re
 import signal
-import subprocess
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,19 +27,6 @@ with Session(int(sys.argv[1].partition("=")[2])) as bus:
 @pytest.fixture
 def desk(tmp_path: Path) -> Desk:
     return Desk(tmp_path)
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A folder on a disk of 64 KiB."""
-    folder = tmp_path / "small"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
-    result = subprocess.run(mount, capture_output=True, text=True, check=False)
-    if result.returncode:
-        pytest.skip(f"a small disk cannot be made here: {result.stderr.strip() or 'no mount'}")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
 
 
 def recorded(plan: Plan) -> Plan:
