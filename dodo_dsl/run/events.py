@@ -37,6 +37,14 @@ class Exited:
 
 
 @dataclass(frozen=True)
+class Overrun:
+    """A service has lost messages of the bus, so many up to now, as its receive buffer was full."""
+
+    service: str
+    messages: int
+
+
+@dataclass(frozen=True)
 class Unstartable:
     service: str
     why: str
@@ -49,7 +57,7 @@ class Lost:
     why: str
 
 
-Event = Ready | Verdict | Malformed | Exited | Unstartable | Lost
+Event = Ready | Verdict | Malformed | Overrun | Exited | Unstartable | Lost
 
 
 class Backend(Protocol):

@@ -4,7 +4,7 @@ import json
 import math
 from typing import Any
 
-from dodo_dsl.run.events import Event, Malformed, Ready, Verdict
+from dodo_dsl.run.events import Event, Malformed, Overrun, Ready, Verdict
 
 _OUTCOMES = ("passed", "failed")
 _MAX_TEXT = 2000
@@ -25,6 +25,8 @@ def read_line(service: str, judge: bool, line: bytes) -> Event | None:
     kind = message.get("dodo")
     if kind == "ready":
         return Ready(service)
+    if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
+        return Overrun(service, message["messages"])
     if kind == "verdict" and judge:
         problem = _problem(message)
         if problem:
