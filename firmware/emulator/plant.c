@@ -41,9 +41,10 @@ static double length_of(enum motor motor)
     return c->high * 1e-6 / plant_unit(motor) + c->offset / MICRO;
 }
 
+/* The field goes in microsteps. */
 static double field_of(const struct plant *plant, enum motor motor)
 {
-    return plant->chain.chips[motor].field / MICRO + plant->carriages[motor].origin;
+    return floor(plant->chain.chips[motor].field) / MICRO + plant->carriages[motor].origin;
 }
 
 static void see_switch(struct plant *plant, enum motor motor)
