@@ -170,10 +170,12 @@ static void unblock(void)
 
 void rig_judge(void)
 {
-    if (!judge_drivers() || rig.mode == MODE_HOMING)
+    bool homing = rig.mode == MODE_HOMING;
+    if (!homing && broken_axes() == 0)
+        for (uint8_t m = 0; m < MOTORS; m++)
+            judge_switch(m);
+    if (!judge_drivers() || homing)
         return;
-    for (uint8_t m = 0; m < MOTORS; m++)
-        judge_switch(m);
     judge_square();
     unblock();
 }

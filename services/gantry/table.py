@@ -1,4 +1,7 @@
-"""The serial protocol and the rig in numbers. Made of firmware/protocol.yml by scripts/make-protocol: change it there."""
+"""The serial protocol and the rig in numbers.
+
+Made of firmware/protocol.yml by scripts/make-protocol: change it there.
+"""
 
 from enum import IntEnum
 
