@@ -13,9 +13,9 @@ enum { /* registers */
     REG_STEP_MODE = 0x16, REG_CONFIG = 0x18, REG_STATUS = 0x19
 };
 
-enum { /* commands; those that move forward are one more */
-    OP_NOP = 0x00, OP_SET = 0x00, OP_GET = 0x20, OP_MOVE = 0x40, OP_RUN = 0x50, OP_GOTO = 0x60, OP_GO_UNTIL = 0x82,
-    OP_RELEASE = 0x92, OP_SOFT_STOP = 0xB0, OP_HARD_STOP = 0xB8, OP_GET_STATUS = 0xD0, FORWARD = 0x01
+enum { /* commands; those that move forward are one more; GO_UNTIL copies the position to MARK, RELEASE zeroes it */
+    OP_NOP = 0x00, OP_SET = 0x00, OP_GET = 0x20, OP_MOVE = 0x40, OP_RUN = 0x50, OP_GOTO = 0x60, OP_GO_UNTIL = 0x8A,
+    OP_RELEASE = 0x92, OP_SOFT_STOP = 0xB0, OP_HARD_STOP = 0xB8, OP_GET_STATUS = 0xD0, OP_RESET_POS = 0xD8, FORWARD = 0x01
 };
 
 enum { /* flags of STATUS */

@@ -64,11 +64,16 @@ static void approach(void)
     enter(APPROACH, orders);
 }
 
+/* The counters begin at 0 here as well, so that the way to where the switches open is seen. */
 static void release(void)
 {
-    struct order orders[MOTORS];
-    for (uint8_t m = 0; m < MOTORS; m++)
+    struct order orders[MOTORS], zero[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        zero[m] = (struct order){OP_RESET_POS, 0};
         orders[m] = (struct order){OP_RELEASE + FORWARD, 0};
+    }
+    drivers_send(zero, 0);
+    rig_look();
     enter(RELEASE, orders);
 }
 
