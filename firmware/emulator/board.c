@@ -3,10 +3,12 @@
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_spi.h>
 #include <simavr/avr_uart.h>
+#include <simavr/avr_watchdog.h>
 #include <simavr/sim_avr.h>
 #include <simavr/sim_elf.h>
 #include <simavr/sim_interrupts.h>
 #include <simavr/sim_io.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "say.h"
@@ -15,10 +17,12 @@
 #define SELECT_PIN 2    /* of port B */
 #define ALIVE_MASK 0x10 /* of port D */
 #define MCUSR_DATA 0x54
+#define DATA_OVERRUN 0x08 /* of UCSR0A */
 #define START_UP 0.065  /* s, the chip's own after any reset */
 #define HOLD 0.25       /* s that the drivers' reset stays up by its capacitor when nobody drives it */
 #define FIFO 3          /* bytes of the real receiver: two, and the one that comes in */
 #define BYTE_BITS 10
+#define AVR_MACHINE 83 /* EM_AVR */
 #define JUMP_TO_ITSELF 0xCFFF
 
 static struct {
@@ -35,6 +39,12 @@ static struct {
     uint16_t hung_word;
     avr_flashaddr_t hung_at;
     unsigned long overruns;
+    bool loses_next, lost;
+    avr_io_read_t read_byte, read_status;
+    void *byte_reader, *status_reader;
+    avr_io_t listener;
+    avr_cycle_count_t looped, slept, line_end;
+    struct board_times worst;
 } board;
 
 static void log_nothing(avr_t *avr, const int level, const char *format, va_list arguments)
@@ -77,9 +87,33 @@ static void select_changed(avr_irq_t *irq, uint32_t value, void *parameter)
 
 /* The serial line */
 
+static void note(double *worst, avr_cycle_count_t cycles)
+{
+    if ((double)cycles / BOARD_HZ > *worst)
+        *worst = (double)cycles / BOARD_HZ;
+}
+
+/* Reading a byte takes back the flag that others were lost, as on the chip. */
+static uint8_t uart_read(avr_t *avr, avr_io_addr_t address, void *parameter)
+{
+    (void)parameter;
+    board.lost = false;
+    return board.read_byte(avr, address, board.byte_reader);
+}
+
+static uint8_t uart_status(avr_t *avr, avr_io_addr_t address, void *parameter)
+{
+    uint8_t status = board.read_status ? board.read_status(avr, address, board.status_reader) : avr->data[address];
+    (void)parameter;
+    return board.lost ? status | DATA_OVERRUN : status;
+}
+
 static void uart_sent(avr_irq_t *irq, uint32_t value, void *parameter)
 {
     (void)irq, (void)parameter;
+    if (board.line_end != 0)
+        note(&board.worst.answer, board.avr->cycle - board.line_end);
+    board.line_end = 0;
     if (board.sent_count < sizeof board.sent)
         board.sent[board.sent_count++] = (uint8_t)value;
 }
@@ -113,12 +147,14 @@ void board_give(uint8_t byte)
     if (!runs() || !avr_regbit_get(board.avr, board.uart->rxen))
         return;
     board.busy_until = board.avr->cycle + byte_cycles();
-    if (waiting_bytes() >= FIFO) {
+    if (waiting_bytes() >= FIFO || board.loses_next) {
         board.overruns++;
-        avr_regbit_set(board.avr, board.uart->dor);
+        board.loses_next = false;
+        board.lost = true;
         return;
     }
-    avr_regbit_clear(board.avr, board.uart->dor);
+    if (byte == '\n')
+        board.line_end = board.busy_until;
     avr_raise_irq(avr_io_getirq(board.avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
 }
 
@@ -149,7 +185,7 @@ static void after_reset(avr_t *avr)
     unhang();
     board.was_reset = true;
     board.sent_count = 0;
-    board.busy_until = board.debt = 0;
+    board.busy_until = board.debt = board.looped = board.line_end = 0;
     board.starts = board.plant->time + START_UP;
     chain_select(&board.plant->chain, false);
     if (!board.by_order)
@@ -196,6 +232,7 @@ void board_hang(void)
     memcpy(&board.hung_word, board.avr->flash + board.hung_at, sizeof board.hung_word);
     memcpy(board.avr->flash + board.hung_at, &jump, sizeof jump);
     board.avr->sreg[S_I] = 0;
+    board.avr->state = cpu_Running;
 }
 
 /* Time */
@@ -214,12 +251,19 @@ static void see_alive_line(void)
         l6470_wake(&board.plant->chain.chips[i], alive);
 }
 
+static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *parameter)
+{
+    (void)avr, (void)when, (void)parameter;
+    return 0;
+}
+
 static void run_processor(void)
 {
     avr_cycle_count_t wanted = (avr_cycle_count_t)(BOARD_HZ * PLANT_DT) - board.debt, begin = board.avr->cycle;
     board.was_reset = false;
     if (board.avr->data[0xC4] != 0)
         board.uart->cycles_per_byte = byte_cycles();
+    avr_cycle_timer_register(board.avr, wanted, wake, NULL);
     while (board.avr->cycle - begin < wanted && !board.was_reset && !board_crashed()) {
         avr_run(board.avr);
     }
@@ -232,6 +276,18 @@ void board_step(void)
         run_processor();
     see_alive_line();
     plant_step(board.plant);
+}
+
+void board_lose_next(void)
+{
+    board.loses_next = true;
+}
+
+struct board_times board_times(void)
+{
+    struct board_times times = board.worst;
+    memset(&board.worst, 0, sizeof board.worst);
+    return times;
 }
 
 unsigned long board_overruns(void)
@@ -252,25 +308,66 @@ static void *module(const char *kind)
     return NULL;
 }
 
-static void sleep_not(avr_t *avr, avr_cycle_count_t cycles)
+/* The processor sleeps, and we need not wait. */
+static void sleep_through(avr_t *avr, avr_cycle_count_t cycles)
 {
-    (void)avr, (void)cycles;
+    (void)avr;
+    board.slept += cycles;
+}
+
+/* The loop resets the watchdog each time round. */
+static int hear_watchdog(avr_io_t *io, uint32_t what, void *parameter)
+{
+    (void)io, (void)parameter;
+    if (what == AVR_IOCTL_WATCHDOG_RESET) {
+        if (board.looped != 0)
+            note(&board.worst.loop, board.avr->cycle - board.looped - board.slept);
+        board.looped = board.avr->cycle;
+        board.slept = 0;
+    }
+    return -1;
+}
+
+static void wire_uart(void)
+{
+    uint32_t flags = 0;
+    avr_io_addr_t data = board.uart->r_udr - DATA_TO_IO, status = board.uart->r_ucsra - DATA_TO_IO;
+    avr_ioctl(board.avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
+    board.read_byte = board.avr->io[data].r.c;
+    board.byte_reader = board.avr->io[data].r.param;
+    board.avr->io[data].r.c = uart_read;
+    board.read_status = board.avr->io[status].r.c;
+    board.status_reader = board.avr->io[status].r.param;
+    board.avr->io[status].r.c = uart_status;
 }
 
 static void wire(void)
 {
-    uint32_t flags = 0;
     avr_t *avr = board.avr;
     board.uart = module("uart");
     board.spi = module("spi");
     board.reset = avr->reset;
     avr->reset = after_reset;
-    avr->sleep = sleep_not;
+    avr->sleep = sleep_through;
     avr->run_cycle_limit = 1000;
-    avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
+    board.listener = (avr_io_t){.kind = "listener", .ioctl = hear_watchdog};
+    avr_register_io(avr, &board.listener);
+    wire_uart();
     avr->io[board.spi->r_spdr - DATA_TO_IO].w.c = spi_write;
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), uart_sent, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), SELECT_PIN), select_changed, NULL);
+}
+
+/* simavr takes anything for a program. */
+static bool is_firmware(const char *elf)
+{
+    unsigned char head[20] = {0};
+    FILE *file = fopen(elf, "rb");
+    if (file == NULL)
+        return false;
+    bool whole = fread(head, sizeof head, 1, file) == 1;
+    fclose(file);
+    return whole && memcmp(head, "\177ELF", 4) == 0 && head[18] == AVR_MACHINE && head[19] == 0;
 }
 
 bool board_begin(struct plant *plant, const char *elf, double boot)
@@ -279,7 +376,7 @@ bool board_begin(struct plant *plant, const char *elf, double boot)
     avr_global_logger_set(log_nothing);
     board.plant = plant;
     board.boot = boot;
-    if (elf_read_firmware(elf, &firmware) != 0 || firmware.flash == NULL)
+    if (!is_firmware(elf) || elf_read_firmware(elf, &firmware) != 0 || firmware.flash == NULL)
         return false;
     strcpy(firmware.mmcu, "atmega328p");
     firmware.frequency = (uint32_t)BOARD_HZ;

@@ -32,6 +32,16 @@ void board_give(uint8_t byte);
 /* What the controller sent since the last time, at most size bytes. */
 size_t board_sent(uint8_t *bytes, size_t size);
 
+/* The longest time round the firmware's loop, and from a line's last bit to the first bit of its answer, s; since the
+ * last time. */
+struct board_times {
+    double loop, answer;
+};
+struct board_times board_times(void);
+
+/* The next byte gets lost in the receiver, as if the program had not fetched the ones before. */
+void board_lose_next(void);
+
 /* Bytes that the controller's receiver lost, and whether the processor ended. */
 unsigned long board_overruns(void);
 bool board_crashed(void);

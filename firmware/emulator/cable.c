@@ -10,13 +10,14 @@
 #include <termios.h>
 #include <unistd.h>
 
+#define PATIENCE_MS 5000
 #define LOOK_EVERY 10 /* calls of cable_opened between two looks at the terminal */
 
 static int master = -1;
 static bool hung, dtr;
 static unsigned noise, looks;
-static uint8_t buffer[256];
-static size_t begin, end;
+static uint8_t buffer[8192];
+static size_t begin, end, written;
 static char terminal[64], *linked;
 
 static bool make_link(const char *link)
@@ -95,13 +96,31 @@ static uint8_t through_noise(uint8_t byte)
     return byte;
 }
 
+void cable_listen(void)
+{
+    if (master < 0)
+        return;
+    memmove(buffer, buffer + begin, end - begin);
+    end -= begin;
+    begin = 0;
+    ssize_t count = end < sizeof buffer ? read(master, buffer + end, sizeof buffer - end) : 0;
+    end += count > 0 ? (size_t)count : 0;
+}
+
+bool cable_await(size_t count)
+{
+    struct pollfd state = {.fd = master, .events = POLLIN};
+    cable_listen();
+    while (end - begin < count && end < sizeof buffer && poll(&state, 1, PATIENCE_MS) > 0) {
+        if ((state.revents & POLLIN) == 0)
+            break;
+        cable_listen();
+    }
+    return end - begin >= count;
+}
+
 bool cable_read(uint8_t *byte)
 {
-    if (begin == end && master >= 0) {
-        ssize_t count = read(master, buffer, sizeof buffer);
-        begin = 0;
-        end = count > 0 ? (size_t)count : 0;
-    }
     if (begin == end)
         return false;
     *byte = through_noise(buffer[begin++]);
@@ -114,10 +133,11 @@ void cable_write(const uint8_t *bytes, size_t count)
         uint8_t byte = through_noise(bytes[i]);
         if (write(master, &byte, 1) != 1)
             return;
+        written++;
     }
 }
 
-int cable_descriptor(void)
+size_t cable_written(void)
 {
-    return master;
+    return written;
 }

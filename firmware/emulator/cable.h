@@ -19,13 +19,19 @@ bool cable_opened(void);
 /* Of a thousand bytes in either direction so many get a wrong bit. */
 void cable_noise(unsigned per_mille);
 
+/* Fetch what the client sent, as far as there is room. */
+void cable_listen(void);
+
+/* Wait until so many bytes have been fetched and not read yet; false when they do not come within 5 s. */
+bool cable_await(size_t count);
+
 /* The next byte from the client; false when there is none. */
 bool cable_read(uint8_t *byte);
 
 /* Bytes for the client; lost when nobody reads. */
 void cable_write(const uint8_t *bytes, size_t count);
 
-/* To wait for; -1 when it is out. */
-int cable_descriptor(void);
+/* Bytes that were written, all together. */
+size_t cable_written(void);
 
 #endif

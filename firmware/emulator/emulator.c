@@ -18,6 +18,7 @@
 #include "say.h"
 
 #define SLICE 10            /* steps between two looks at the world: 1 ms */
+#define LISTEN 5            /* steps between two looks at the cable */
 #define LATE 0.05           /* s */
 #define MOST_STEPPED 3600.0 /* s of one order */
 
@@ -49,14 +50,17 @@ static const char *const help =
     "  --fast             as fast as possible instead of in real time\n"
     "  --stepped          time passes only by the order `run S`\n"
     "  --help\n\n"
-    "orders, a line each, answered by {\"done\": true} or {\"error\": ...}:\n" CONTROL_HELP
+    "orders, a line each, answered by {\"done\": true, \"sent\": bytes so far} or {\"error\": ...}:\n" CONTROL_HELP
     "  run S               with --stepped: let S seconds pass\n"
+    "  await N             wait, while no time passes, until the client's next N bytes are there\n"
     "  unplug [power]      pull the USB cable, and with `power` the controller's power with it\n"
     "  plug                plug it in again, with power\n"
     "  noise N             of a thousand bytes N have a wrong bit\n"
     "  reset               press the reset button\n"
     "  hold on|off         keep the controller in reset, as a broken one\n"
     "  hang                let the firmware hang\n"
+    "  lose                the receiver loses the next byte\n"
+    "  times               longest time round the firmware's loop and until an answer begins, s, since the last time\n"
     "  overruns            bytes that the controller's receiver lost\n"
     "  lateness            s that real time was missed by, together\n"
     "  quit\n"
@@ -110,7 +114,10 @@ static bool question(const char *line)
 {
     if (strcmp(line, "overruns") == 0)
         say("\"overruns\": %lu", board_overruns());
-    else if (strcmp(line, "lateness") == 0)
+    else if (strcmp(line, "times") == 0) {
+        struct board_times times = board_times();
+        say("\"loop\": %.6f, \"answer\": %.6f", times.loop, times.answer);
+    } else if (strcmp(line, "lateness") == 0)
         say("\"lateness\": %.6f", self.late);
     else
         return false;
@@ -125,10 +132,14 @@ static bool obey(const char *line)
         return unplug(line[6] != '\0');
     if (strncmp(line, "noise ", 6) == 0)
         cable_noise((unsigned)strtoul(line + 6, NULL, 10));
+    else if (strncmp(line, "await ", 6) == 0)
+        return cable_await(strtoul(line + 6, NULL, 10));
     else if (strcmp(line, "reset") == 0)
         board_reset(RESET_ORDERED);
     else if (strcmp(line, "hold on") == 0 || strcmp(line, "hold off") == 0)
         board_hold(line[6] == 'n');
+    else if (strcmp(line, "lose") == 0)
+        board_lose_next();
     else if (strcmp(line, "hang") == 0)
         board_hang();
     else if (strcmp(line, "quit") == 0)
@@ -138,13 +149,18 @@ static bool obey(const char *line)
     return true;
 }
 
+static void say_done(void)
+{
+    say("\"done\": true, \"t\": %.4f, \"sent\": %zu", plant.time, cable_written());
+}
+
 static void take_order(const char *line)
 {
     if (strncmp(line, "run ", 4) == 0) {
         if (!step(line + 4))
             say("\"error\": \"run takes seconds up to %g, with --stepped\"", MOST_STEPPED);
     } else if (obey(line))
-        say("\"done\": true, \"t\": %.4f", plant.time);
+        say_done();
     else
         say("\"error\": \"no such order, see --help\"");
 }
@@ -192,6 +208,8 @@ static void pass_slice(void)
 {
     uint8_t byte;
     for (int i = 0; i < SLICE; i++) {
+        if (i % LISTEN == 0)
+            cable_listen();
         if (board_wants() && cable_read(&byte))
             board_give(byte);
         board_step();
@@ -244,7 +262,7 @@ static void live(void)
         pass_slice();
         if (self.waiting && plant.time >= self.until - PLANT_DT / 2) {
             self.waiting = false;
-            say("\"done\": true, \"t\": %.4f", plant.time);
+            say_done();
         }
     }
 }
@@ -316,7 +334,7 @@ int main(int argc, char **argv)
         return 2;
     }
     plant_begin(&plant, self.place);
-    if (access(elf, R_OK) != 0 || !board_begin(&plant, elf, self.boot)) {
+    if (!board_begin(&plant, elf, self.boot)) {
         fprintf(stderr, "rig-emulator: %s is no firmware that can be read: build it with make firmware\n", elf);
         return 2;
     }

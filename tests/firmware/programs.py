@@ -24,7 +24,8 @@ class Program:
     def __init__(self, *words: str) -> None:
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.events: list[dict[str, Any]] = []
-        self.moves = False
+        self.sent = 0
+        """Bytes that the controller sent, all together."""
 
     def __enter__(self) -> "Program":
         return self
@@ -52,6 +53,7 @@ class Program:
         while not found or not {"done", "error"} & found[-1].keys():
             found.append(self.read())
         assert found[-1].get("done") is True, f"{line}: {found[-1]}"
+        self.sent = int(found[-1].get("sent", 0))
         return found[:-1]
 
     def run(self, seconds: float) -> list[dict[str, Any]]:
@@ -138,7 +140,7 @@ class Rig(Program):
         super().__init__(str(EMULATOR), "--stepped", "--pose-rate", "0", "--start", where, *options, str(ELF))
         self.path = self._ready()
         self.port: serial.Serial | None = None
-        self._rest = b""
+        self._rest, self._got = b"", 0
 
     def __exit__(self, *details: object) -> None:
         self.close()
@@ -151,8 +153,8 @@ class Rig(Program):
 
     def open(self) -> None:
         """Open the port, which resets the controller, and wait until it can hear."""
-        self.port = serial.Serial(self.path, 115200, timeout=0)
-        self._rest = b""
+        self.port = serial.Serial(self.path, 115200, timeout=5)
+        self._rest, self._got = b"", self.sent
         self.run(0.15)
 
     def close(self) -> None:
@@ -168,7 +170,10 @@ class Rig(Program):
         """The answers that come within 10 ms after the last byte, in the controller's time."""
         assert self.port is not None
         self.port.write(data)
-        self.port.flush()
+        self.order(f"await {len(data)}")
         self.run(0.01 + len(data) * 10 / 115200)
-        *lines, self._rest = (self._rest + self.port.read(4096)).split(b"\n")
+        new = self.port.read(self.sent - self._got)
+        assert len(new) == self.sent - self._got, "answers are missing"
+        self._got = self.sent
+        *lines, self._rest = (self._rest + new).split(b"\n")
         return [line.decode("ascii") for line in lines]

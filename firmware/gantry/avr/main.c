@@ -1,6 +1,7 @@
 /* The ATmega328P of an Arduino UNO R3: pins, clock, watchdog, and the loop. Pins are listed in firmware/README.md. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
+#include <avr/sleep.h>
 #include <avr/wdt.h>
 #include <util/atomic.h>
 #include <util/delay.h>
@@ -70,6 +71,19 @@ static void start_clock(void)
     TIMSK0 = 1 << OCIE0A;
 }
 
+/* Until the next interrupt, a millisecond at most; one that comes just before is not slept over. */
+static void doze(void)
+{
+    cli();
+    if (!uart_has_byte()) {
+        sleep_enable();
+        sei();
+        sleep_cpu();
+        sleep_disable();
+    }
+    sei();
+}
+
 int main(void)
 {
     MCUSR = 0;
@@ -85,5 +99,6 @@ int main(void)
         if (uart_read(&byte))
             gantry_take(byte);
         gantry_tick();
+        doze();
     }
 }

@@ -55,9 +55,14 @@ void uart_start(void)
     UCSR0B = (1 << RXEN0) | (1 << TXEN0) | (1 << RXCIE0);
 }
 
+bool uart_has_byte(void)
+{
+    return in_head != in_tail;
+}
+
 bool uart_read(uint8_t *byte)
 {
-    if (in_head == in_tail)
+    if (!uart_has_byte())
         return false;
     *byte = in[in_tail];
     in_tail = NEXT(in_tail);
