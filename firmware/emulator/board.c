@@ -111,7 +111,7 @@ static uint8_t uart_status(avr_t *avr, avr_io_addr_t address, void *parameter)
 static void uart_sent(avr_irq_t *irq, uint32_t value, void *parameter)
 {
     (void)irq, (void)parameter;
-    if (board.line_end != 0)
+    if (board.line_end != 0 && board.avr->cycle >= board.line_end)
         note(&board.worst.answer, board.avr->cycle - board.line_end);
     board.line_end = 0;
     if (board.sent_count < sizeof board.sent)

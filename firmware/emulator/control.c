@@ -32,6 +32,10 @@ static bool on_motor(struct plant *plant, const char *order, int motor, const ch
         plant->carriages[motor].stuck = (enum stuck)choice;
     else if (strcmp(order, "heat") == 0 && (choice = which(how, heats, 3)) >= 0)
         l6470_heat(chip, (enum l6470_heat)choice);
+    else if (strcmp(order, "miscount") == 0 && fabs(strtod(how, NULL)) <= 10000)
+        chip->zero += round(strtod(how, NULL) * 128);
+    else if (strcmp(order, "tear") == 0)
+        plant->carriages[motor].torn = true;
     else if (strcmp(order, "short") == 0)
         l6470_short(chip);
     else

@@ -10,6 +10,8 @@
     "  push MOTOR STEPS                    move a carriage by full steps; four lose the motor's hold\n" \
     "  switch MOTOR works|open|closed      a limit switch that is stuck\n" \
     "  heat MOTOR cool|warm|hot            a driver that warns, or shuts down\n" \
+    "  miscount MOTOR STEPS                a driver whose counter is off by full steps\n" \
+    "  tear MOTOR                          a belt that is off: the motor turns and nothing moves\n" \
     "  short MOTOR                         a driver that sees too much current\n" \
     "  motors on|off                       the motors' supply\n"
 

@@ -122,9 +122,11 @@ static void step_motor(struct plant *plant, enum motor motor)
     double before = chip->speed, field = chip->field;
     l6470_advance(chip, PLANT_DT);
     note_extremes(plant, motor, before, field);
-    move_rotor(plant, motor, chip->speed / MICRO);
-    hit_frame(plant, motor);
-    note_slip(plant, motor);
+    if (!plant->carriages[motor].torn) {
+        move_rotor(plant, motor, chip->speed / MICRO);
+        hit_frame(plant, motor);
+        note_slip(plant, motor);
+    }
     see_switch(plant, motor);
 }
 

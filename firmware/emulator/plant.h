@@ -14,7 +14,7 @@ struct carriage {
     double at, speed;  /* full steps, full steps/s */
     double origin;     /* at - field when nothing was lost */
     long slips;        /* turns of four full steps that rotor and field are apart */
-    bool closed, crashed;
+    bool closed, crashed, torn; /* torn: the belt is off */
     enum stuck stuck;
 };
 

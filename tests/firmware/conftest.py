@@ -61,8 +61,8 @@ def new_rig(firmware: None) -> Iterator[Rig]:
 
 @pytest.fixture
 def rig(new_rig: Rig) -> Rig:
-    """The emulated rig, calibrated and in the middle."""
+    """The emulated rig, calibrated and away from all edges."""
     new_rig.calibrate()
-    new_rig.go(0, 0, 0)
+    new_rig.go(-0.4, -0.3, -1)
     new_rig.extremes()
     return new_rig

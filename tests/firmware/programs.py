@@ -18,6 +18,9 @@ MIDDLE = (0.1, -0.1, 11.0)
 """Where rigs stand at first; m, m, degrees."""
 
 
+NEAR_HOME = (-0.85, -0.65, -140.0)
+
+
 class Program:
     """A program that takes orders, a line each, and answers in JSON; time passes only by `run`."""
 
@@ -135,7 +138,7 @@ class Bench(Program):
 class Rig(Program):
     """The emulated rig: the firmware's binary behind a serial port."""
 
-    def __init__(self, *options: str, place: tuple[float, float, float] = MIDDLE) -> None:
+    def __init__(self, *options: str, place: tuple[float, float, float] = NEAR_HOME) -> None:
         where = ",".join(map(str, place))
         super().__init__(str(EMULATOR), "--stepped", "--pose-rate", "0", "--start", where, *options, str(ELF))
         self.path = self._ready()

@@ -58,6 +58,7 @@ def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, moto
     """An open one is noticed at the frame, at homing speed, and by the way; a closed one before anything goes far."""
     bench.go(-0.5, -0.4, -2)
     bench.order(f"switch {motor} {stuck}")
+    bench.extremes()
     bench.say("$CALIBRATE")
     passed = 0.0
     while (status := bench.status()) == Status.HOMING:
@@ -66,10 +67,32 @@ def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, moto
         passed += 0.5
     assert status in (Status.FAULT, Status.STALL)
     assert all(one["value"] <= 0.4 for one in bench.happened("crash"))
+    if stuck == "closed":
+        assert max(bench.extremes()["way"][:2]) < 0.02
     bench.run(1)
     assert not bench.pose()["moves"]
     bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
+
+
+def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
+    fresh.order("tear x")
+    fresh.say("$CALIBRATE")
+    fresh.until(Status.FAULT)
+    assert 1.85 < fresh.extremes()["way"][0] < 1.9
+
+
+def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
+    fresh.say("$CALIBRATE")
+    fresh.run(1)
+    fresh.order("switch x closed")
+    fresh.run(0.01)
+    fresh.order("switch x works")
+    fresh.run(0.2)
+    before = fresh.pose()["x"]
+    fresh.until(Status.FAULT)
+    fresh.run(0.1)
+    assert fresh.pose()["x"] == pytest.approx(before, abs=1e-4)
 
 
 def test_only_stop_ends_it_early(fresh: Bench) -> None:

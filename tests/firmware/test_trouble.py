@@ -31,6 +31,17 @@ def test_trouble_stops_everything(bench: Bench, motor: str, order: str, status: 
     assert abs(bench.pose()["skew"]) < 0.012
 
 
+def test_a_pair_whose_counters_part_stops_and_is_void(bench: Bench) -> None:
+    bench.keep_running("0,0.1,0", 0.5)
+    bench.order("miscount y2 8")
+    bench.run(0.01)
+    assert bench.status() == Status.FAULT
+    bench.run(0.1)
+    assert not bench.pose()["moves"]
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+
+
 def test_heat_that_lasts_comes_back(bench: Bench) -> None:
     bench.order("heat x warm")
     bench.run(0.01)
