@@ -259,7 +259,12 @@ static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *paramete
 
 static void run_processor(void)
 {
-    avr_cycle_count_t wanted = (avr_cycle_count_t)(BOARD_HZ * PLANT_DT) - board.debt, begin = board.avr->cycle;
+    const avr_cycle_count_t slice = (avr_cycle_count_t)(BOARD_HZ * PLANT_DT);
+    if (board.debt >= slice) { /* it slept through */
+        board.debt -= slice;
+        return;
+    }
+    avr_cycle_count_t wanted = slice - board.debt, begin = board.avr->cycle;
     board.was_reset = false;
     if (board.avr->data[0xC4] != 0)
         board.uart->cycles_per_byte = byte_cycles();
