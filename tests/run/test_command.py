@@ -31,7 +31,7 @@ class Desk:
 
     def compiled(self, plan: Plan) -> Path:
         target = self.folder / "generated" / plan.slug
-        target.mkdir(parents=True)
+        target.mkdir(parents=True, exist_ok=True)
         (target / "test.json").write_text(to_json(plan))
         return target
 
@@ -283,3 +283,15 @@ def test_usage_errors_are_sentences(desk: Desk) -> None:
         assert result.returncode == 2, result
         assert said in result.stderr
         assert "Traceback" not in result.stderr
+
+
+def test_times_of_all_runs_are_kept_and_drawn(desk: Desk) -> None:
+    """A second run forecasts what the first one took, and the report shows both."""
+    first = desk.start(desk.bench.plan())
+    said_first, _ = first.communicate()
+    assert "; at most " in said_first
+    second = desk.start(desk.bench.plan())
+    said, _ = second.communicate()
+    assert "; about " in said
+    assert (desk.folder / "report" / "times.png").read_bytes().startswith(b"\x89PNG")
+    assert 'src="times.png"' in (desk.folder / "report" / "index.html").read_text()
