@@ -9,6 +9,7 @@ from pathlib import Path
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
+from dodo_dsl.plan.emulation import DRAWN, hardware
 from dodo_dsl.plan.files import Copy, FilesError, copies
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
 from dodo_dsl.plan.recorder import MANIFEST, recorder
@@ -176,7 +177,7 @@ class _Builder:
             if (flag := self._flag(use, parameter, f"{key}.{parameter.name}")) is not None
         ]
         flags.append(Flag("cid", str(self.cid)))
-        return Service(
+        service = Service(
             use.layer,
             use.name,
             manifest.name,
@@ -186,6 +187,7 @@ class _Builder:
             judge=use.layer == "evaluation",
             devices=self._devices(use, manifest),
         )
+        return hardware(service, self.manifests, self._image(self.manifests[DRAWN].image))
 
     def _devices(self, use: Use, manifest: Manifest) -> tuple[str, ...]:
         """The device files among what the manifest names; a rig's camera may be none (rpicam, a recording)."""
