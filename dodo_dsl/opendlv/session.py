@@ -54,22 +54,17 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._receiver, select.POLLIN)
 
-    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> None:
-        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now).
+    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> Envelope:
+        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now); returns how.
 
         Raises MessageError, FrameError or SessionError.
         """
         now = time.time_ns() // 1000
-        self.send_envelope(
-            Envelope(
-                self.messages.id(message),
-                self.messages.encode(message),
-                now,
-                0,
-                now if sample_time is None else sample_time,
-                sender_stamp,
-            )
-        )
+        sampled = now if sample_time is None else sample_time
+        id_, payload = self.messages.id(message), self.messages.encode(message)
+        envelope = Envelope(id_, payload, now, 0, sampled, sender_stamp)
+        self.send_envelope(envelope)
+        return envelope
 
     def send_envelope(self, envelope: Envelope) -> None:
         """Send an envelope as it is; raises FrameError, and SessionError above 65,507 bytes."""

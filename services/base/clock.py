@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.memory import SharedMemory
 
 MICROSECONDS = 1_000_000
 LATEST = MICROSECONDS
@@ -26,9 +27,15 @@ class Inbox(Protocol):
         """Let the service have it."""
         ...
 
+    def overhear(self, envelope: Envelope) -> None:
+        """It is on the bus, but the service is not to act upon it."""
+        ...
+
 
 class Clock(Protocol):
-    """Test time, in microseconds since the epoch."""
+    """Test time, in microseconds since the epoch. ``relays`` says that it hands on what was on the bus before."""
+
+    relays: bool
 
     def now(self) -> int:
         """The time of the test."""
@@ -41,6 +48,18 @@ class Clock(Protocol):
         """
         ...
 
+    def sent(self, envelope: Envelope) -> None:
+        """The service has sent this."""
+        ...
+
+    def memory(self, name: str, size: int) -> SharedMemory:
+        """New shared memory for pictures that are sampled by this clock; raises SharedMemoryError."""
+        ...
+
+    def close(self) -> None:
+        """The service ends."""
+        ...
+
 
 class RealTimeClock:
     """Test time is the wall clock's at the start, and goes on evenly whatever that is set to afterwards.
@@ -48,6 +67,8 @@ class RealTimeClock:
     Steps are the scheduled instants, not the moments at which the processor got to them: a service that is late
     catches up with the same times that it would have had, and skips steps only when it is more than 1 s late.
     """
+
+    relays = False
 
     def __init__(self) -> None:
         self._offset = time.time_ns() // 1000 - time.monotonic_ns() // 1000
@@ -64,6 +85,15 @@ class RealTimeClock:
             yield due
             due += period
             due += self._skipped(due, period)
+
+    def sent(self, envelope: Envelope) -> None:
+        """Time goes on by itself."""
+
+    def memory(self, name: str, size: int) -> SharedMemory:
+        return SharedMemory.create(name, size)
+
+    def close(self) -> None:
+        """Nobody waits."""
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
         """Deliver until the instant has come, and then what else is there already."""

@@ -1,8 +1,34 @@
+"""The clock of a test in lockstep as a program."""
+
 import sys
 from pathlib import Path
 
-from services.base import run
-from services.base.later import build
+from services.base import Context, Service, run
+from services.base.service import period_of
+from services.clock.answers import Answers, kinds
+from services.clock.model import Patience, Roles
+from services.clock.service import ClockService
+
+_MICROSECONDS = 1_000_000
+
+
+def build(context: Context) -> Service:
+    flags = context.flags
+    ids = {name: context.messages.id(name) for name in context.messages.names()}
+    done = kinds([flags["done"]] if flags["done"] else [], ids)
+    answers = Answers(kinds(flags["answers"], ids), kinds(flags["hears"], ids), done[0] if done else None)
+    roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
+    assert context.session is not None, "the program gives its session"
+    return ClockService(
+        context.session,
+        roles,
+        answers,
+        period_of(flags["freq"]),
+        round(flags["timeout"] * _MICROSECONDS),
+        Patience(flags["first-patience"], flags["patience"]),
+        flags["wall-timeout"],
+    )
+
 
 if __name__ == "__main__":
     sys.exit(run(Path(__file__).parent, build))
