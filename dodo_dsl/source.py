@@ -16,7 +16,8 @@ from dodo_dsl.diagnostics import Diagnostic, Span
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
-MAX_NODES = 50_000
+MAX_NODES = 20_000
+MAX_PROBLEMS = 500
 
 Plain = str | int | float | bool | None
 
@@ -141,6 +142,8 @@ class _Builder:
 
     def report(self, span: Span, rule: str, message: str, hint: str = "") -> None:
         self.diagnostics.append(Diagnostic(span, rule, message, hint))
+        if len(self.diagnostics) == MAX_PROBLEMS:
+            raise _Stop(Diagnostic(span, "too-large", f"{MAX_PROBLEMS} problems so far; the rest is not read"))
 
     def feed(self, event: Any) -> None:
         if isinstance(event, yaml.DocumentStartEvent):
@@ -291,6 +294,16 @@ def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:
     except (yaml.YAMLError, ValueError) as error:
         return None, [*builder.diagnostics, _syntax(file, text, error)]
     return builder.root, builder.diagnostics
+
+
+def path_of(folder: Path, text: str) -> Path | None:
+    """The path that a text means, links followed; None for what no path is: NUL, too long, links in a circle."""
+    try:
+        path = (folder / text).resolve()
+        path.exists()
+    except (OSError, RuntimeError, ValueError):
+        return None
+    return path
 
 
 def read(path: Path) -> tuple[Node | None, list[Diagnostic]]:

@@ -19,6 +19,7 @@ EXAMPLES = """examples:
 
 
 _MOST_LINES = 200
+_MOST_PROBLEMS = 1000
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -41,9 +42,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 
 def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
-    if diagnostics or style != "text":
+    if style != "text":
         stdout.write(FORMATS[style](diagnostics))
-    if diagnostics and style == "text":
+    elif diagnostics:
+        stdout.write(FORMATS[style](diagnostics[:_MOST_PROBLEMS]))
+        if len(diagnostics) > _MOST_PROBLEMS:
+            stdout.write(f"... {len(diagnostics) - _MOST_PROBLEMS} more problems\n")
         rules = {diagnostic.rule for diagnostic in diagnostics}
         stdout.write(f"dodo explain {rules.pop() if len(rules) == 1 else 'RULE'} says more\n")
 

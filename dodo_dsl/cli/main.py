@@ -14,6 +14,7 @@ from dodo_dsl.cli import explain as explain_command
 from dodo_dsl.cli import images as images_command
 from dodo_dsl.cli import list as list_command
 from dodo_dsl.cli import new as new_command
+from dodo_dsl.cli import rec as rec_command
 from dodo_dsl.cli import report as report_command
 from dodo_dsl.cli import run as run_command
 from dodo_dsl.cli.exits import Exit
@@ -25,6 +26,7 @@ COMMANDS: dict[str, ModuleType] = {
     "explain": explain_command,
     "new": new_command,
     "report": report_command,
+    "rec": rec_command,
     "images": images_command,
     "doctor": doctor_command,
 }

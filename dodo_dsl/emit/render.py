@@ -91,7 +91,7 @@ def _render(template: str, **values: object) -> str:
 
 
 def render_plan(plan: Plan) -> list[File]:
-    """The compose layers, ``.env`` and ``test.json`` of one test."""
+    """The compose layers, ``compose.yaml`` that keeps compose in the folder, ``.env`` and ``test.json`` of one test."""
     names = {layer: f"{layer}.compose.yml" for layer in LAYERS}
     own_network = plan.isolation == "network"
     files = [
@@ -110,6 +110,7 @@ def render_plan(plan: Plan) -> list[File]:
         if layer != "application"
     ]
     files.append(File(f"{plan.slug}/{names['application']}", _render("application.compose.yml.j2", plan=plan)))
+    files.append(File(f"{plan.slug}/compose.yaml", _render("compose.yaml.j2")))
     files.append(File(f"{plan.slug}/.env", _render("env.j2", plan=plan, files=list(names.values()))))
     files.append(File(f"{plan.slug}/test.json", to_json(plan)))
     return files

@@ -101,12 +101,7 @@ def decode_body(body: bytes, received: int | None = None) -> Envelope:
 
     Fields come in any order, the first of equal ones counts, absent ones are zero.
     """
-    try:
-        proto = _TYPE.FromString(body)
-        if proto.ByteSize() != len(body):
-            proto = _TYPE.FromString(wire.keep_first(body, _LAYOUT.shape))
-    except (DecodeError, wire.WireError) as error:
-        raise FrameError(f"the frame holds no envelope: {error}") from None
+    proto = _parsed(body)
     sent, sample_time = proto.sent, proto.sampleTimeStamp
     if received is None:
         received = proto.received.seconds * MICROSECONDS + proto.received.microseconds
@@ -118,6 +113,27 @@ def decode_body(body: bytes, received: int | None = None) -> Envelope:
         sample_time.seconds * MICROSECONDS + sample_time.microseconds,
         proto.senderStamp,
     )
+
+
+def decode_parts(body: bytes) -> tuple[int, bytes, list[int], int]:
+    """An envelope as it stands on the wire: id, payload, six numbers, sender stamp; raises FrameError.
+
+    The numbers are seconds and microseconds of sent, received and sample time.
+    """
+    proto = _parsed(body)
+    times = (proto.sent, proto.received, proto.sampleTimeStamp)
+    numbers = [number for time in times for number in (time.seconds, time.microseconds)]
+    return proto.dataType, proto.serializedData, numbers, proto.senderStamp
+
+
+def _parsed(body: bytes) -> Any:
+    try:
+        proto = _TYPE.FromString(body)
+        if proto.ByteSize() != len(body):
+            proto = _TYPE.FromString(wire.keep_first(body, _LAYOUT.shape))
+    except (DecodeError, wire.WireError) as error:
+        raise FrameError(f"the frame holds no envelope: {error}") from None
+    return proto
 
 
 def _put_time(stamp: Any, time: int) -> None:

@@ -1,9 +1,10 @@
-"""Shared memory as libcluon lays it out in its SysV mode: how the frames of a camera travel.
+"""Shared memory in both modes of libcluon: how the frames of a camera travel.
 
-A segment without header holds the data; one semaphore is the mutex (1 is free), another the condition (1 is idle,
-0 wakes all that wait). The time stamp of the content is the token file's time of modification.
+SysV is the default: a segment without header holds the data, semaphores are mutex and condition, and the time of the
+content is that of the token file in /tmp. CLUON_SHAREDMEMORY_POSIX=1 selects POSIX: one object holds all of it.
 """
 
+import errno
 import os
 import time
 from collections.abc import Iterator
@@ -11,16 +12,16 @@ from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import Self
 
-import sysv_ipc
-
-from dodo_dsl.opendlv import tokenfile
+from dodo_dsl.opendlv import posix_segment, tokenfile
+from dodo_dsl.opendlv.posix_segment import PosixSegment
 from dodo_dsl.opendlv.segment import Segment
-from dodo_dsl.opendlv.semaphore import Result, operate
+from dodo_dsl.opendlv.semaphore import Result
 from dodo_dsl.opendlv.tokenfile import SharedMemoryError
 
 __all__ = ["SharedMemory", "SharedMemoryError"]
 
 LOCK_PATIENCE = 5.0
+MODE = "CLUON_SHAREDMEMORY_POSIX"
 
 
 class SharedMemory:
@@ -30,9 +31,9 @@ class SharedMemory:
     valid after `close`.
     """
 
-    def __init__(self, segment: Segment, name: str, owner: bool) -> None:
+    def __init__(self, segment: Segment | PosixSegment, name: str, owner: bool) -> None:
         self.name = name
-        self.size: int = segment.memory.size
+        self.size: int = segment.size
         self.buffer = segment.view()
         self._segment = segment
         self._owner = owner
@@ -40,28 +41,35 @@ class SharedMemory:
         self._closed = False
 
     @classmethod
-    def create(cls, name: str, size: int) -> Self:
+    def create(cls, name: str, size: int, posix: bool | None = None) -> Self:
         """Make memory of `size` bytes, all zero, and what belongs to it; `close` removes it all.
 
-        What a dead creator left under this name is removed first. Raises SharedMemoryError, also where a living
-        process holds memory of this name.
+        What a dead creator left under this name is removed first. `posix` selects the mode (by default the environment
+        does). Raises SharedMemoryError, also where a living process holds memory of this name.
         """
-        _refuse_posix()
         if not 0 < size < 2**32:
             raise SharedMemoryError(f"shared memory `{name}` cannot have {size} bytes")
+        if _wants_posix() if posix is None else posix:
+            return cls(PosixSegment.create(posix_segment.path_of(name), size), name, owner=True)
         return cls(Segment.create(tokenfile.path_of(name), size), name, owner=True)
 
     @classmethod
     def attach(cls, name: str) -> Self:
-        """Use the memory that another process made; raises SharedMemoryError where there is none."""
-        _refuse_posix()
-        return cls(Segment.attach(tokenfile.path_of(name)), name, owner=False)
+        """Use the memory that another process made, in the mode in which it made it.
+
+        A token file in /tmp means SysV; where there is none, an object of this name means POSIX. Raises
+        SharedMemoryError where there is neither.
+        """
+        token = tokenfile.path_of(name)
+        if not token.exists() and (_wants_posix() or _is_posix(name)):
+            return cls(PosixSegment.attach(posix_segment.path_of(name)), name, owner=False)
+        return cls(Segment.attach(token), name, owner=False)
 
     @contextmanager
     def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
         """Hold the mutex; raises SharedMemoryError when another holds it for `timeout` seconds."""
         deadline = time.monotonic() + timeout
-        while (result := self._operate(self._segment.mutex, -1, deadline - time.monotonic())) is not Result.DONE:
+        while (result := self._take(deadline - time.monotonic())) is not Result.DONE:
             if result is Result.TIMEOUT:
                 raise SharedMemoryError(f"shared memory `{self.name}` was locked by another for {timeout:g} s")
         self._locked = True
@@ -69,7 +77,7 @@ class SharedMemory:
             yield
         finally:
             self._locked = False
-            self._operate(self._segment.mutex, 1, None)
+            self._release()
 
     def stamp(self, time_us: int) -> None:
         """Say when the content was sampled (microseconds since the epoch); only while locked."""
@@ -95,18 +103,21 @@ class SharedMemory:
             self._wake()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for a notification: False when `timeout` seconds are over or a signal came.
+        """Wait for a notification without spinning: False when `timeout` seconds are over, or (SysV) a signal came.
 
         Raises SharedMemoryError when the creator has removed the memory.
         """
-        return self._operate(self._segment.condition, 0, timeout) is Result.DONE
+        try:
+            return self._segment.wait(timeout) is Result.DONE
+        except OSError as error:
+            raise self._failed(error) from None
 
     def readers_waiting(self) -> int:
         """How many processes wait for a notification at this moment."""
         try:
-            return int(self._segment.condition.waiting_for_zero)
-        except sysv_ipc.Error:
-            raise self._removed() from None
+            return self._segment.readers_waiting()
+        except OSError as error:
+            raise self._failed(error) from None
 
     def close(self) -> None:
         """Let go; the creator wakes all that wait and removes everything."""
@@ -115,8 +126,6 @@ class SharedMemory:
         self._closed = True
         self.buffer = memoryview(b"")
         if self._owner:
-            with suppress(SharedMemoryError):
-                self._wake()
             self._segment.remove()
         self._segment.close()
 
@@ -130,25 +139,41 @@ class SharedMemory:
 
     def _wake(self) -> None:
         try:
-            self._segment.condition.value = 0
-            self._segment.condition.value = 1
-        except sysv_ipc.Error:
-            raise self._removed() from None
+            self._segment.wake()
+        except OSError as error:
+            raise self._failed(error) from None
 
-    def _operate(self, semaphore: sysv_ipc.Semaphore, value: int, timeout: float | None) -> Result:
+    def _take(self, timeout: float) -> Result:
         try:
-            return operate(semaphore.id, value, timeout, undo=value != 0)
-        except OSError:
-            raise self._removed() from None
+            return self._segment.lock(timeout)
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def _release(self) -> None:
+        try:
+            self._segment.unlock()
+        except OSError as error:
+            raise self._failed(error) from None
 
     def _need_lock(self) -> None:
         if not self._locked:
             raise SharedMemoryError(f"shared memory `{self.name}` must be locked for its time stamp")
 
-    def _removed(self) -> SharedMemoryError:
-        return SharedMemoryError(f"shared memory `{self.name}` was removed by its creator")
+    def _failed(self, error: OSError) -> SharedMemoryError:
+        reasons = {
+            errno.ETIMEDOUT: "can notify no more: a reader was killed while it waited",
+            errno.ENOTRECOVERABLE: "can be locked no more: its holder was killed",
+        }
+        return SharedMemoryError(
+            f"shared memory `{self.name}` {reasons.get(error.errno or 0, 'was removed by its creator')}"
+        )
 
 
-def _refuse_posix() -> None:
-    if os.environ.get("CLUON_SHAREDMEMORY_POSIX", "").startswith("1"):
-        raise SharedMemoryError("CLUON_SHAREDMEMORY_POSIX=1 is set, but only SysV shared memory is supported")
+def _wants_posix() -> bool:
+    return os.environ.get(MODE, "").startswith("1")
+
+
+def _is_posix(name: str) -> bool:
+    with suppress(SharedMemoryError):
+        return posix_segment.path_of(name).exists()
+    return False

@@ -60,32 +60,37 @@ class MessageSet:
 
     def type(self, key: str | int) -> builtins.type[Any]:
         """The class of a message, by full name or id; raises UnknownMessage."""
-        return self._layout(key).type
+        return self.layout(key).type
 
     def id(self, key: Message | builtins.type[Message] | str) -> int:
         """The id of a message, of its class or of its full name; raises UnknownMessage."""
         name = key if isinstance(key, str) else key.DESCRIPTOR.full_name
-        return self._layout(name).definition.id
+        return self.layout(name).definition.id
+
+    def ids(self) -> frozenset[int]:
+        """All ids."""
+        return frozenset(self._by_id)
 
     def name(self, id_: int) -> str:
         """The full name for an id; raises UnknownMessage."""
-        return self._layout(id_).definition.name
+        return self.layout(id_).definition.name
 
     def encode(self, message: Message) -> bytes:
         """The payload as libcluon writes it: every field in order, zeros and defaults too.
 
         Raises MessageError where a number does not fit its type, UnknownMessage for a message of another set.
         """
-        return codec.encode(self._layout(message.DESCRIPTOR.full_name), message)
+        return codec.encode(self.layout(message.DESCRIPTOR.full_name), message)
 
     def decode(self, id_: int, payload: bytes) -> Any:
         """The message in a payload: fields in any order, the first of equal ones counts, absent ones default.
 
         Raises MessageError for bytes that are no such message, UnknownMessage for an unknown id.
         """
-        return codec.decode(self._layout(id_), payload)
+        return codec.decode(self.layout(id_), payload)
 
-    def _layout(self, key: str | int) -> Layout:
+    def layout(self, key: str | int) -> Layout:
+        """What a codec knows of a message, by full name or id; raises UnknownMessage."""
         layout = self._by_id.get(key) if isinstance(key, int) else self._layouts.get(key)
         if layout is None:
             raise UnknownMessage(self._unknown(key))

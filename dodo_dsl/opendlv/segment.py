@@ -11,6 +11,7 @@ from typing import Self
 import sysv_ipc
 
 from dodo_dsl.opendlv import tokenfile
+from dodo_dsl.opendlv.semaphore import Result, operate
 from dodo_dsl.opendlv.tokenfile import SharedMemoryError
 
 MEMORY, MUTEX, CONDITION = 1, 2, 3  # libcluon's project numbers
@@ -51,6 +52,7 @@ class Segment:
         token = tokenfile.open_existing(path)
         status = os.fstat(token)
         try:
+            _refuse_twin(path)
             return cls(
                 path,
                 token,
@@ -61,6 +63,9 @@ class Segment:
         except sysv_ipc.Error as error:
             os.close(token)
             raise SharedMemoryError(f"shared memory `{path.name}` has no content (yet): {error}") from None
+        except SharedMemoryError:
+            os.close(token)
+            raise
 
     def view(self) -> memoryview:
         """A view of the data; the segment is detached when this view and all that came of it are gone."""
@@ -68,12 +73,43 @@ class Segment:
         weakref.finalize(array, self.memory.detach).atexit = False
         return memoryview(array).cast("B")
 
+    @property
+    def size(self) -> int:
+        """Bytes of the data."""
+        return int(self.memory.size)
+
+    def lock(self, timeout: float) -> Result:
+        """Take the mutex; TIMEOUT when another holds it for `timeout` seconds. Raises OSError when it is gone."""
+        return operate(self.mutex.id, -1, timeout, undo=True)
+
+    def unlock(self) -> None:
+        operate(self.mutex.id, 1, None, undo=True)
+
+    def wait(self, timeout: float | None) -> Result:
+        """Wait for a notification; raises OSError when the creator has removed the memory."""
+        return operate(self.condition.id, 0, timeout)
+
+    def wake(self) -> None:
+        try:
+            self.condition.value = 0
+            self.condition.value = 1
+        except sysv_ipc.Error as error:
+            raise OSError(str(error)) from None
+
+    def readers_waiting(self) -> int:
+        try:
+            return int(self.condition.waiting_for_zero)
+        except sysv_ipc.Error as error:
+            raise OSError(str(error)) from None
+
     def close(self) -> None:
         """Forget the token file; the segment itself lives as long as its view."""
         os.close(self.token)
 
     def remove(self) -> None:
-        """Take everything away, the token file where it is still the same one."""
+        """Wake all that wait and take everything away, the token file where it is still the same one."""
+        with suppress(OSError):
+            self.wake()
         for part in (self.condition, self.mutex, self.memory):
             with suppress(sysv_ipc.Error):
                 part.remove()
@@ -113,6 +149,17 @@ def _clear(path: Path, status: os.stat_result, existed: bool) -> bool:
         with suppress(sysv_ipc.ExistentialError):
             sysv_ipc.Semaphore(tokenfile.key(status, project)).remove()
     return True
+
+
+def _refuse_twin(path: Path) -> None:
+    """Two token files with the same keys name one memory, and nobody can tell whose it is."""
+    with suppress(FileNotFoundError):
+        twin = tokenfile.twin(path)
+        if twin is not None and twin.stat().st_size == 0:
+            raise SharedMemoryError(
+                f"shared memory `{path.name}` cannot be told from `{twin.name}`: the keys of {path} and {twin} collide "
+                f"(ftok); remove the one that is not used, or start its creator anew"
+            )
 
 
 def _alive(pid: int) -> bool:

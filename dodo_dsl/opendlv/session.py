@@ -21,7 +21,10 @@ CIDS = range(1, 255)
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
 _SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
+_SO_RXQ_OVFL = 40
 _TIMESPEC = struct.Struct("@qq")
+_COUNT = struct.Struct("@I")
+_ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
 
 
 class SessionError(OSError):
@@ -32,7 +35,8 @@ class Session:
     """One member of the group 225.0.0.<cid>; a context manager.
 
     Datagrams of the session itself are dropped, as libcluon does. Bytes of others that are no frame are
-    counted in `garbage`. Raises SessionError for a cid outside 1 to 254 and where there is no route for multicast.
+    counted in `garbage`, and in `lost` the datagrams for which the receive buffer had no room. Raises SessionError
+    for a cid outside 1 to 254 and where there is no route for multicast.
     """
 
     def __init__(self, cid: int, messages: MessageSet | None = None) -> None:
@@ -41,6 +45,7 @@ class Session:
         self.cid = cid
         self.messages = messages or MessageSet.standard()
         self.garbage = 0
+        self.lost = 0
         group = (f"225.0.0.{cid}", PORT)
         try:
             self._receiver = _receiver(group)
@@ -115,7 +120,9 @@ class Session:
         self.close()
 
     def _next(self) -> Envelope | None:
-        size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], 64)
+        size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES)
+        if len(ancillary) > 1:
+            self.lost = _lost(ancillary)
         if address == self._own_address:
             return None
         try:
@@ -140,6 +147,11 @@ def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
     return time.time_ns() // 1000
 
 
+def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
+    """How many datagrams the kernel dropped so far; it says so once there are any."""
+    return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
+
+
 def _sender(group: tuple[str, int], receiver: socket.socket) -> socket.socket:
     """Connected, so that the address its datagrams carry is known; time to live 1, loop on."""
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -160,6 +172,7 @@ def _receiver(group: tuple[str, int]) -> socket.socket:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         receiver.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        receiver.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
         receiver.bind(group)
         membership = socket.inet_aton(group[0]) + socket.inet_aton("0.0.0.0")  # noqa: S104
         receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)

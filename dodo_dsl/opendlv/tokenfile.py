@@ -70,11 +70,16 @@ def move_to_other_inode(path: Path) -> None:
 
 def collides(path: Path) -> bool:
     """Whether another file of the folder has the keys of this one."""
+    return twin(path) is not None
+
+
+def twin(path: Path) -> Path | None:
+    """Another file of the folder that has the keys of this one."""
     own = path.stat()
     with os.scandir(path.parent) as entries:
         # the inode of the listing is compared first: it costs no call
         near = [entry for entry in entries if (entry.inode() ^ own.st_ino) & 0xFFFF == 0]
-        return any(_same_key(entry, own) for entry in near if entry.name != path.name)
+        return next((Path(e.path) for e in near if e.name != path.name and _same_key(e, own)), None)
 
 
 def _same_key(entry: "os.DirEntry[str]", own: os.stat_result) -> bool:

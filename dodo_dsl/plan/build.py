@@ -162,7 +162,8 @@ class _Builder:
 
     def _recorder(self) -> list[Service]:
         manifest = self.manifests["rec-recorder"]
-        frames = (Flag("frames", f"{self.spec.frames_hz:g}"),) if self.spec.frames_hz else ()
+        can = "frames" in manifest.parameters
+        frames = (Flag("frames", f"{self.spec.frames_hz:g}"),) if self.spec.frames_hz and can else ()
         flags = (Flag("rec", RECORDING, "report"), *frames, Flag("cid", str(self.cid)))
         image = self._image(manifest.image)
         return [Service("environment", RECORDER, manifest.name, image, manifest.process, flags)]

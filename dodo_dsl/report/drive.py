@@ -9,7 +9,6 @@ from typing import Any
 
 from dodo_dsl.opendlv.codec import MessageError
 from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.plan.model import Plan
 
 _FRAME = "opendlv.sim.Frame"
@@ -48,6 +47,8 @@ def read_drive(plan: Plan, folder: Path, recording: Path) -> Drive | None:
 
 
 def _path(recording: Path) -> Iterator[tuple[float, float, float, float]]:
+    from dodo_dsl.opendlv.recording import read_envelopes  # numpy takes longer to start than the compiler
+
     messages = MessageSet.standard()
     wanted, begin = messages.id(_FRAME), messages.id("dodo.TestBegin")
     start: int | None = None

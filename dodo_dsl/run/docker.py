@@ -83,6 +83,8 @@ class DockerBackend:
     ) -> tuple[int, str, str]:
         """Exit code, standard output and the last line of standard error of a compose command."""
         environment = {**os.environ, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
+        for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
+            environment.pop(name, None)  # the test's own .env decides
         if subnet:
             environment["DODO_SUBNET"] = subnet
         process = await asyncio.create_subprocess_exec(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dodo_dsl import __version__, data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, plain, read
+from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.schema import validate
@@ -99,17 +99,19 @@ def _texts(entry: Entry | None) -> Iterator[Scalar]:
 def _folders(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
     folders = []
     for item in _texts(entry):
-        folder = data.registry() if item.text == SHIPPED else (root / item.text).resolve()
-        if not folder.is_dir():
+        folder = data.registry() if item.text == SHIPPED else path_of(root, item.text)
+        if folder is None or not folder.is_dir():
             problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'", _FROM_HERE))
-        folders.append(folder)
+        else:
+            folders.append(folder)
     return tuple(folders)
 
 
 def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
     files = []
     for item in _texts(entry):
-        if (root / item.text).is_file():
+        path = path_of(root, item.text)
+        if path is not None and path.is_file():
             files.append(root / item.text)
         else:
             problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'", _FROM_HERE))

@@ -4,7 +4,7 @@ import functools
 from pathlib import Path
 
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, shown_path
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, read
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, path_of, read
 
 KEY = "extends"
 MAX_CHAIN = 8
@@ -31,7 +31,9 @@ def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, lis
     written = node.get(KEY) if isinstance(node, Mapping) else None
     if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not is_text(node):
         return node, []  # the schema says so
-    path = (chain[-1].parent / written.text).resolve()
+    path = path_of(chain[-1].parent, written.text)
+    if path is None:
+        return node, [Diagnostic(written.span, "extends-file", f"'{written.text[:60]}' is no path")]
     problem = _problem(written, path, chain, root)
     if problem:
         return node, [problem]

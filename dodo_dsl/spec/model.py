@@ -1,5 +1,7 @@
 """A spec as it was written: fields that are missing or of a wrong type are None and stand in the diagnostics."""
 
+import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +15,8 @@ from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.schema import validate
 
 LAYERS = ("environment", "action", "evaluation")
+MAX_SERVICES = 100
+"""Of a layer, as the schema has it."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +137,11 @@ def _timeout(node: Node | None) -> tuple[float | None, list[Diagnostic]]:
     return seconds, []
 
 
+def _seed(node: Node | None) -> int:
+    value = node.value if isinstance(node, Scalar) else None
+    return int(value) if isinstance(value, int | float) and math.isfinite(value) else 0
+
+
 def _frames(node: Node | None) -> float:
     return (_number(node.get("frames"), "Hz") if isinstance(node, Mapping) else None) or 0.0
 
@@ -142,7 +151,6 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         value = node.get(key)
         return value.value if isinstance(value, Scalar) and isinstance(value.value, str) else default
 
-    seed = node.get("seed")
     uses = tuple(_uses(node))
     timeout, found = _timeout(node.get("timeout"))
     spec = Spec(
@@ -155,7 +163,7 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         clock=text("clock", "realtime"),
         rig=text("rig"),
         isolation=text("isolation"),
-        seed=int(seed.value) if isinstance(seed, Scalar) and isinstance(seed.value, int | float) else 0,
+        seed=_seed(node.get("seed")),
         frames_hz=_frames(node.get("record")),
         uses=uses,
         choice=choice,
@@ -176,7 +184,7 @@ def _uses(node: Mapping) -> Iterator[Use]:
         services = node.get(layer)
         if not isinstance(services, Mapping):
             continue
-        for name, entry in services.entries.items():
+        for name, entry in itertools.islice(services.entries.items(), MAX_SERVICES):
             if not isinstance(entry.value, Mapping):
                 continue
             uses, parameters = entry.value.get("uses"), entry.value.get("with")

@@ -32,6 +32,7 @@ _DIMENSION = {unit: dimension for dimension, units in _FACTORS.items() for unit 
 _NUMBER = r"[-+]?(?:\d{1,40}(?:\.\d{0,40})?|\.\d{1,40})(?:[eE][-+]?\d{1,3})?"
 _QUANTITY = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>[A-Za-z%/°µ][A-Za-z0-9/%°µ^²]*)?\s*", re.ASCII)
 _DIGITS = 15
+_MAX_TEXT = 100
 
 UNITS = tuple(_DIMENSION)
 
@@ -60,6 +61,8 @@ def convert(value: object, unit: str) -> Decimal:
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise QuantityError(f"expected a quantity in {unit}", _example("1", unit))
     text = str(value)
+    if len(text) > _MAX_TEXT:
+        raise QuantityError(f"'{text[:20]}...' is not a quantity in {unit}", _example("1", unit))
     match = _QUANTITY.fullmatch(text)
     if unit == SHARE and (not match or _DIMENSION.get(match["unit"] or SHARE) != "share"):
         raise QuantityError(f"'{text}' is no share", "write for example 0.5 or 50 %")

@@ -1,6 +1,7 @@
 """JSON Schema errors as diagnostics at the line and column of the value they mean."""
 
 import functools
+import itertools
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -8,7 +9,7 @@ from typing import Any
 
 from dodo_dsl import data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
-from dodo_dsl.source import Mapping, Node, Scalar, Sequence, plain
+from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
 
 _UNIT = "x-unit"
@@ -44,7 +45,7 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
     """All violations of ``schemas/<schema>.schema.json``; tags are refused as well."""
     found = list(_tags(node))
     validator = _validator(schema)
-    for error in validator.iter_errors(plain(node)):
+    for error in itertools.islice(validator.iter_errors(plain(node)), MAX_PROBLEMS):
         place = _locate(node, error.absolute_path)
         if not error.absolute_path:
             place.about = validator.schema.get("properties", {})
@@ -96,9 +97,9 @@ def _shown(value: object) -> str:
 
 def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
     known = error.schema.get("properties", {})
-    for name in error.instance:
-        if name not in known:
-            yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
+    unknown = (name for name in error.instance if name not in known)
+    for name in itertools.islice(unknown, MAX_PROBLEMS):
+        yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
 
 
 def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -162,13 +163,18 @@ def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
     low, high = error.schema.get("minimum"), error.schema.get("maximum")
-    message = f"{place.name} is {error.instance}, expected {low} to {high}"
+    message = f"{place.name} is {_shown(error.instance)[1:-1]}, expected {low} to {high}"
     yield Diagnostic(place.span, "out-of-range", message)
 
 
 def _too_few(error: Any, place: _Place) -> Iterator[Diagnostic]:
     expected = "a text" if isinstance(error.instance, str) else "at least one entry"
     yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected {expected}")
+
+
+def _too_many(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    message = f"{place.name} has {len(error.instance)} entries, expected at most {error.validator_value}"
+    yield Diagnostic(place.span, "too-large", message)
 
 
 def _fallback(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -186,6 +192,8 @@ _TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
     "maxLength": _pattern,
     "minimum": _bounds,
     "maximum": _bounds,
+    "maxProperties": _too_many,
+    "maxItems": _too_many,
     "minProperties": _too_few,
     "minItems": _too_few,
     "minLength": _too_few,

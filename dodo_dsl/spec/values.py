@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
-from dodo_dsl.source import Node, Scalar, Sequence
+from dodo_dsl.source import Node, Scalar, Sequence, path_of
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Parameter
 
@@ -190,19 +190,20 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
     if not scalar.text or Path(scalar.text).is_absolute():
         message = f"{_name(parameter)} is '{scalar.text}', expected a path relative to the spec"
         raise ValueProblem(scalar.span, "path-escape", message)
-    try:
-        target = (folder / scalar.text).resolve()
-        exists = target.exists()
-    except (OSError, RuntimeError) as error:
-        message = f"{_name(parameter)}: '{scalar.text[:60]}' is no path ({getattr(error, 'strerror', error)})"
-        raise ValueProblem(scalar.span, "missing-file", message) from error
+    target = path_of(folder, scalar.text)
+    if target is None:
+        message = f"{_name(parameter)}: '{scalar.text[:60]}' is no path: too long, or its links go in a circle"
+        raise ValueProblem(scalar.span, "missing-file", message)
     if not target.is_relative_to(root.resolve()):
         message = f"{_name(parameter)}: '{scalar.text}' leaves the registry"
         raise ValueProblem(scalar.span, "path-escape", message, "files of a test lie in its registry")
-    if not exists:
+    if not target.exists():
         beside = [p.name for p in target.parent.iterdir()] if target.parent.is_dir() else []
         message = f"{_name(parameter)}: there is no file or folder '{scalar.text}'"
         raise ValueProblem(scalar.span, "missing-file", message, did_you_mean(target.name, beside))
+    if not target.is_file() and not target.is_dir():
+        message = f"{_name(parameter)}: '{scalar.text}' is a pipe or a device, expected a file or a folder"
+        raise ValueProblem(scalar.span, "unreadable-file", message)
     return Value(scalar.text, "path", target)
 
 

@@ -53,6 +53,8 @@ class Loop:
         if service.finished and service.verdict is None:
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close()
+        if self.session.lost:
+            _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
         if self.session.garbage:
             _log.debug("%d datagrams held no message", self.session.garbage)
 
@@ -82,6 +84,10 @@ class Loop:
                     return
                 handler(message, envelope.sample_time)
 
-    def _send(self, output: Message | Output, now: int) -> None:
+    def _send(self, output: Message | Output | Envelope, now: int) -> None:
+        if isinstance(output, Envelope):
+            self.session.send_envelope(output)
+            self.clock.sent(output)
+            return
         message, stamp = output if isinstance(output, Output) else (output, self.sender_stamp)
         self.clock.sent(self.session.send(message, now, stamp))

@@ -49,8 +49,8 @@ class Service:
     def begin(self, now: int) -> None:
         """All services are ready: the test begins."""
 
-    def update(self, now: int) -> Iterable[Message | Output]:
-        """What there is to say at ``now``; it is sent with ``now`` as its sample time."""
+    def update(self, now: int) -> Iterable[Message | Output | Envelope]:
+        """What there is to say at ``now``; it is sent with ``now`` as its sample time, an envelope as it is."""
         return ()
 
     def end_of_input(self, now: int) -> None:

@@ -2,7 +2,7 @@ import sys
 from pathlib import Path
 
 from services.base import run
-from services.base.later import build
+from services.beacon.service import build
 
 if __name__ == "__main__":
     sys.exit(run(Path(__file__).parent, build))

@@ -1,24 +1,15 @@
-"""The Kiwi car as a single track: steering and pedal in, velocities of the body out.
+"""A car as a single track: steering and pedal in, velocities of the body out.
 
-The equations and constants are those of the public Kiwi simulation: one wheel for each axle, linear tyres,
-first-order speed, explicit Euler. SI units; body frame x forward, y left, yaw rate positive to the left.
+The equations are those of the public Kiwi simulation: one wheel for each axle, linear tyres, first-order speed,
+explicit Euler. SI units; body frame x forward, y left, yaw rate positive to the left.
 """
 
 import math
 from dataclasses import dataclass
 
-MICROSECONDS = 1_000_000
+from services.dynamic_model.car import KIWI, Car
 
-MASS = 1.113  # kg
-INERTIA = 0.01  # kg m2, about the vertical axis
-FRONT, REAR = 0.12, 0.104  # m, centre of mass to each axle
-CORNERING_FRONT, CORNERING_REAR = 15.0, 15.0  # N/rad
-RESISTANCE = 4.0  # N s/m
-GAIN_FORWARD, GAIN_REVERSE = 26.0, 5.0  # N per unit of pedal
-STEERING_GAIN = 0.6 / 0.290888  # angle of the wheel per requested angle
-STEERING_LIMIT = 0.6  # rad, at the wheel
-PEDAL_REVERSE, PEDAL_FORWARD = -0.9, 0.14
-SLIP_SPEED = 0.1  # m/s; the tyres carry sideways only above this speed
+MICROSECONDS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -30,39 +21,40 @@ class Motion:
     yaw_rate: float = 0.0
 
 
-def wheel_angle(request: float) -> float:
-    """Angle of the front wheel in rad for a ground steering request in rad: scaled, then limited to 0.6."""
-    return max(-STEERING_LIMIT, min(STEERING_LIMIT, STEERING_GAIN * request))
+def wheel_angle(request: float, car: Car = KIWI) -> float:
+    """Angle of the front wheel in rad for a ground steering request in rad: scaled, then limited."""
+    return max(-car.steering_limit, min(car.steering_limit, car.steering_gain * request))
 
 
-def pedal_position(request: float) -> float:
-    """The pedal that the car accepts: limited to -0.9 (reverse) to 0.14 (forward), without unit."""
-    return max(PEDAL_REVERSE, min(PEDAL_FORWARD, request))
+def pedal_position(request: float, car: Car = KIWI) -> float:
+    """The pedal that the car accepts, without unit; negative is reverse."""
+    return max(car.pedal_reverse, min(car.pedal_forward, request))
 
 
-def step(motion: Motion, wheel: float, pedal: float, dt: float) -> Motion:
+def step(motion: Motion, wheel: float, pedal: float, dt: float, car: Car = KIWI) -> Motion:
     """One explicit Euler step of `dt` seconds with the wheel (rad) and the pedal held."""
     vx, vy, r = motion.vx, motion.vy, motion.yaw_rate
-    gain = GAIN_FORWARD if pedal > 0 else GAIN_REVERSE
-    next_vx = vx + dt * (gain * pedal - RESISTANCE * vx) / MASS
+    gain = car.gain_forward if pedal > 0 else car.gain_reverse
+    next_vx = vx + dt * (gain * pedal - car.resistance * vx) / car.mass
     speed = abs(vx)
-    if speed <= SLIP_SPEED:
+    if speed <= car.slip_speed:
         return Motion(next_vx, 0.0, 0.0)
-    force_front = CORNERING_FRONT * (wheel - (vy + FRONT * r) / speed)
-    force_rear = CORNERING_REAR * (REAR * r - vy) / speed
-    next_vy = vy + dt * ((force_front + force_rear) / MASS - vx * r)
-    next_r = r + dt * (FRONT * force_front - REAR * force_rear) / INERTIA
+    force_front = car.cornering_front * (wheel - (vy + car.front * r) / speed)
+    force_rear = car.cornering_rear * (car.rear * r - vy) / speed
+    next_vy = vy + dt * ((force_front + force_rear) / car.mass - vx * r)
+    next_r = r + dt * (car.front * force_front - car.rear * force_rear) / car.inertia
     return Motion(next_vx, next_vy, next_r)
 
 
 class Vehicle:
     """The car through test time: it holds its last requests and advances only in `update`."""
 
-    def __init__(self, freq: float) -> None:
-        """`freq` in Hz: the equations are never stepped by more than its period."""
+    def __init__(self, freq: float, car: Car = KIWI, steps: int = 1) -> None:
+        """`freq` in Hz: the equations are stepped `steps` times or more in each of its periods."""
         self.motion = Motion()
         self.rejected = 0
-        self._longest = math.ceil(MICROSECONDS / freq)
+        self.car = car
+        self._longest = math.ceil(MICROSECONDS / (freq * steps))
         self._wheel = 0.0
         self._pedal = 0.0
         self._now: int | None = None
@@ -71,15 +63,20 @@ class Vehicle:
         """Take a ground steering request in rad; False, and nothing changes, when it is not finite."""
         if not self._accepts(request):
             return False
-        self._wheel = wheel_angle(request)
+        self._wheel = wheel_angle(request, self.car)
         return True
 
     def press(self, request: float) -> bool:
         """Take a pedal position request; False, and nothing changes, when it is not finite."""
         if not self._accepts(request):
             return False
-        self._pedal = pedal_position(request)
+        self._pedal = pedal_position(request, self.car)
         return True
+
+    def reset(self) -> None:
+        """Stand still, with the wheel straight and the pedal let go."""
+        self.motion = Motion()
+        self._wheel = self._pedal = 0.0
 
     def update(self, now: int) -> Motion:
         """Advance to `now` (microseconds) with the requests held; the first call only takes the time.
@@ -93,9 +90,9 @@ class Vehicle:
         steps = -(-elapsed // self._longest)
         for index in range(steps):
             dt = elapsed * (index + 1) // steps - elapsed * index // steps
-            self.motion = step(self.motion, self._wheel, self._pedal, dt / MICROSECONDS)
+            self.motion = step(self.motion, self._wheel, self._pedal, dt / MICROSECONDS, self.car)
         if not math.isfinite(self.motion.vx + self.motion.vy + self.motion.yaw_rate):
-            raise ArithmeticError("the single-track model ran out of bounds: choose a higher freq")
+            raise ArithmeticError("the single-track model ran out of bounds: choose a higher freq or more steps")
         return self.motion
 
     def _accepts(self, request: float) -> bool:

@@ -1,9 +1,13 @@
 """The single-track model on the bus."""
 
+from pathlib import Path
 from typing import Any
 
 from services.base import Context, Output, Service, period_of
+from services.dynamic_model.car import KIWI, read_car
 from services.dynamic_model.model import Vehicle
+
+RESET = "reset"
 
 
 class DynamicModel(Service):
@@ -11,14 +15,19 @@ class DynamicModel(Service):
 
     def __init__(self, context: Context) -> None:
         self._log = context.log
-        self.period = period_of(context.flags["freq"])
-        self.vehicle = Vehicle(context.flags["freq"])
+        flags = context.flags
+        self.period = period_of(flags["freq"])
+        car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
+        self.vehicle = Vehicle(flags["freq"], car, flags["steps"])
+        stable = car.stable_above(flags["freq"] * flags["steps"])
+        self._log.debug("the steps are stable above %.3f m/s; sideways the car moves above %g", stable, car.slip_speed)
         self.inputs = {
             ("opendlv.proxy.GroundSteeringRequest", None): self._steer,
             ("opendlv.proxy.PedalPositionRequest", None): self._press,
+            ("opendlv.sim.Command", None): self._command,
         }
         self._state = context.messages.type("opendlv.sim.KinematicState")
-        self._frame_id = context.flags["frame-id"]
+        self._frame_id = flags["frame-id"]
 
     def update(self, now: int) -> tuple[Output]:
         motion = self.vehicle.update(now)
@@ -31,6 +40,10 @@ class DynamicModel(Service):
     def _press(self, message: Any, _sample_time: int) -> None:
         if not self.vehicle.press(message.position):
             self._ignored("PedalPositionRequest", message.position)
+
+    def _command(self, message: Any, _sample_time: int) -> None:
+        if message.command == RESET:
+            self.vehicle.reset()
 
     def _ignored(self, name: str, value: float) -> None:
         if self.vehicle.rejected == 1:

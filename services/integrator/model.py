@@ -40,7 +40,7 @@ class Integrator:
     """
 
     def __init__(self, start: Pose) -> None:
-        self.pose = start
+        self.pose = self._start = start
         self._twist = Twist()
         self._coming: list[tuple[int, Twist]] = []
         self._now: int | None = None
@@ -48,6 +48,10 @@ class Integrator:
     def feed(self, twist: Twist, sample_time: int) -> None:
         """Take the body's twist at `sample_time` (microseconds)."""
         self._coming.append((sample_time, twist))
+
+    def reset(self) -> None:
+        """Stand at the start until the next twist."""
+        self.pose, self._twist, self._coming = self._start, Twist(), []
 
     def update(self, now: int) -> Pose:
         """The pose at `now` (microseconds); the first call only takes the time.

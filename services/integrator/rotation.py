@@ -6,6 +6,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 SERIES = 0.05  # rad; below it the series is more exact than the quotient
+UPRIGHT = 1 - 1e-12  # sine of a pitch at which roll and yaw cannot be told apart
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
@@ -19,6 +20,20 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
         cr * cp * sy - sr * sp * cy,
         cr * cp * cy + sr * sp * sy,
     )
+
+
+def angles(q: Quaternion) -> Vector:
+    """Roll, pitch and yaw in rad of an attitude, as `quaternion` takes them; pitch is within +-pi/2.
+
+    Where the body looks straight up or down, roll and yaw are one turn: all of it counts as yaw.
+    """
+    x, y, z, w = q
+    sine = max(-1.0, min(1.0, 2 * (w * y - z * x)))
+    if abs(sine) > UPRIGHT:
+        return 0.0, math.copysign(math.pi / 2, sine), math.remainder(2 * math.atan2(z, w), math.tau)
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return roll, math.asin(sine), yaw
 
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:

@@ -1,30 +1,51 @@
 """The integrator on the bus."""
 
 import math
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.messages import MessageSet
 from services.base import Context, Flags, Output, Service, period_of
 from services.integrator.model import Integrator, Pose, Twist
-from services.integrator.rotation import quaternion
+from services.integrator.rotation import angles, quaternion
+
+FRAME, RESET = "opendlv.sim.Frame", "reset"
+OLD_FRAME = Path(__file__).with_name("frame-0.9.odvd")
 
 
 class Integration(Service):
     """Takes kinematic states and says where the body is, both under the sender stamp ``frame-id``."""
 
     def __init__(self, context: Context) -> None:
+        flags = context.flags
         self._log = context.log
-        self.period = period_of(context.flags["freq"])
-        self.body = Integrator(start(context.flags))
+        self.period = period_of(flags["freq"])
+        self.body = Integrator(start(flags))
         self.rejected = 0
-        self._frame = context.messages.type("opendlv.sim.Frame")
-        self._frame_id = context.flags["frame-id"]
-        self.inputs = {("opendlv.sim.KinematicState", self._frame_id): self._feed}
+        self._frame = context.messages.type(FRAME)
+        self._old = MessageSet(odvd.load(OLD_FRAME)) if flags["euler"] else None
+        self._stamps = [stamp for stamp in (flags["frame-id"], flags["copy-id"]) if stamp is not None]
+        self.inputs = {
+            ("opendlv.sim.KinematicState", flags["frame-id"]): self._feed,
+            ("opendlv.sim.Command", None): self._command,
+        }
 
-    def update(self, now: int) -> tuple[Output]:
+    def update(self, now: int) -> Iterator[Output | Envelope]:
         pose = self.body.update(now)
         x, y, z = pose.position
         qx, qy, qz, qw = pose.attitude
-        return (Output(self._frame(x=x, y=y, z=z, qx=qx, qy=qy, qz=qz, qw=qw), self._frame_id),)
+        frame = self._frame(x=x, y=y, z=z, qx=qx, qy=qy, qz=qz, qw=qw)
+        for stamp in self._stamps:
+            yield Output(frame, stamp)
+            if self._old is not None:
+                yield Envelope(self._old.id(FRAME), _old_payload(self._old, pose), now, 0, now, stamp)
+
+    def _command(self, message: Any, _sample_time: int) -> None:
+        if message.command == RESET:
+            self.body.reset()
 
     def _feed(self, state: Any, sample_time: int) -> None:
         twist = Twist((state.vx, state.vy, state.vz), (state.rollRate, state.pitchRate, state.yawRate))
@@ -34,6 +55,11 @@ class Integration(Service):
         self.rejected += 1
         if self.rejected == 1:
             self._log.warning("a KinematicState of %s is ignored, as all that are not finite will be", twist)
+
+
+def _old_payload(messages: MessageSet, pose: Pose) -> bytes:
+    (x, y, z), (roll, pitch, yaw) = pose.position, angles(pose.attitude)
+    return messages.encode(messages.type(FRAME)(x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw))
 
 
 def start(flags: Flags) -> Pose:

@@ -1,42 +1,76 @@
-"""A recording as it is written: frames one after the other."""
+"""A recording as it is written: frames one after the other, up to a size, while recording is on."""
 
+import logging
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.envelope import Envelope, FrameError, encode_frame
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
+
+RECORD, STOP = 1, 2
+
+_log = logging.getLogger(__name__)
 
 
 class RecordingError(ValueError):
-    """A file that cannot become a recording."""
+    """A file that cannot become a recording, or that takes no more."""
 
 
 class Recording:
-    """A new `.rec` file; a context manager.
+    """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and says so.
 
     Nothing is held back in the process: whatever ends it, the file holds all frames written so far.
     Raises RecordingError for a file that is there, and where none can be made.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.frames = 0
+    def __init__(self, path: Path, max_size: int | None = None) -> None:
+        self.is_on = True
+        self.left_out = 0
+        self._max_size = max_size
         try:
-            self._file = path.open("xb", buffering=0)
+            self._writer = RecordingWriter(path)
         except FileExistsError:
             raise RecordingError(f"{path} is there already and is not overwritten") from None
         except OSError as error:
             raise RecordingError(f"{path} cannot be written: {error.strerror}") from None
 
+    @property
+    def frames(self) -> int:
+        """How many frames were written."""
+        return self._writer.frames
+
+    def command(self, command: int) -> None:
+        """RecorderCommand: 1 records from the next message on, 2 stops; anything else is no command."""
+        if command not in (RECORD, STOP):
+            _log.warning("%d is no command for a recorder, expected 1 to record or 2 to stop", command)
+            return
+        self.is_on = command == RECORD
+        _log.info("recording %s, %d messages are recorded", "goes on" if self.is_on else "stops", self.frames)
+
     def write(self, envelope: Envelope) -> None:
-        """Append an envelope as it was received; raises OSError when the disk takes no more."""
-        left = memoryview(encode_frame(envelope))
-        while left:
-            left = left[self._file.write(left) :]
-        self.frames += 1
+        """Append an envelope as it was received; raises RecordingError when the disk takes no more."""
+        if not self.is_on:
+            return
+        try:
+            frame = encode_frame(envelope)
+        except FrameError as error:  # larger than a frame can be
+            self._leave_out(str(error))
+            return
+        if self._max_size is not None and self._writer.size + len(frame) > self._max_size:
+            self._leave_out(f"the recording has its largest size, {self._max_size} bytes")
+            return
+        try:
+            self._writer.write_frames((frame,))
+        except OSError as error:
+            place = f"{self._writer.path} ends after {self.frames} messages"
+            raise RecordingError(f"{place}: {error.strerror}") from None
 
     def close(self) -> None:
         """End the recording."""
-        self._file.close()
+        if self.left_out:
+            _log.warning("%d messages were not recorded", self.left_out)
+        self._writer.close()
 
     def __enter__(self) -> Self:
         return self
@@ -45,3 +79,8 @@ class Recording:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _leave_out(self, reason: str) -> None:
+        if not self.left_out:
+            _log.warning("a message is not recorded: %s", reason)
+        self.left_out += 1

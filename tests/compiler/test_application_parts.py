@@ -206,3 +206,39 @@ def test_what_is_read_can_be_rewritten(services: dict[str, Any], isolation: str,
     node, wrong = source.parse(texts["t/application.compose.yml"], "copy")
     assert node is not None and not wrong
     assert repr(source.plain(node)) == repr(application.compose)
+
+
+HUGE = {
+    "a text": {"a": {"image": "x", "command": "--cid={" * 100_000}},
+    "many services": {f"s{n}": {"image": "x", "depends_on": [f"s{n + 1}"]} for n in range(3_000)},
+    "a chain": {f"s{n}": {"image": "x", "extends": f"s{n + 1}", "environment": [f"A{n}=1"]} for n in range(2_000)},
+    "many copies": {
+        "s": {"image": "x", "environment": [f"A{n}=1" for n in range(5_000)]},
+        **{f"s{n}": {"image": "x", "extends": "s"} for n in range(2_000)},
+    },
+}
+
+
+@pytest.mark.parametrize("services", HUGE.values(), ids=HUGE)
+def test_what_would_grow_without_end_is_refused(services: dict[str, Any], tmp_path: Path) -> None:
+    file = tmp_path / "docker-compose.yml"
+    file.write_text(json.dumps({"services": services}))
+    found, problems = read_application(file)
+    assert found is None
+    assert "too-large" in {p.rule for p in problems}
+
+
+def test_links_are_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("CID=1\nPASSWORD=hidden\nservices: {a: {image: secret}}\n")
+    folder = tmp_path / "team"
+    folder.mkdir()
+    for name in (".env", "common.yml"):
+        (folder / name).symlink_to(tmp_path / "secret")
+    file = folder / "docker-compose.yml"
+    file.write_text("services: {b: {image: x, command: --cid=1}}\n")
+    found, problems = read_application(file)
+    assert found is not None and problems == [] and found.variables == {}
+    file.write_text("services: {b: {extends: {file: common.yml, service: a}}}\n")
+    found, problems = read_application(file)
+    assert found is None
+    assert [p.message for p in problems] == ["'common.yml' is a symbolic link, expected a file beside this one"]

@@ -126,6 +126,17 @@ def test_compose_sees_one_project_with_all_services(generated: Path) -> None:
         assert any(f"--cid={plan.cid}" in word for word in service["command"]) or name == "sandbox"
 
 
+@pytest.mark.parametrize("name", ["docker-compose.yml", "compose.yaml"])
+def test_compose_sees_the_test_whatever_lies_above_it(generated: Path, name: str) -> None:
+    """Compose looks for a file in all folders above, and takes one before it reads the test's ``.env``."""
+    foreign = generated.parent / name
+    foreign.write_text("services: {stranger: {image: stranger, network_mode: host}}\n")
+    try:
+        test_compose_sees_one_project_with_all_services(generated)
+    finally:
+        foreign.unlink()
+
+
 def test_check_says_when_output_is_stale(generated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(generated.parent)
     assert run("compile", "--check")[0] == 0

@@ -67,3 +67,11 @@ def memory_name() -> Iterator[str]:
     name = f"dodo-test-{uuid.uuid4().hex}.argb"
     yield name
     assert not Path("/tmp", name).exists()
+    assert not Path("/dev/shm", name).exists()
+
+
+@pytest.fixture(params=["sysv", "posix"])
+def mode(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Each of libcluon's modes of shared memory, for this process and those that it starts afterwards."""
+    monkeypatch.setenv("CLUON_SHAREDMEMORY_POSIX", "1" if request.param == "posix" else "0")
+    return str(request.param)

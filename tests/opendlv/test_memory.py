@@ -30,7 +30,7 @@ def write(memory: SharedMemory, byte: int, time_us: int) -> None:
     memory.notify_all()
 
 
-def test_libcluon_reads_each_frame_once(peer: Peer, memory_name: str) -> None:
+def test_libcluon_reads_each_frame_once(mode: str, peer: Peer, memory_name: str) -> None:
     with SharedMemory.create(memory_name, SIZE) as memory:
         assert peer.ask("attach", name=memory_name) == {"valid": True}
         peer.order("wait", name=memory_name, frames=50)
@@ -41,7 +41,7 @@ def test_libcluon_reads_each_frame_once(peer: Peer, memory_name: str) -> None:
         peer.ask("close", name=memory_name)
 
 
-def test_frames_of_libcluon_are_read(peer: Peer, memory_name: str) -> None:
+def test_frames_of_libcluon_are_read(mode: str, peer: Peer, memory_name: str) -> None:
     assert peer.ask("create", name=memory_name, size=SIZE) == {"valid": True}
     with SharedMemory.attach(memory_name) as memory:
         assert memory.size == SIZE
@@ -55,8 +55,9 @@ def test_frames_of_libcluon_are_read(peer: Peer, memory_name: str) -> None:
             assert set(memory.buffer) == {9}
             assert memory.sample_time() == TIME
         peer.ask("close", name=memory_name)
-        with pytest.raises(SharedMemoryError, match="was removed by its creator"):
-            memory.wait(1.0)
+        if mode == "sysv":
+            with pytest.raises(SharedMemoryError, match="was removed by its creator"):
+                memory.wait(1.0)
 
 
 def test_two_names_of_one_memory(memory_name: str) -> None:
@@ -81,7 +82,7 @@ def _die_while_locked(name: str) -> None:
     os._exit(0)
 
 
-def test_a_dead_holder_of_the_lock_holds_it_no_more(memory_name: str) -> None:
+def test_a_dead_holder_of_the_lock_holds_it_no_more(mode: str, memory_name: str) -> None:
     with SharedMemory.create(memory_name, 1) as memory:
         process = multiprocessing.get_context("spawn").Process(target=_die_while_locked, args=(memory_name,))
         process.start()
@@ -92,7 +93,7 @@ def test_a_dead_holder_of_the_lock_holds_it_no_more(memory_name: str) -> None:
             assert memory.sample_time() == -1
 
 
-def test_a_lock_held_by_another_is_an_error_in_the_end(memory_name: str) -> None:
+def test_a_lock_held_by_another_is_an_error_in_the_end(mode: str, memory_name: str) -> None:
     with (
         SharedMemory.create(memory_name, 1) as memory,
         SharedMemory.attach(memory_name) as other,
@@ -103,7 +104,7 @@ def test_a_lock_held_by_another_is_an_error_in_the_end(memory_name: str) -> None
         pass
 
 
-def test_stamps_need_the_lock(memory_name: str) -> None:
+def test_stamps_need_the_lock(mode: str, memory_name: str) -> None:
     with SharedMemory.create(memory_name, 1) as memory:
         for use in (lambda: memory.stamp(1), memory.sample_time):
             with pytest.raises(SharedMemoryError, match="must be locked"):
@@ -115,7 +116,7 @@ def _create_and_die(name: str) -> None:
     os._exit(0)
 
 
-def test_what_a_dead_creator_left_is_replaced(memory_name: str) -> None:
+def test_what_a_dead_creator_left_is_replaced(mode: str, memory_name: str) -> None:
     process = multiprocessing.get_context("spawn").Process(target=_create_and_die, args=(memory_name,))
     process.start()
     process.join(20.0)
@@ -125,11 +126,9 @@ def test_what_a_dead_creator_left_is_replaced(memory_name: str) -> None:
         assert memory.size == 20 and set(memory.buffer) == {0}
 
 
-def test_memory_of_a_living_creator_is_not_taken(memory_name: str) -> None:
-    with (
-        SharedMemory.create(memory_name, 10),
-        pytest.raises(SharedMemoryError, match=f"process {os.getpid()} uses it"),
-    ):
+def test_memory_of_a_living_creator_is_not_taken(mode: str, memory_name: str) -> None:
+    text = f"process {os.getpid()} uses it" if mode == "sysv" else "a living process uses it"
+    with SharedMemory.create(memory_name, 10), pytest.raises(SharedMemoryError, match=text):
         SharedMemory.create(memory_name, 10)
 
 
@@ -148,7 +147,7 @@ def test_colliding_keys_are_avoided(memory_name: str) -> None:
         twin.unlink()
 
 
-def test_arrays_stay_valid_after_the_end(memory_name: str) -> None:
+def test_arrays_stay_valid_after_the_end(mode: str, memory_name: str) -> None:
     with SharedMemory.create(memory_name, 10) as memory:
         array = np.frombuffer(memory.buffer, np.uint8)
         array[:] = 3
@@ -172,8 +171,91 @@ def test_names_and_sizes_that_cannot_be(name: str, size: int) -> None:
         SharedMemory.create(name, size)
 
 
-def test_posix_mode_is_refused(memory_name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CLUON_SHAREDMEMORY_POSIX", "1")
-    for use in (SharedMemory.attach, lambda name: SharedMemory.create(name, 1)):
-        with pytest.raises(SharedMemoryError, match="only SysV shared memory is supported"):
-            use(memory_name)
+def test_a_reader_finds_the_mode_of_the_creator(mode: str, memory_name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with SharedMemory.create(memory_name, 12) as memory:
+        assert Path("/tmp", memory_name).exists() is (mode == "sysv")
+        assert Path("/dev/shm", memory_name).exists() is (mode == "posix")
+        monkeypatch.setenv("CLUON_SHAREDMEMORY_POSIX", "0" if mode == "posix" else "1")
+        with SharedMemory.attach(f"/{memory_name}") as reader:
+            memory.buffer[11] = 5
+            assert (reader.size, reader.buffer[11]) == (12, 5)
+
+
+def test_waiting_for_posix_memory_ends(memory_name: str) -> None:
+    with SharedMemory.create(memory_name, 1, posix=True) as memory, SharedMemory.attach(memory_name) as reader:
+        assert reader.wait(0.0) is False
+        assert reader.wait(0.02) is False
+        failures: list[str] = []
+
+        def wait() -> None:
+            try:
+                reader.wait(None)
+            except SharedMemoryError as error:
+                failures.append(str(error))
+
+        thread = threading.Thread(target=wait)
+        thread.start()
+        until_waiting(memory, 1)
+        memory.close()
+        thread.join(10.0)
+    assert failures == [f"shared memory `{memory_name}` was removed by its creator"]
+
+
+def test_waiting_takes_no_processor_time(mode: str, memory_name: str) -> None:
+    with SharedMemory.create(memory_name, 1) as memory:
+        before = time.process_time()
+        assert memory.wait(0.5) is False
+        assert time.process_time() - before < 0.1
+
+
+def test_two_tokens_of_one_memory_are_told(memory_name: str) -> None:
+    path, twin = Path("/tmp", memory_name), Path("/tmp", f"{memory_name}.twin")
+    with SharedMemory.create(memory_name, 10):
+        os.link(path, twin)
+        try:
+            with pytest.raises(SharedMemoryError, match=rf"cannot be told from `{twin.name}`: the keys .* collide"):
+                SharedMemory.attach(memory_name)
+        finally:
+            twin.unlink()
+
+
+@pytest.mark.parametrize("name", ["", "/", "a/b", "/tmp/a", "..", "x" * 254])
+def test_names_that_cannot_be_in_posix_mode(name: str) -> None:
+    with pytest.raises(SharedMemoryError):
+        SharedMemory.create(name, 1, posix=True)
+
+
+def test_an_object_that_libcluon_did_not_make(memory_name: str) -> None:
+    path = Path("/dev/shm", memory_name)
+    path.write_bytes(b"\xff" * 200)
+    try:
+        with pytest.raises(SharedMemoryError, match="has no content"):
+            SharedMemory.attach(memory_name)
+    finally:
+        path.unlink()
+
+
+def _wait_for_ever(name: str) -> None:
+    with SharedMemory.attach(name) as memory:
+        while True:
+            memory.wait(None)
+
+
+def test_a_killed_reader_blocks_nobody(mode: str, memory_name: str) -> None:
+    context = multiprocessing.get_context("spawn")
+    with SharedMemory.create(memory_name, 1) as memory:
+        failure = ""
+        for _ in range(3):
+            process = context.Process(target=_wait_for_ever, args=(memory_name,))
+            process.start()
+            before = memory.readers_waiting()
+            until_waiting(memory, before + 1)
+            process.kill()
+            process.join(20.0)
+            try:
+                memory.notify_all()
+            except SharedMemoryError as error:
+                failure = str(error)
+                break
+    told = f"shared memory `{memory_name}` can notify no more: a reader was killed while it waited"
+    assert failure == ("" if mode == "sysv" else told)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.source import Entry, Scalar, Sequence
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Use
@@ -45,7 +45,7 @@ def _among(context: Context, use: Use, manifest: Manifest, parameter: Parameter,
         yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", "see docs/maps.md")
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
-    for item in items:
+    for item in items[:MAX_PROBLEMS]:
         if isinstance(item, Scalar) and item.text not in names and "${matrix" not in item.text:
             message = f"there is no '{item.text}' among the {key} of {file.parent.name}/{file.name}"
             yield Diagnostic(item.span, "unknown-name", message, did_you_mean(item.text, names))
@@ -65,6 +65,8 @@ def _file(context: Context, use: Use, parameter: Parameter) -> Path | None:
 def _names(file: Path, key: str) -> tuple[str, ...] | str:
     """The names of the entries of a list in a JSON file, or what is wrong with the file."""
     try:
+        if file.exists() and not file.is_file():
+            return "this is no plain file"
         if file.stat().st_size > _MAX_BYTES:
             return f"larger than {_MAX_BYTES >> 20} MiB"
         document = json.loads(file.read_text(encoding="utf-8"))

@@ -10,7 +10,7 @@ from dodo_dsl.plan.application import merge, paths
 from dodo_dsl.plan.application.files import Files
 from dodo_dsl.source import Entry, Node, Scalar
 
-MAX_DEPTH = 16
+MAX_DEPTH = 8
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,13 @@ class Service:
 
 def extended(files: Files, service: Service, node: Node, chain: tuple[Service, ...] = ()) -> Node:
     """The service with what it extends below it."""
-    if not isinstance(node, source.Mapping) or "extends" not in node.entries:
+    if not isinstance(node, source.Mapping) or "extends" not in node.entries or files.full:
         return node
     own = source.Mapping(node.span, {k: e for k, e in node.entries.items() if k != "extends"}, node.tag)
     base = _base(files, node.entries["extends"], (*chain, service))
-    return own if base is None else merge.merged_service(base, own)
+    result = own if base is None else merge.merged_service(base, own)
+    files.grow(result, node.entries["extends"].key)
+    return result
 
 
 def _base(files: Files, entry: Entry, chain: tuple[Service, ...]) -> Node | None:

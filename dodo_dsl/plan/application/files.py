@@ -7,9 +7,11 @@ from pathlib import Path
 from dodo_dsl import source
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan.variables import dotenv
-from dodo_dsl.source import Scalar, read
+from dodo_dsl.source import Node, Scalar, read
 
 MAX_FILES = 64
+MAX_NODES = 50_000
+MAX_TEXT = 8_192
 _MAX_ENV = 1 << 20
 
 
@@ -20,6 +22,24 @@ class Files:
         self.problems: list[Diagnostic] = []
         self.variables: dict[str, str] = {}
         self._documents: dict[Path, source.Mapping | None] = {}
+        self._nodes = 0
+
+    @property
+    def full(self) -> bool:
+        """Whether there is too much already."""
+        return self._nodes > MAX_NODES
+
+    def grow(self, node: Node, span: Span) -> bool:
+        """Counts what is read and what ``extends`` makes of it; False with a problem when it is too much."""
+        for part in source.walk(node):
+            self._nodes += 1
+            long = isinstance(part, Scalar) and len(part.text) > MAX_TEXT
+            if self._nodes <= MAX_NODES and not long:
+                continue
+            what = f"a text of more than {MAX_TEXT} characters" if long else f"more than {MAX_NODES} values in all"
+            self.problems.append(Diagnostic(part.span if long else span, "too-large", what))
+            return False
+        return True
 
     def problem(self, span: Span, message: str, hint: str = "") -> None:
         self.problems.append(Diagnostic(span, "application-file", message, hint))
@@ -33,7 +53,8 @@ class Files:
                 message = "the file holds no mapping, expected a compose file with services"
                 found = [*found, Diagnostic(node.span, "wrong-type", message)]
             self.problems.extend(found)
-            self._documents[file] = node if isinstance(node, source.Mapping) else None
+            fits = isinstance(node, source.Mapping) and self.grow(node, Span(str(file)))
+            self._documents[file] = node if isinstance(node, source.Mapping) and fits else None
         return self._documents[file]
 
     def other(self, word: Scalar, folder: Path) -> Path | None:

@@ -4,6 +4,7 @@
 not there without a rig, so it is left out. ``application-cid``: no service can be told which bus to use.
 """
 
+import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +32,7 @@ class Written:
     containers: dict[str, str]
     volumes: Mapping[str, Any]
 
-    @property
+    @functools.cached_property
     def plain(self) -> dict[str, Any]:
         value: dict[str, Any] = plain(self.node)
         return value

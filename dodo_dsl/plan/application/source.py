@@ -17,6 +17,7 @@ from dodo_dsl.plan.application.problems import Written, problems, unknown_keys
 from dodo_dsl.plan.variables import names
 from dodo_dsl.spec.schema import validate
 
+MAX_SERVICES = 256
 _OURS = ("services", "version", "name", "networks", "include")
 
 
@@ -26,11 +27,13 @@ def read_application(path: Path | Sequence[Path]) -> tuple[ApplicationSource | N
     files = Files()
     document = load(files, paths)
     found = files.problems
-    if document is not None and not has_errors(found):
-        found = [*found, *validate(document, "application")]
     services = document.get("services") if document else None
     if isinstance(services, source.Mapping):
-        found = [*found, *itertools.chain.from_iterable(unknown_keys(e.value) for e in services.entries.values())]
+        found.extend(itertools.chain.from_iterable(unknown_keys(e.value) for e in services.entries.values()))
+        if len(services.entries) > MAX_SERVICES:
+            found.append(Diagnostic(services.span, "too-large", f"more than {MAX_SERVICES} services"))
+    if document is not None and not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
+        found.extend(validate(document, "application"))
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
     application = _application(paths[0].resolve(), document, services, files.variables)
@@ -115,15 +118,31 @@ def _circles(application: ApplicationSource) -> Iterator[Diagnostic]:
         name: {other for _, other in references(plain(node), containers) if other in application.services}
         for name, node in application.services.items()
     }
-    settled: set[str] = set()
-    while ready := {name for name, others in needs.items() if name not in settled and others <= settled}:
-        settled |= ready
-    waiting = [name for name in needs if name not in settled]
-    while other := [n for n in waiting if not any(n in needs[w] for w in waiting)]:
-        waiting = [n for n in waiting if n not in other]
-    if waiting:
-        message = f"services wait for one another: {', '.join(waiting)}"
-        yield Diagnostic(application.spans[waiting[0]], "application-file", message, "one of them must start first")
+    waiting = set(_never_ready(needs))
+    wanted_by: dict[str, set[str]] = {name: set() for name in needs}
+    for name in waiting:
+        for other in needs[name]:
+            wanted_by[other].add(name)
+    circle = [name for name in _never_ready(wanted_by) if name in waiting]
+    if circle:
+        message = f"services wait for one another: {', '.join(circle[:6])}{', ...' if len(circle) > 6 else ''}"
+        yield Diagnostic(application.spans[circle[0]], "application-file", message, "one of them must start first")
+
+
+def _never_ready(needs: Mapping[str, set[str]]) -> Iterator[str]:
+    """Those that wait for themselves, or for such a one."""
+    left = {name: len(others) for name, others in needs.items()}
+    wanted_by: dict[str, list[str]] = {}
+    for name, others in needs.items():
+        for other in others:
+            wanted_by.setdefault(other, []).append(name)
+    ready = [name for name, count in left.items() if not count]
+    while ready:
+        for name in wanted_by.get(ready.pop(), ()):
+            left[name] -= 1
+            if not left[name]:
+                ready.append(name)
+    yield from (name for name, count in left.items() if count)
 
 
 def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:

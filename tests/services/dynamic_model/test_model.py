@@ -1,24 +1,12 @@
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.dynamic_model.model import (
-    CORNERING_FRONT,
-    CORNERING_REAR,
-    FRONT,
-    GAIN_FORWARD,
-    INERTIA,
-    MASS,
-    REAR,
-    RESISTANCE,
-    Motion,
-    Vehicle,
-    pedal_position,
-    step,
-    wheel_angle,
-)
+from services.dynamic_model.car import KIWI
+from services.dynamic_model.model import Motion, Vehicle, pedal_position, step, wheel_angle
 
 SECOND = 1_000_000
 
@@ -41,7 +29,12 @@ def test_speed_follows_the_first_order_response() -> None:
     vehicle.press(0.1)
     for millisecond in range(0, 2001):
         vehicle.update(millisecond * 1000)
-        exact = GAIN_FORWARD * 0.1 / RESISTANCE * (1 - math.exp(-RESISTANCE / MASS * millisecond / 1000))
+        exact = (
+            KIWI.gain_forward
+            * 0.1
+            / KIWI.resistance
+            * (1 - math.exp(-KIWI.resistance / KIWI.mass * millisecond / 1000))
+        )
         assert vehicle.motion.vx == pytest.approx(exact, abs=1e-3)
 
 
@@ -49,8 +42,8 @@ def test_euler_steps_are_the_ones_of_the_difference_equation() -> None:
     vehicle = Vehicle(freq=100)
     vehicle.press(0.1)
     drive(vehicle, 0.5)
-    ratio = 1 - 0.01 * RESISTANCE / MASS
-    assert vehicle.motion.vx == pytest.approx(GAIN_FORWARD * 0.1 / RESISTANCE * (1 - ratio**50), rel=1e-12)
+    ratio = 1 - 0.01 * KIWI.resistance / KIWI.mass
+    assert vehicle.motion.vx == pytest.approx(KIWI.gain_forward * 0.1 / KIWI.resistance * (1 - ratio**50), rel=1e-12)
 
 
 def test_one_step_by_hand() -> None:
@@ -82,11 +75,11 @@ def test_steady_turn_agrees_with_the_linear_single_track_model() -> None:
     vehicle.press(0.1)
     vehicle.steer(0.1)
     motion = drive(vehicle, 5)
-    base = FRONT + REAR
-    balance = REAR * CORNERING_REAR - FRONT * CORNERING_FRONT
-    gradient = MASS * balance / (base * CORNERING_FRONT * CORNERING_REAR)
+    base = KIWI.front + KIWI.rear
+    balance = KIWI.rear * KIWI.cornering_rear - KIWI.front * KIWI.cornering_front
+    gradient = KIWI.mass * balance / (base * KIWI.cornering_front * KIWI.cornering_rear)
     assert motion.yaw_rate == pytest.approx(motion.vx * wheel_angle(0.1) / (base + gradient * motion.vx**2), rel=1e-9)
-    assert INERTIA > 0 and motion.yaw_rate > 0
+    assert KIWI.inertia > 0 and motion.yaw_rate > 0
 
 
 def test_left_is_positive_and_right_its_mirror() -> None:
@@ -120,7 +113,7 @@ def test_the_first_update_advances_nothing() -> None:
     vehicle = Vehicle(100)
     vehicle.press(0.14)
     assert vehicle.update(5 * SECOND) == Motion()
-    assert vehicle.update(5 * SECOND + 10_000).vx == pytest.approx(0.01 * GAIN_FORWARD * 0.14 / MASS)
+    assert vehicle.update(5 * SECOND + 10_000).vx == pytest.approx(0.01 * KIWI.gain_forward * 0.14 / KIWI.mass)
 
 
 def test_time_does_not_run_backwards() -> None:
@@ -147,9 +140,53 @@ def test_steps_are_never_longer_than_the_period_and_lose_no_time(elapsed: int, f
     vehicle.update(0)
     vehicle.update(elapsed)
     steps = math.ceil(elapsed / math.ceil(SECOND / freq))
-    limit = GAIN_FORWARD * 0.1 / RESISTANCE
-    ratio = 1 - elapsed / SECOND / steps * RESISTANCE / MASS
+    limit = KIWI.gain_forward * 0.1 / KIWI.resistance
+    ratio = 1 - elapsed / SECOND / steps * KIWI.resistance / KIWI.mass
     assert vehicle.motion.vx == pytest.approx(limit * (1 - ratio**steps), rel=1e-4)
+
+
+def test_finer_steps_are_stable_where_the_public_scheme_is_not() -> None:
+    def swing(steps: int) -> float:
+        vehicle = Vehicle(100, steps=steps)
+        vehicle.press(4 * 0.12 / 26)
+        vehicle.motion = Motion(0.12, 0.0, 0.1)
+        drive(vehicle, 2)
+        return abs(vehicle.motion.yaw_rate)
+
+    assert swing(steps=1) > 1e3
+    assert swing(steps=2) < 1e-9
+
+
+@pytest.mark.parametrize("rate", [100, 200])
+def test_the_limit_of_stability_is_where_the_motion_stops_to_decay(rate: float) -> None:
+    limit = KIWI.stable_above(rate)
+    assert limit == pytest.approx(19.14 / rate, rel=1e-3)
+    for speed, decays in ((limit * 0.99, False), (limit * 1.01, True)):
+        motion = Motion(speed, 0.0, 0.1)
+        for _ in range(4000):
+            motion = step(Motion(speed, motion.vy, motion.yaw_rate), 0.0, 0.0, 1 / rate, replace(KIWI, slip_speed=0.01))
+        assert (abs(motion.yaw_rate) < 0.1) is decays
+
+
+def test_one_step_in_each_period_is_what_it_always_was() -> None:
+    """The drive of the public scheme, written out once more, bit for bit."""
+    vehicle = Vehicle(100)
+    vehicle.press(0.12)
+    vehicle.steer(0.2)
+    motion = Motion()
+    vehicle.update(0)
+    for tick in range(1, 500):
+        motion = step(motion, 0.2 * (0.6 / 0.290888), 0.12, 0.01)
+        assert vehicle.update(tick * 10_000) == motion
+
+
+def test_reset_is_standing_still() -> None:
+    vehicle = Vehicle(100)
+    vehicle.press(0.1)
+    vehicle.steer(0.2)
+    assert drive(vehicle, 1).vx > 0
+    vehicle.reset()
+    assert drive(vehicle, 1, start=SECOND) == Motion()
 
 
 def test_steps_too_long_for_the_tyres_are_an_error_and_not_a_state() -> None:

@@ -10,11 +10,15 @@ from services.base import Context, Flags, Output
 from services.dynamic_model.service import DynamicModel
 from tests.services.process import hear, running, say
 
+SECOND = 1_000_000
 STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
 
 
-def service(frame_id: int = 3) -> DynamicModel:
-    return DynamicModel(Context("dynamic-model", Flags({"freq": 100.0, "frame-id": frame_id}), MessageSet.standard()))
+FLAGS = {"freq": 100.0, "steps": 1, "vehicle": None, "frame-id": 3}
+
+
+def service(**flags: object) -> DynamicModel:
+    return DynamicModel(Context("dynamic-model", Flags({**FLAGS, **flags}), MessageSet.standard()))
 
 
 def test_requests_move_the_body_that_its_output_tells() -> None:
@@ -42,6 +46,29 @@ def test_what_is_no_number_is_said_once(caplog: pytest.LogCaptureFixture) -> Non
         "a PedalPositionRequest of nan is ignored, as all that are not finite will be"
     ]
     assert model.vehicle.rejected == 2
+
+
+def test_another_car_and_finer_steps(tmp_path: Path) -> None:
+    (tmp_path / "car.yml").write_text("mass: 2\n")
+    model = service(vehicle=str(tmp_path / "car.yml"), steps=4)
+    assert model.vehicle.car.mass == 2
+    model.inputs[PEDAL, None](MessageSet.standard().type(PEDAL)(position=0.1), 0)
+    model.update(0)
+    model.update(10_000)
+    assert model.vehicle.motion.vx == pytest.approx(0.65 * (1 - (1 - 0.0025 * 4 / 2) ** 4), rel=1e-6)
+
+
+def test_the_command_reset_and_no_other() -> None:
+    model, messages = service(), MessageSet.standard()
+    model.inputs[PEDAL, None](messages.type(PEDAL)(position=0.1), 0)
+    for now in (0, SECOND):
+        model.update(now)
+    command = model.inputs["opendlv.sim.Command", None]
+    command(messages.type("opendlv.sim.Command")(command="other"), 0)
+    assert model.vehicle.motion.vx > 0.5
+    command(messages.type("opendlv.sim.Command")(command="reset"), 0)
+    (output,) = model.update(2 * SECOND)
+    assert (output.message.vx, output.message.vy, output.message.yawRate) == (0, 0, 0)
 
 
 def test_on_the_bus(cid: int, tmp_path: Path) -> None:

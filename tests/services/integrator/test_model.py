@@ -108,3 +108,27 @@ def test_when_updates_fall_makes_no_difference(twists: list[tuple[int, float, fl
     for now in sorted(updates):
         often.update(now * 10_000)
     assert often.update(SECOND).position == pytest.approx(once.update(SECOND).position, abs=1e-9)
+
+
+def test_reset_goes_back_to_the_start_and_stands() -> None:
+    body = Integrator(start(1, 2, 0.7))
+    body.update(0)
+    body.feed(CIRCLE, 0)
+    body.update(SECOND)
+    body.feed(CIRCLE, 2 * SECOND)
+    body.reset()
+    assert body.update(3 * SECOND) == start(1, 2, 0.7)
+    body.feed(CIRCLE, 3 * SECOND)
+    assert body.update(4 * SECOND).position[:2] == pytest.approx(on_the_circle(start(1, 2), 0.7, 1.0)[:2])
+
+
+def test_an_hour_of_circles_drifts_by_nothing_that_shows() -> None:
+    body = Integrator(start())
+    body.update(0)
+    body.feed(CIRCLE, 0)
+    for now in range(0, 3600 * SECOND, 100_000):
+        body.update(now)
+    x, y, angle = on_the_circle(start(), 0.0, 3600.0)
+    pose = body.update(3600 * SECOND)
+    assert pose.position == pytest.approx((x, y, 0.0), abs=1e-9)
+    assert math.remainder(heading(pose) - angle, math.tau) == pytest.approx(0, abs=1e-9)

@@ -1,10 +1,13 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
 
-from services.integrator.rotation import displacement, multiply, quaternion, rotate, turn
+from services.integrator.rotation import angles, displacement, multiply, quaternion, rotate, turn
 
 rates = st.tuples(*[st.floats(-20, 20)] * 3)
 velocities = st.tuples(*[st.floats(-2, 2)] * 3)
@@ -62,3 +65,40 @@ def test_small_angles_join_the_closed_form_without_a_step(angle: float) -> None:
     assert z == 0
     assert x == pytest.approx(radius * math.sin(angle) if angle else 1.0, rel=1e-14)
     assert y == pytest.approx(radius * 2 * math.sin(angle / 2) ** 2 if angle else 0.0, rel=1e-14)
+
+
+@settings(deadline=None)
+@given(velocities, rates, st.floats(0, 2))
+def test_a_step_is_the_exponential_of_the_motion(
+    v: tuple[float, float, float], w: tuple[float, float, float], dt: float
+) -> None:
+    """Against scipy's matrix exponential of the twist, which knows nothing of closed forms."""
+    twist = np.array([[0, -w[2], w[1], v[0]], [w[2], 0, -w[0], v[1]], [-w[1], w[0], 0, v[2]], [0, 0, 0, 0]])
+    moved = expm(twist * dt)
+    assert displacement(v, w, dt) == pytest.approx(tuple(moved[:3, 3]), abs=1e-9)
+    turned = [rotate(turn(w, dt), axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    assert np.allclose(np.array(turned).T, moved[:3, :3], atol=1e-9)
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-1.57, 1.57), st.floats(-math.pi, math.pi))
+def test_angles_come_back_from_the_quaternion(roll: float, pitch: float, yaw: float) -> None:
+    found = angles(quaternion(roll, pitch, yaw))
+    again = quaternion(*found)
+    assert abs(sum(a * b for a, b in zip(again, quaternion(roll, pitch, yaw), strict=True))) == pytest.approx(1)
+    assert found[1] == pytest.approx(pitch, abs=1e-6)
+
+
+@given(st.floats(-3, 3), st.floats(-1.5, 1.5), st.floats(-3, 3))
+def test_angles_are_those_of_scipy(roll: float, pitch: float, yaw: float) -> None:
+    q = quaternion(roll, pitch, yaw)
+    expected = Rotation.from_quat(q).as_euler("ZYX")[::-1]
+    assert angles(q) == pytest.approx(tuple(expected), abs=1e-9)
+
+
+@pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2])
+def test_looking_straight_up_or_down_all_turn_is_yaw(pitch: float) -> None:
+    for roll, yaw in ((0.3, 0.5), (-2.0, 1.0), (0.0, 3.0)):
+        q = quaternion(roll, pitch, yaw)
+        found = angles(q)
+        assert found[:2] == (0.0, pitch)
+        assert abs(sum(a * b for a, b in zip(quaternion(*found), q, strict=True))) == pytest.approx(1)

@@ -1,26 +1,31 @@
 import logging
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.session import Session
-from services.base import Context, Flags
-from services.integrator.service import Integration
+from services.base import Context, Flags, Output
+from services.integrator.service import OLD_FRAME, Integration
 from tests.services.process import hear, running, say
 
 STATE = "opendlv.sim.KinematicState"
 START = {"freq": 100.0, "x": 1, "y": 2.0, "z": 0.5, "roll": 0, "pitch": 0, "yaw": 90.0, "frame-id": 4}
+START |= {"copy-id": None, "euler": False}
 
 
-def service() -> Integration:
-    return Integration(Context("integrator", Flags(START), MessageSet.standard()))
+def service(**flags: object) -> Integration:
+    return Integration(Context("integrator", Flags({**START, **flags}), MessageSet.standard()))
 
 
 def test_the_frame_starts_where_the_flags_say_and_follows_the_states() -> None:
     body, kind = service(), MessageSet.standard().type(STATE)
-    assert list(body.inputs) == [(STATE, 4)]
+    assert list(body.inputs) == [(STATE, 4), ("opendlv.sim.Command", None)]
     (output,) = body.update(0)
     frame = output.message
     assert (frame.DESCRIPTOR.full_name, output.sender_stamp) == ("opendlv.sim.Frame", 4)
@@ -33,7 +38,7 @@ def test_the_frame_starts_where_the_flags_say_and_follows_the_states() -> None:
 
 def test_a_state_that_is_not_finite_is_said_once_and_changes_nothing(caplog: pytest.LogCaptureFixture) -> None:
     body, kind = service(), MessageSet.standard().type(STATE)
-    body.update(0)
+    list(body.update(0))
     body.inputs[STATE, 4](kind(vx=1.0), 0)
     with caplog.at_level(logging.WARNING):
         for _ in range(2):
@@ -41,6 +46,30 @@ def test_a_state_that_is_not_finite_is_said_once_and_changes_nothing(caplog: pyt
     assert len(caplog.records) == 1 and "is ignored" in caplog.text
     (output,) = body.update(1_000_000)
     assert output.message.y == pytest.approx(3)
+
+
+def test_frames_of_set_09_and_copies() -> None:
+    body = service(euler=True, yaw=30.0, pitch=20.0, roll=10.0, **{"copy-id": 9})
+    outputs = list(body.update(5))
+    assert [type(o) for o in outputs] == [Output, Envelope] * 2
+    old = MessageSet(odvd.load(OLD_FRAME))
+    for (new, before), stamp in zip((outputs[:2], outputs[2:]), (4, 9), strict=True):
+        assert isinstance(new, Output) and isinstance(before, Envelope)
+        assert (new.sender_stamp, before.sender_stamp, before.data_type, before.sample_time) == (stamp, stamp, 1001, 5)
+        frame = old.decode(1001, before.payload)
+        assert [frame.x, frame.y, frame.z] == [1, 2, 0.5]
+        assert [math.degrees(a) for a in (frame.roll, frame.pitch, frame.yaw)] == pytest.approx([10, 20, 30])
+
+
+def test_the_command_reset_and_no_other() -> None:
+    body, messages = service(), MessageSet.standard()
+    list(body.update(0))
+    body.inputs[STATE, 4](messages.type(STATE)(vx=1.0), 0)
+    for command, y in (("other", 3), ("reset", 2)):
+        body.inputs["opendlv.sim.Command", None](messages.type("opendlv.sim.Command")(command=command), 0)
+        (output,) = body.update(1_000_000)
+        assert isinstance(output, Output)
+        assert output.message.y == pytest.approx(y)
 
 
 def test_on_the_bus(cid: int, tmp_path: Path) -> None:
@@ -53,3 +82,19 @@ def test_on_the_bus(cid: int, tmp_path: Path) -> None:
         while frame.x == 1:
             _, frame = hear(session, "opendlv.sim.Frame", 4)
         assert frame.x < 1 and frame.y == pytest.approx(0, abs=1e-3)
+
+
+def test_frames_of_set_09_on_the_bus(cid: int, tmp_path: Path) -> None:
+    with Session(cid) as session, running("integrator", tmp_path, f"--cid={cid}", "--euler", "--yaw=90"):
+        while (envelope := session.receive(20)) is not None and envelope.data_type != 1001:
+            pass
+        assert envelope is not None
+        assert MessageSet(odvd.load(OLD_FRAME)).decode(1001, envelope.payload).yaw == pytest.approx(math.pi / 2)
+
+
+def test_real_frames_of_set_09_have_this_layout(shared_data: Callable[[str], Path]) -> None:
+    messages = MessageSet(odvd.load(OLD_FRAME))
+    payloads = [e.payload for e in read_envelopes(shared_data("sim-2023-04-27.rec")) if e.data_type == 1001]
+    frames = [messages.decode(1001, payload) for payload in payloads]
+    assert len(frames) > 100
+    assert [messages.encode(frame) for frame in frames] == payloads

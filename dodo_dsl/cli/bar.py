@@ -1,0 +1,19 @@
+"""A bar on a terminal for work that takes long; nothing elsewhere."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+
+@contextmanager
+def bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Gives a function that takes how much of `total` is done."""
+    if not stream.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(file=stream), transient=True) as progress:
+        task = progress.add_task(text, total=total)
+        yield lambda done: progress.update(task, completed=done)

@@ -1,0 +1,130 @@
+"""What `dodo rec` does once its command line is read."""
+
+import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from dodo_dsl.cli.bar import bar
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.opendlv import message_sets
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.varints import Numbers
+from dodo_dsl.recordings import coco, contents, cut, table
+from dodo_dsl.recordings.contents_text import contents_text
+from dodo_dsl.recordings.frames import IMAGE
+from dodo_dsl.recordings.outputs import new_file, new_folder, refuse_existing
+from dodo_dsl.recordings.selection import NothingSelected, Selection
+
+
+@dataclass(frozen=True)
+class _Job:
+    options: argparse.Namespace
+    recording: Recording
+    messages: MessageSet
+    stdout: TextIO
+    stderr: TextIO
+
+    def tell(self, text: str) -> None:
+        self.stderr.write(f"dodo rec: {text}\n")
+
+    def rows(self) -> Numbers:
+        """What the command line selects; what was skipped is told first."""
+        if self.recording.damage:
+            self.tell(f"{self.recording.path}: {self.recording.damage}")
+        options = self.options
+        return Selection(options.message, options.start, options.end).rows(self.recording, self.messages)
+
+    def folder(self) -> Path:
+        folder: Path = self.options.output or self.options.file.with_suffix("")
+        if folder.exists() and not folder.is_dir():
+            raise NothingSelected(f"{folder} is no folder; name one with -o")
+        return folder
+
+
+def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    """Carry out one action; raises what `dodo rec` turns into a sentence."""
+    path: Path = options.file
+    with bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
+        recording = Recording(path, progress)
+    with recording:
+        version, messages = _messages(options.messages, recording)
+        job = _Job(options, recording, messages, stdout, stderr)
+        if options.action == "info":
+            _info(job, version)
+        elif options.action == "cut":
+            _cut(job)
+        elif options.csv:
+            _csv(job)
+        else:
+            _coco(job)
+    return Exit.OK
+
+
+def _messages(wanted: list[str], recording: Recording) -> tuple[str, MessageSet]:
+    versions = [word for word in wanted if word in (message_sets.OLD, message_sets.NEW)]
+    own = [Path(word) for word in wanted if word not in versions]
+    version = versions[-1] if versions else message_sets.version_of(recording)
+    return version, message_sets.load(version, *own)
+
+
+def _info(job: _Job, version: str) -> None:
+    images = len(job.recording.rows(messages=[IMAGE]))
+    with bar(job.stderr, "decoding frames", images) as progress:
+        decoding = None if job.options.no_decode else progress
+        found = contents.look(job.recording, job.messages, version, decoding, job.tell)
+    if job.options.json:
+        job.stdout.write(json.dumps(found.as_json(job.recording), indent=2) + "\n")
+    else:
+        job.stdout.write(contents_text(found, job.recording))
+
+
+def _cut(job: _Job) -> None:
+    output: Path = job.options.output
+    if output.exists() and output.samefile(job.recording.path):
+        raise NothingSelected(f"{output} is the recording itself; name another file with -o")
+    refuse_existing([output], job.options.force)
+    rows = job.rows()
+    with new_file(output) as place, bar(job.stderr, f"writing {output.name}", len(rows)) as progress:
+        cut.write(job.recording, rows, place, progress)
+    job.stdout.write(f"{output}: {len(rows)} of {len(job.recording)} messages\n")
+
+
+def _csv(job: _Job) -> None:
+    recording, messages, folder = job.recording, job.messages, job.folder()
+    rows = job.rows()
+    types = recording.index["data_type"][rows]
+    known = rows[np.isin(types, list(messages.ids()))]
+    if not len(known):
+        raise NothingSelected(f"nothing is known of the messages in {recording.path}; name their .odvd by --messages")
+    names = table.names(recording, messages, known)
+    refuse_existing([folder / name for name in names], job.options.force)
+    with new_folder(folder) as place, bar(job.stderr, "writing tables", len(known)) as progress:
+        undecodable = table.write(recording, messages, known, place, progress)
+    for id_, count in undecodable.items():
+        job.tell(f"{count} payloads of {messages.name(id_)} cannot be decoded and have no row")
+    if unknown := sorted(set(types.tolist()) - messages.ids()):
+        job.tell(f"left out, as nothing is known of them: messages {', '.join(map(str, unknown))}")
+    job.stdout.write(f"{folder}: {len(names)} tables with {len(known) - undecodable.total()} rows\n")
+
+
+def _coco(job: _Job) -> None:
+    recording, options, folder = job.recording, job.options, job.folder()
+    if options.message:
+        raise NothingSelected("--message does not go with --coco; choose senders with --camera and --labels")
+    rows = job.rows()
+    images = coco.images_of(recording, rows, options.camera)
+    labels = coco.detections(recording, job.messages, rows, options.labels)
+    if not labels and not options.all:
+        raise NothingSelected(f"{recording.path} holds no detections with a box; --all exports frames without them")
+    refuse_existing([folder / coco.ANNOTATIONS], options.force)
+    with new_folder(folder) as place, bar(job.stderr, "decoding frames", len(images)) as progress:
+        export = coco.Export(place, options.pictures, options.all, progress, job.tell)
+        result = export.write(recording, images, labels)
+    if result.lost:
+        job.tell(f"{result.lost} of {len(images)} packets gave no frame")
+    job.stdout.write(f"{folder}: {len(result.images)} frames with {len(result.boxes)} boxes\n")

@@ -1,0 +1,68 @@
+"""The pixel formats of camera frames in shared memory, and pictures from and to them.
+
+`argb` has 4 bytes a pixel, in memory blue, green, red, alpha; `bgr` 3; `i420` planes of brightness and, at half the
+width and height, of two colours (12 bits a pixel).
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Picture = NDArray[np.uint8]
+
+FORMATS = ("argb", "bgr", "i420")
+_HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3}  # twice the bytes a pixel
+
+
+class PixelError(ValueError):
+    """A memory's size, or a format's name, that fits no picture."""
+
+
+def size(format_: str, width: int, height: int) -> int:
+    """Bytes of a picture; raises PixelError for an unknown format, and for i420 with an odd width or height."""
+    if format_ not in FORMATS:
+        raise PixelError(f"there is no pixel format `{format_}`; known are {', '.join(FORMATS)}")
+    if format_ == "i420" and (width % 2 or height % 2):
+        raise PixelError(f"i420 needs an even width and height, not {width} x {height}")
+    return width * height * _HALF_BYTES[format_] // 2
+
+
+def format_of(name: str, memory_size: int, width: int, height: int) -> str:
+    """The format of a memory by its size (names lie: some `.argb` have 3 bytes a pixel); raises PixelError."""
+    for format_, half_bytes in _HALF_BYTES.items():
+        if 0 < memory_size == width * height * half_bytes // 2:
+            return format_
+    raise PixelError(f"memory `{name}` has {memory_size} bytes, which is no picture of {width} x {height} pixels")
+
+
+def view(data: Any, format_: str, width: int, height: int) -> Picture:
+    """The bytes of a memory as an array, without a copy; raises PixelError where there are too few.
+
+    Its shape is (height, width, 4) for argb, (height, width, 3) for bgr and (height * 3 / 2, width) for i420; bytes
+    behind the picture are left out.
+    """
+    wanted = size(format_, width, height)
+    flat = np.frombuffer(data, np.uint8)
+    if flat.size < wanted:
+        raise PixelError(f"{flat.size} bytes are too few for {format_} of {width} x {height} pixels, {wanted} bytes")
+    shape = {"argb": (height, width, 4), "bgr": (height, width, 3), "i420": (height * 3 // 2, width)}[format_]
+    return flat[:wanted].reshape(shape)
+
+
+def to_bgr(picture: Picture, format_: str) -> Picture:
+    """A picture as blue, green, red (height, width, 3)."""
+    return _converted(picture, {"argb": "COLOR_BGRA2BGR", "i420": "COLOR_YUV2BGR_I420"}.get(format_))
+
+
+def from_bgr(picture: Picture, format_: str) -> Picture:
+    """A picture of blue, green, red in another format, shaped as `view` has it; alpha is 255."""
+    return _converted(picture, {"argb": "COLOR_BGR2BGRA", "i420": "COLOR_BGR2YUV_I420"}.get(format_))
+
+
+def _converted(picture: Picture, code: str | None) -> Picture:
+    if code is None:
+        return picture.copy()
+    import cv2
+
+    return np.asarray(cv2.cvtColor(picture, getattr(cv2, code)), np.uint8)

@@ -1,0 +1,150 @@
+"""A way through points: where a vehicle is at a time, how it is turned and how it moves.
+
+World: metres, z up, heading counter-clockwise from the x axis. Between two way points position and heading change
+evenly, the heading by the shorter way round (at exactly half a turn: to the left).
+"""
+
+import bisect
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+
+class WayError(ValueError):
+    """Way points that make no way; one sentence with their place."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A way point as written: ``place`` is where, x, y, z in m, ``yaw`` in rad and ``time`` in s where known."""
+
+    place: str
+    x: float
+    y: float
+    z: float = 0.0
+    yaw: float | None = None
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the vehicle is: m and rad in the world, and its velocity there in m/s and rad/s."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_rate: float = 0.0
+
+    @property
+    def body_velocity(self) -> tuple[float, float, float]:
+        """The velocity along the vehicle's own axes, forward, left and up (m/s)."""
+        (vx, vy, vz), c, s = self.velocity, math.cos(self.yaw), math.sin(self.yaw)
+        return c * vx + s * vy, c * vy - s * vx, vz
+
+
+@dataclass(frozen=True)
+class _Knot:
+    time: float
+    x: float
+    y: float
+    z: float
+    yaw: float
+
+
+class Way:
+    """Poses over time, from two way points or more.
+
+    Before the first point's time the vehicle stands there. After the last point's it stands there, or drives on as
+    between the last two where the way is ``endless``.
+    """
+
+    def __init__(self, points: Sequence[Point], speed: float, endless: bool = False) -> None:
+        """``speed`` (m/s) makes the times where the points have none; raises WayError."""
+        if len(points) < 2:
+            place = f"{points[0].place}: " if points else ""
+            raise WayError(f"{place}a way needs two way points or more")
+        yaws = [p.yaw for p in points]
+        turned = [y for y in yaws if y is not None] if None not in yaws else headings(points)
+        timed = _timed(points) if points[0].time is not None else _at_speed(points, speed)
+        self._knots = [_Knot(t, p.x, p.y, p.z, yaw) for t, p, yaw in zip(timed, points, turned, strict=True)]
+        self._times = timed
+        self.duration = math.inf if endless else timed[-1]
+
+    def at(self, time: float) -> Pose:
+        """The pose ``time`` seconds after the start; the velocity at a way point is the one from there on."""
+        index = min(bisect.bisect_right(self._times, time), len(self._knots) - 1)
+        a, b = self._knots[max(index - 1, 0)], self._knots[max(index, 1)]
+        if time < a.time:
+            return _standing(a)
+        if time >= b.time and time >= self.duration:
+            return _standing(b)
+        return _between(a, b, time)
+
+
+def wrapped(angle: float) -> float:
+    """The same angle above -pi and up to pi."""
+    turned = math.remainder(angle, math.tau)
+    return math.pi if turned == -math.pi else turned
+
+
+def headings(points: Sequence[Point]) -> list[float]:
+    """The heading (rad) at each point of a vehicle that looks where it goes.
+
+    It is half-way between the directions of the parts before and after the point. Raises WayError when all points
+    are at one place.
+    """
+    parts = [math.atan2(b.y - a.y, b.x - a.x) if (a.x, a.y) != (b.x, b.y) else None for a, b in pairwise(points)]
+    known = next((part for part in parts if part is not None), None)
+    if known is None:
+        raise WayError(f"{points[-1].place}: all way points are at one place, so the vehicle needs yaw to look along")
+    directions = []
+    for part in parts:  # standing still it looks as before
+        known = known if part is None else part
+        directions.append(known)
+    inner = [a + wrapped(b - a) / 2 for a, b in pairwise(directions)]
+    return [directions[0], *inner, directions[-1]]
+
+
+def _timed(points: Sequence[Point]) -> list[float]:
+    times = [p.time for p in points if p.time is not None]
+    if times[0] < 0:
+        raise WayError(f"{points[0].place}: time: {times[0]:g} is before the start")
+    for before, now, point in zip(times, times[1:], points[1:], strict=False):
+        if now <= before:
+            raise WayError(f"{point.place}: time: {now:g} is not after {before:g}, that of the point before")
+    return times
+
+
+def _at_speed(points: Sequence[Point], speed: float) -> list[float]:
+    times = [0.0]
+    for a, b in pairwise(points):
+        length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
+        if length == 0:
+            raise WayError(
+                f"{b.place}: the same place as the point before, so a way with a speed ends there; give times"
+            )
+        times.append(times[-1] + length / speed)
+    return times
+
+
+def _between(a: _Knot, b: _Knot, time: float) -> Pose:
+    took, turn = b.time - a.time, wrapped(b.yaw - a.yaw)
+    share = (time - a.time) / took
+    x, y, z = (p + share * (q - p) for p, q in ((a.x, b.x), (a.y, b.y), (a.z, b.z)))
+    velocity = ((b.x - a.x) / took, (b.y - a.y) / took, (b.z - a.z) / took)
+    return Pose(x, y, z, wrapped(a.yaw + share * turn), velocity, turn / took)
+
+
+def _standing(knot: _Knot) -> Pose:
+    return Pose(knot.x, knot.y, knot.z, wrapped(knot.yaw))
+
+
+def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Way:
+    """A straight way from a place along ``yaw`` (rad), without end where it has no ``length`` (m)."""
+    begin = Point("the start", x, y, z, yaw)
+    reach = length or 1.0
+    end = replace(begin, x=x + reach * math.cos(yaw), y=y + reach * math.sin(yaw))
+    return Way([begin, end], speed, endless=length is None)

@@ -1,0 +1,84 @@
+"""Pictures that were taken before: of an image, a video or a recording, over and over."""
+
+import importlib
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from services.camera.picture import Image, Picture, from_bgr
+
+RECORDING = ".rec"
+IMAGE_READING = 1055
+
+
+class FileCamera:
+    """One picture of the file for each ``read``, in their order, and from the first again after the last."""
+
+    def __init__(self, path: Path, width: int, height: int) -> None:
+        """Pictures are scaled to ``width`` and ``height``; raises ValueError or OSError for a file without any."""
+        if not path.is_file():
+            raise OSError(f"there is no file {path}")
+        self._path, self._size = path, (width, height)
+        self._still = cv2.imread(str(path), cv2.IMREAD_COLOR) if cv2.haveImageReader(str(path)) else None
+        first = next(self._begun(), None)
+        if first is None:
+            raise ValueError(f"{path} holds no pictures, expected an image, a video or a recording")
+        self._left = chain([first], self._skipped()) if self._still is None else iter(())
+
+    def read(self) -> Picture:
+        """The next picture, without a time."""
+        if self._still is not None:
+            return from_bgr(np.asarray(self._still, np.uint8), *self._size)
+        picture = next(self._left, None)
+        if picture is None:
+            self._left = self._begun()
+            picture = next(self._left)
+        return from_bgr(picture, *self._size)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._left = iter(())
+
+    def _begun(self) -> Iterator[Image]:
+        if self._still is not None:
+            return iter([np.asarray(self._still, np.uint8)])
+        return recorded(self._path) if self._path.suffix == RECORDING else filmed(self._path)
+
+    def _skipped(self) -> Iterator[Image]:
+        pictures = self._begun()
+        next(pictures)
+        return pictures
+
+
+def filmed(path: Path) -> Iterator[Image]:
+    """The pictures of a video, as B, G, R."""
+    capture: Any = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    try:
+        while (found := capture.read())[0]:
+            yield np.asarray(found[1], np.uint8)
+    finally:
+        capture.release()
+
+
+def recorded(path: Path) -> Iterator[Image]:
+    """The pictures of an OpenDLV recording's first camera, as B, G, R; raises ValueError where none can be decoded."""
+    try:
+        video = importlib.import_module("dodo_dsl.opendlv.video")
+        reader = importlib.import_module("dodo_dsl.opendlv.recording")
+    except ImportError as error:
+        raise ValueError(f"recordings cannot be shown here: {error}") from None
+    from dodo_dsl.opendlv.messages import MessageSet
+
+    messages, decoder, sender = MessageSet.standard(), None, None
+    for envelope in reader.read_envelopes(path):
+        sender = envelope.sender_stamp if sender is None and envelope.data_type == IMAGE_READING else sender
+        if (envelope.data_type, envelope.sender_stamp) == (IMAGE_READING, sender):
+            reading = messages.decode(IMAGE_READING, envelope.payload)
+            decoder = decoder or video.VideoDecoder(reading.format)
+            frame = decoder.decode(reading.data)
+            if frame is not None:
+                yield frame.pixels("bgr")

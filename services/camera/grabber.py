@@ -1,0 +1,74 @@
+"""A camera that makes one wait is read in a thread, so that the service never waits for it."""
+
+import threading
+import time
+from typing import Protocol
+
+from services.camera.picture import CameraError, Picture
+
+SILENCE = 5.0
+"""s without a picture after which a camera counts as lost."""
+JOIN_PATIENCE = 2.0
+
+
+class Camera(Protocol):
+    """Where pictures come from."""
+
+    def read(self) -> Picture:
+        """The next picture; raises CameraError when there are no more."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the camera."""
+        ...
+
+
+class Grabber:
+    """Keeps the newest picture of a camera; ``name`` is the camera's, for sentences."""
+
+    def __init__(self, camera: Camera, name: str, silence: float = SILENCE) -> None:
+        self._camera, self._name, self._silence = camera, name, silence
+        self._changed = threading.Condition()
+        self._newest: Picture | None = None
+        self._error: Exception | None = None
+        self._closed = False
+        self._heard = time.monotonic()
+        self._thread = threading.Thread(target=self._grab, daemon=True)
+        self._thread.start()
+
+    def wait(self, timeout: float) -> bool:
+        """Whether the first picture or an error has come within ``timeout`` seconds."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._newest is not None or self._error is not None, timeout)
+
+    def take(self) -> Picture | None:
+        """The newest picture, once; raises CameraError when the camera is lost or silent."""
+        with self._changed:
+            picture, self._newest = self._newest, None
+            error, heard = self._error, self._heard
+        if picture is not None:
+            return picture
+        if error is not None:
+            raise error
+        if time.monotonic() - heard > self._silence:
+            raise CameraError(f"the camera {self._name} has given no picture for {self._silence:g} s")
+        return None
+
+    def close(self) -> None:
+        """Let go of the camera, without waiting long for one that hangs."""
+        self._closed = True
+        self._camera.close()
+        self._thread.join(JOIN_PATIENCE)
+
+    def _grab(self) -> None:
+        while not self._closed:
+            try:
+                picture = self._camera.read()
+            except Exception as error:  # noqa: BLE001 - it ends the service from the service's own thread
+                with self._changed:
+                    self._error = error
+                    self._changed.notify_all()
+                return
+            with self._changed:
+                self._newest, self._heard = picture, time.monotonic()
+                self._changed.notify_all()

@@ -1,0 +1,45 @@
+"""Pictures as OpenDLV shares them: ARGB (in memory B, G, R, A) and I420, always both."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+
+
+class CameraError(RuntimeError):
+    """The camera has no more pictures to give; one sentence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """``argb`` (height, width, 4), ``i420`` (height * 3 / 2, width) and when it was taken (us since the epoch).
+
+    A picture that was not taken now, as of a file, has no time.
+    """
+
+    argb: Image
+    i420: Image
+    time: int | None = None
+
+
+def from_i420(i420: Image, time: int | None = None) -> Picture:
+    """The picture of planes Y, U, V (height * 3 / 2, width), BT.601."""
+    return Picture(_converted(i420, cv2.COLOR_YUV2BGRA_I420), i420, time)
+
+
+def from_bgr(bgr: Image, width: int, height: int, time: int | None = None) -> Picture:
+    """The picture of B, G, R (any height, any width, 3), scaled where it has another size."""
+    if bgr.shape[:2] != (height, width):
+        smaller = bgr.shape[0] * bgr.shape[1] > height * width
+        bgr = np.asarray(
+            cv2.resize(bgr, (width, height), interpolation=cv2.INTER_AREA if smaller else cv2.INTER_LINEAR)
+        )
+    return Picture(_converted(bgr, cv2.COLOR_BGR2BGRA), _converted(bgr, cv2.COLOR_BGR2YUV_I420), time)
+
+
+def _converted(image: Any, code: int) -> Image:
+    return np.asarray(cv2.cvtColor(image, code), np.uint8)

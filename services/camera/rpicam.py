@@ -1,0 +1,102 @@
+"""The camera of a Raspberry Pi: raw I420 from the pipe of ``rpicam-vid``."""
+
+import contextlib
+import os
+import select
+import shutil
+import subprocess
+import threading
+import time
+
+import numpy as np
+
+from services.camera.picture import CameraError, Picture, from_i420
+
+PROGRAM = "rpicam-vid"
+ALIGNED = 64
+"""Rows of other widths are padded in the pipe."""
+PATIENCE = 2.0
+
+
+class RpiCamera:
+    """Reads whole pictures; ``read`` waits for one, ``close`` ends the program and any waiting."""
+
+    def __init__(self, width: int, height: int, freq: float, exposure: float) -> None:
+        """``freq`` in Hz, ``exposure`` in s.
+
+        Raises ValueError for a width that the pipe pads, OSError where there is no program.
+        """
+        if width % ALIGNED or height % 2:
+            raise ValueError(
+                f"rpicam needs a width that is a multiple of {ALIGNED} and an even height, not {width} x {height}"
+            )
+        if shutil.which(PROGRAM) is None:
+            raise OSError(f"the program {PROGRAM} is not there, expected it on PATH (package rpicam-apps)")
+        self._shape, self._size = (height * 3 // 2, width), width * height * 3 // 2
+        self._closed = threading.Event()
+        self._process = subprocess.Popen(
+            argv(width, height, freq, exposure),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        assert self._process.stdout is not None
+        self._pipe = self._process.stdout.fileno()
+        self._words, self._busy = b"", threading.Lock()
+        self._stderr = threading.Thread(target=self._listen, daemon=True)
+        self._stderr.start()
+
+    def read(self) -> Picture:
+        """The next picture, with the time at which it was complete; raises CameraError when there are no more."""
+        data = bytearray()
+        while len(data) < self._size:
+            with self._busy:
+                part = os.read(self._pipe, self._size - len(data)) if self._readable() else b""
+            if not part:
+                raise CameraError(self._why())
+            data += part
+        image = np.frombuffer(bytes(data), np.uint8).reshape(self._shape)
+        return from_i420(image, time.time_ns() // 1000)
+
+    def close(self) -> None:
+        """End the program, with force where it does not go by itself."""
+        self._closed.set()
+        self._process.terminate()
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._stderr.join(PATIENCE)
+        with self._busy:  # a reader sees that it is closed
+            for pipe in (self._process.stdout, self._process.stderr):
+                if pipe is not None:
+                    pipe.close()
+
+    def _readable(self) -> bool:
+        """Wait for bytes or the end of the pipe, but not on after `close`."""
+        while not self._closed.is_set():
+            if select.select([self._pipe], [], [], 0.1)[0]:
+                return True
+        return False
+
+    def _listen(self) -> None:
+        """Keep the end of what the program says, which tells why it ended."""
+        assert self._process.stderr is not None
+        with contextlib.suppress(ValueError):
+            for line in self._process.stderr:
+                self._words = line.strip() or self._words
+
+    def _why(self) -> str:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(PATIENCE)
+        self._stderr.join(PATIENCE)
+        words = self._words.decode("utf-8", "replace")
+        return f"{PROGRAM} ended with code {self._process.returncode}" + (f": {words}" if words else "")
+
+
+def argv(width: int, height: int, freq: float, exposure: float) -> list[str]:
+    """The command: no preview, no end, raw pictures on standard output, each exposed for ``exposure`` s."""
+    size = ["--width", str(width), "--height", str(height)]
+    rate = ["--framerate", f"{freq:g}", "--shutter", str(round(exposure * 1e6))]
+    return [PROGRAM, "--nopreview", "--timeout", "0", "--codec", "yuv420", "--flush", *size, *rate, "--output", "-"]

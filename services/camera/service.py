@@ -1,0 +1,84 @@
+"""The camera as a service: pictures into shared memory at a fixed rate."""
+
+from pathlib import Path
+
+from dodo_dsl.opendlv.memory import SharedMemory
+from services.base import Context, Flags, Service, period_of
+from services.base.signals import interruptible
+from services.camera.files import FileCamera
+from services.camera.grabber import SILENCE, Camera, Grabber
+from services.camera.picture import CameraError, Image, Picture
+from services.camera.rpicam import RpiCamera
+from services.camera.v4l2 import V4l2Camera
+
+EMULATED = "an emulated camera belongs to the emulated rig, which comes with a later version"
+
+
+class CameraService(Service):
+    """Shares the newest picture at each instant of its rate, and none twice."""
+
+    def __init__(self, camera: Grabber | FileCamera, argb: SharedMemory, i420: SharedMemory, freq: float) -> None:
+        self.period = period_of(freq)
+        self._camera, self._argb, self._i420 = camera, argb, i420
+        self.shared = 0
+        """How many pictures were shared."""
+
+    def update(self, now: int) -> tuple[()]:
+        picture: Picture | None = self._camera.take() if isinstance(self._camera, Grabber) else self._camera.read()
+        if picture is not None:
+            time = now if picture.time is None else picture.time
+            share(self._argb, picture.argb, time)
+            share(self._i420, picture.i420, time)
+            self.shared += 1
+        return ()
+
+
+def share(memory: SharedMemory, image: Image, time: int) -> None:
+    """Copy an image and stamp it under the lock, and then tell those who wait."""
+    with memory.lock():
+        memory.buffer[: image.nbytes] = image.data.cast("B")
+        memory.stamp(time)
+    memory.notify_all()
+
+
+def open_camera(flags: Flags) -> Camera:
+    """The camera that the flags name; raises ValueError or OSError."""
+    source, width, height = flags["source"], flags["width"], flags["height"]
+    if source == "emulated":
+        raise ValueError(EMULATED)
+    if source == "file" and not flags["file"]:
+        raise ValueError("--file is missing: the picture, video or recording that the source file shows")
+    path = Path(flags["file"] if source == "file" else source)
+    if source == "file" or (not source.startswith("/dev/") and path.is_file()):
+        return FileCamera(path, width, height)
+    if flags["exposure"] * flags["freq"] > 1 + 1e-9:
+        fits = f"{1 / flags['freq']:g} s between two pictures"
+        raise ValueError(f"--exposure={flags['exposure']:g} does not fit into the {fits}")
+    if source == "rpicam":
+        return RpiCamera(width, height, flags["freq"], flags["exposure"])
+    if source.startswith("/dev/"):
+        return V4l2Camera(path, width, height, flags["freq"], flags["exposure"])
+    raise ValueError(f"--source={source} is no camera, expected a device such as /dev/video0, rpicam, file or emulated")
+
+
+def build(context: Context) -> Service:
+    """The service from its flags: it is ready when the first picture has come."""
+    flags = context.flags
+    width, height, freq = flags["width"], flags["height"], flags["freq"]
+    if width % 2 or height % 2:
+        raise ValueError(f"--width={width} and --height={height} must be even for I420")
+    argb = context.memory(flags["name.argb"], width * height * 4)
+    i420 = context.memory(flags["name.i420"], width * height * 3 // 2)
+    camera = open_camera(flags)
+    for note in getattr(camera, "notes", ()):
+        context.log.warning("%s", note)
+    if isinstance(camera, FileCamera):
+        context.resources.callback(camera.close)
+        return CameraService(camera, argb, i420, freq)
+    silence = max(SILENCE, 2 * flags["exposure"])
+    grabber = Grabber(camera, flags["source"], silence)
+    context.resources.callback(grabber.close)
+    with interruptible():
+        if not grabber.wait(silence):
+            raise CameraError(f"the camera {flags['source']} has given no picture for {silence:g} s")
+    return CameraService(grabber, argb, i420, freq)

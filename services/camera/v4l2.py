@@ -1,0 +1,73 @@
+"""A V4L2 device, through OpenCV."""
+
+import stat
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from services.camera.picture import CameraError, Picture, from_bgr
+
+MANUAL = 1
+EXPOSURE_UNIT = 1e-4
+"""V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us."""
+WARNING_SHARE = 0.1
+PATIENCE = 2.0
+
+
+class V4l2Camera:
+    """``read`` waits for a picture; ``notes`` says what the device would not take."""
+
+    def __init__(self, device: Path, width: int, height: int, freq: float, exposure: float) -> None:
+        """``freq`` in Hz, ``exposure`` in s; raises OSError for what is no camera."""
+        if not device.exists():
+            raise OSError(f"there is no camera {device}; is it plugged in?")
+        if not stat.S_ISCHR(device.stat().st_mode):
+            raise OSError(f"{device} is no V4L2 device")
+        self._busy = threading.Lock()
+        self._device, self._width, self._height = device, width, height
+        self._capture: Any = cv2.VideoCapture(str(device), cv2.CAP_V4L2)
+        if not self._capture.isOpened():
+            raise OSError(f"the camera {device} cannot be opened; does another program use it?")
+        wanted = {
+            cv2.CAP_PROP_FRAME_WIDTH: float(width),
+            cv2.CAP_PROP_FRAME_HEIGHT: float(height),
+            cv2.CAP_PROP_FPS: freq,
+            cv2.CAP_PROP_BUFFERSIZE: 1.0,
+            cv2.CAP_PROP_AUTO_EXPOSURE: float(MANUAL),
+            cv2.CAP_PROP_EXPOSURE: exposure / EXPOSURE_UNIT,
+        }
+        for key, value in wanted.items():
+            self._capture.set(key, value)
+        self.notes = self._differences(freq, exposure)
+
+    def read(self) -> Picture:
+        """The next picture, with the time at which it was complete; raises CameraError when the device is lost."""
+        with self._busy:
+            good, image = self._capture.read()
+        now = time.time_ns() // 1000
+        if not good or image is None:
+            raise CameraError(f"the camera {self._device} gives no more pictures; is it still plugged in?")
+        return from_bgr(image, self._width, self._height, now)
+
+    def close(self) -> None:
+        """Let go of the device, if it does not hang; its driver does so at the end of the process."""
+        if self._busy.acquire(timeout=PATIENCE):
+            self._capture.release()
+            self._busy.release()
+
+    def _differences(self, freq: float, exposure: float) -> list[str]:
+        get, notes = self._capture.get, []
+        size = int(get(cv2.CAP_PROP_FRAME_WIDTH)), int(get(cv2.CAP_PROP_FRAME_HEIGHT))
+        if size != (self._width, self._height):
+            notes.append(f"{self._device} gives {size[0]} x {size[1]} pixels, which are scaled")
+        exposed = get(cv2.CAP_PROP_EXPOSURE) * EXPOSURE_UNIT
+        for what, has, wanted, unit in (
+            ("exposure", exposed, exposure, "s"),
+            ("rate", get(cv2.CAP_PROP_FPS), freq, "Hz"),
+        ):
+            if abs(has - wanted) > WARNING_SHARE * wanted:
+                notes.append(f"{self._device} does not take the {what} of {wanted:g} {unit}: it has {has:g}")
+        return notes

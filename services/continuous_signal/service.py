@@ -1,0 +1,100 @@
+"""The judge of a signal on the bus."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.messages import MessageSet
+from services.base import Context, Flags, Output, Service
+from services.continuous_signal.measures import Limits
+from services.continuous_signal.model import Judge
+from services.continuous_signal.recorded import read_recording
+from services.continuous_signal.signals import Signal, check
+from services.continuous_signal.table import read_table
+from services.continuous_signal.target import MICROSECONDS, Target
+
+RECORDING = ".rec"
+NEEDED = ("max-mean", "max-std", "max-distance", "min-share")
+
+
+class ContinuousSignal(Service):
+    """Hears the signal, and its target where that comes live, under their sender stamps."""
+
+    def __init__(self, context: Context) -> None:
+        flags = context.flags
+        signal = check(Signal(flags["message"], flags["sender"], flags["field"]), context.messages)
+        other = _target_signal(flags, signal)
+        target = _target(flags, other, context.messages)
+        if target is None and str(other) == str(signal):
+            raise ValueError("there is no target: give --target, or --target-sender of one that comes live")
+        limits = _limits(flags)
+        self.judge = Judge(f"{signal.field} of {signal}", target, limits, flags["max-time"], flags["align"] == "begin")
+        self._signal, self._other = signal, other
+        self.inputs = {(signal.message, signal.sender): self._hear}
+        if target is None:
+            check(other, context.messages)
+            self.inputs[other.message, other.sender] = self._hear_target
+
+    def begin(self, now: int) -> None:
+        self.judge.begin(now)
+
+    def update(self, now: int) -> Iterable[Message | Output]:
+        self.judge.update(now)
+        self.verdict = self.judge.verdict
+        return ()
+
+    def end_of_input(self, now: int) -> None:
+        self.judge.end(now)
+        self.verdict = self.judge.verdict
+
+    def _hear(self, message: Any, sample_time: int) -> None:
+        self.judge.hear(self._signal.value(message), sample_time)
+
+    def _hear_target(self, message: Any, sample_time: int) -> None:
+        self.judge.hear_target(self._other.value(message), sample_time)
+
+
+def build(context: Context) -> Service:
+    """The service from its flags; raises ValueError for what they leave open."""
+    return ContinuousSignal(context)
+
+
+def _target_signal(flags: Flags, signal: Signal) -> Signal:
+    sender = flags["target-sender"]
+    return Signal(
+        flags["target-message"] or signal.message,
+        signal.sender if sender is None else sender,
+        flags["target-field"] or signal.field,
+    )
+
+
+def _target(flags: Flags, signal: Signal, messages: MessageSet) -> Target | None:
+    """The target from its file, None for one that comes live."""
+    if not flags["target"]:
+        return None
+    path = Path(flags["target"])
+    if path.suffix == RECORDING:
+        return read_recording(path, check(signal, messages), messages)
+    return read_table(path, signal.field, flags["align"] == "sample-time")
+
+
+def _limits(flags: Flags) -> Limits:
+    if all(flags[name] is None for name in NEEDED):
+        raise ValueError(f"there is no limit to judge by: give one or more of --{', --'.join(NEEDED)}")
+    if flags["min-share"] is not None and flags["band"] is None:
+        raise ValueError("--min-share needs --band, the distance that counts as inside")
+    until = flags["until"]
+    if until is not None and until <= flags["from"]:
+        raise ValueError(f"--until={until:g} is not after --from={flags['from']:g}")
+    return Limits(
+        mean=flags["max-mean"],
+        std=flags["max-std"],
+        distance=flags["max-distance"],
+        band=flags["band"],
+        share=flags["min-share"],
+        samples=flags["min-samples"],
+        start=round(flags["from"] * MICROSECONDS),
+        until=None if until is None else round(until * MICROSECONDS),
+    )

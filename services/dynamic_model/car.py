@@ -1,0 +1,119 @@
+"""What a car is to the single-track model: its parameters, from a file where it is not the Kiwi car."""
+
+import difflib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+class CarError(ValueError):
+    """A file that is no car; one sentence with file and line."""
+
+
+@dataclass(frozen=True)
+class Car:
+    """Parameters in SI units; the defaults are the Kiwi car of the public Kiwi simulation."""
+
+    mass: float = 1.113
+    """kg"""
+    inertia: float = 0.01
+    """kg m2, about the vertical axis"""
+    front: float = 0.12
+    """m, centre of mass to the front axle"""
+    rear: float = 0.104
+    """m, centre of mass to the rear axle"""
+    cornering_front: float = 15.0
+    """N/rad, both front wheels"""
+    cornering_rear: float = 15.0
+    """N/rad, both rear wheels"""
+    resistance: float = 4.0
+    """N s/m"""
+    gain_forward: float = 26.0
+    """N per unit of pedal, forward"""
+    gain_reverse: float = 5.0
+    """N per unit of pedal, in reverse"""
+    steering_gain: float = 0.6 / 0.290888
+    """angle of the wheel per requested angle"""
+    steering_limit: float = 0.6
+    """rad, at the wheel, to either side"""
+    pedal_reverse: float = -0.9
+    """lowest pedal that is taken"""
+    pedal_forward: float = 0.14
+    """highest pedal that is taken"""
+    slip_speed: float = 0.1
+    """m/s; the tyres carry sideways only above this speed"""
+
+    def stable_above(self, rate: float) -> float:
+        """The speed in m/s above which Euler's steps at ``rate`` (Hz) are stable.
+
+        Sideways motion decays at w/v, where w is the larger eigenvalue of the tyres' damping; steps of dt need
+        dt w/v < 2.
+        """
+        a = (self.cornering_front + self.cornering_rear) / self.mass
+        d = (self.front**2 * self.cornering_front + self.rear**2 * self.cornering_rear) / self.inertia
+        moment = self.front * self.cornering_front - self.rear * self.cornering_rear
+        root = math.sqrt((a - d) ** 2 / 4 + moment**2 / (self.mass * self.inertia))
+        return ((a + d) / 2 + root) / (2 * rate)
+
+
+KIWI = Car()
+KEYS = {field.name.replace("_", "-"): field.name for field in fields(Car)}
+
+_POSITIVE = ("mass", "inertia", "front", "rear", "resistance", "steering-limit", "slip-speed")
+_NEGATIVE = ("pedal-reverse",)
+_ANY = ("steering-gain",)
+
+
+def read_car(path: Path) -> Car:
+    """The car of a YAML or JSON file, the Kiwi's where the file says nothing; raises CarError."""
+    try:
+        node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+    except OSError as error:
+        raise CarError(f"{path} cannot be read: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{path}:{mark.line + 1}" if mark else str(path)
+        raise CarError(f"{place}: this is neither YAML nor JSON: {getattr(error, 'problem', None) or error}") from None
+    if not isinstance(node, yaml.MappingNode):
+        raise CarError(f"{path}: expected the parameters of a car, such as 'mass: 1.113'")
+    given: dict[str, float] = {}
+    for place, name, value in _entries(path, node):
+        if KEYS[name] in given:
+            raise CarError(f"{place}: {name} is there twice")
+        given[KEYS[name]] = value
+    return replace(KIWI, **given)
+
+
+def _entries(path: Path, node: yaml.MappingNode) -> Iterator[tuple[str, str, float]]:
+    for key, value in node.value:
+        place, name = f"{path}:{key.start_mark.line + 1}", str(key.value)
+        if name not in KEYS:
+            close = difflib.get_close_matches(name, KEYS, 1)
+            raise CarError(f"{place}: a car has no '{name}'" + (f", did you mean '{close[0]}'?" if close else ""))
+        yield place, name, _checked(f"{place}: {name}", name, _number(value))
+
+
+def _number(node: Any) -> float:
+    if not isinstance(node, yaml.ScalarNode) or node.style is not None:
+        return math.nan
+    try:
+        return float(node.value)
+    except ValueError:
+        return math.nan
+
+
+def _checked(what: str, name: str, value: float) -> float:
+    if not math.isfinite(value):
+        raise CarError(f"{what} is no finite number")
+    if name in _ANY:
+        return value
+    if name in _NEGATIVE:
+        if value > 0:
+            raise CarError(f"{what} is {value:g}, expected 0 or less")
+    elif value < 0 or (value == 0 and name in _POSITIVE):
+        raise CarError(f"{what} is {value:g}, expected {'more than 0' if name in _POSITIVE else '0 or more'}")
+    return value

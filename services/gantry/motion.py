@@ -1,0 +1,116 @@
+"""Velocities of the vehicle's body as the rig can follow them: turned into its frame and kept within its limits.
+
+The rig's frame: x forward, y to the left, 0 in the middle, heading counter-clockwise from forward. The camera stands
+for the vehicle's centre of mass.
+"""
+
+import math
+from dataclasses import dataclass
+
+from services.gantry.protocol import Position
+
+HOME = Position(-0.9, -0.7, math.radians(-150))
+"""Where the limit switches are, rounded to the inside: step 0 of Table 4.2's conversions."""
+FARTHEST = Position(0.95, 0.7, math.radians(170))
+"""The other end of the workspace of 1.9 m by 1.4 m, and of the turn."""
+LATENCY = 0.1
+"""s from a measurement to the motion decided upon it, beside four steps, with which braking that comes a step late does
+not swing over the edge."""
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """m/s along x and y, rad/s about z: of the body or in the rig's frame."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """m/s, m/s2, rad/s, rad/s2, and the box of positions (m, rad)."""
+
+    speed: float = 1.0
+    acceleration: float = 0.5
+    yaw_rate: float = 1.0
+    yaw_acceleration: float = 1.0
+    low: Position = HOME
+    high: Position = FARTHEST
+
+    def holds(self, position: Position) -> bool:
+        """Whether a position is within the box."""
+        inside = self.low.x <= position.x <= self.high.x and self.low.y <= position.y <= self.high.y
+        return inside and self.low.yaw <= position.yaw <= self.high.yaw
+
+
+def box(range_x: float, range_y: float, range_yaw: float) -> tuple[Position, Position]:
+    """The positions within so many m from home and rad to either side, as far as the rig goes."""
+    high = Position(min(FARTHEST.x, HOME.x + range_x), min(FARTHEST.y, HOME.y + range_y), min(FARTHEST.yaw, range_yaw))
+    return Position(HOME.x, HOME.y, max(HOME.yaw, -range_yaw)), high
+
+
+def turned(velocity: Velocity, yaw: float) -> Velocity:
+    """A body's velocity in the frame in which the body is turned by ``yaw`` (rad)."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return Velocity(c * velocity.x - s * velocity.y, s * velocity.x + c * velocity.y, velocity.yaw)
+
+
+class Shaper:
+    """Turns what the vehicle does into what the rig is told, one step after the other."""
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self.told = Velocity()
+        self.cut = 0
+        """Steps in which the edge of the workspace took speed away."""
+
+    def step(self, body: Velocity, at: Position, dt: float) -> Velocity:
+        """The velocity in the rig's frame for the next ``dt`` seconds, from the body's and the measured position.
+
+        A speed above the limit is cut without a change of direction; it changes no faster than the accelerations;
+        towards an edge the rig is told no more than what it can brake from.
+        """
+        limits = self.limits
+        wanted = turned(body, at.yaw)
+        x, y = _shortened(wanted.x, wanted.y, limits.speed)
+        change_x, change_y = _shortened(x - self.told.x, y - self.told.y, limits.acceleration * dt)
+        rate = _within(wanted.yaw, limits.yaw_rate)
+        rate = self.told.yaw + _within(rate - self.told.yaw, limits.yaw_acceleration * dt)
+        free = Velocity(self.told.x + change_x, self.told.y + change_y, rate)
+        self.told = self._before_the_edge(free, at, LATENCY + 4 * dt)
+        self.cut += self.told != free
+        return self.told
+
+    def halt(self) -> None:
+        """The rig was told to stop."""
+        self.told = Velocity()
+
+    def _before_the_edge(self, v: Velocity, at: Position, lag: float) -> Velocity:
+        low, high, limits = self.limits.low, self.limits.high, self.limits
+        return Velocity(
+            _edged(v.x, at.x - low.x, high.x - at.x, limits.acceleration, lag),
+            _edged(v.y, at.y - low.y, high.y - at.y, limits.acceleration, lag),
+            _edged(v.yaw, at.yaw - low.yaw, high.yaw - at.yaw, limits.yaw_acceleration, lag),
+        )
+
+
+def _within(value: float, bound: float) -> float:
+    return max(-bound, min(bound, value))
+
+
+def _shortened(x: float, y: float, longest: float) -> tuple[float, float]:
+    length = math.hypot(x, y)
+    return (x, y) if length <= longest else (x * longest / length, y * longest / length)
+
+
+def _edged(v: float, below: float, above: float, acceleration: float, lag: float) -> float:
+    return max(-_braking_speed(below, acceleration, lag), min(_braking_speed(above, acceleration, lag), v))
+
+
+def _braking_speed(room: float, acceleration: float, lag: float) -> float:
+    """The speed from which the rig stops within ``room`` after ``lag`` s: v lag + v^2 / 2a = room."""
+    if room <= 0:
+        return 0.0
+    lost = acceleration * lag
+    return math.sqrt(lost * lost + 2 * acceleration * room) - lost

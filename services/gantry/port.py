@@ -1,0 +1,102 @@
+"""The serial port to the rig's Arduino."""
+
+import contextlib
+import os
+import re
+import select
+import termios
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
+
+import serial
+
+from services.gantry.protocol import BAUD
+
+WRITE_PATIENCE = 0.2
+
+_SOCKET = re.compile(r"socket://(127\.0\.0\.1|localhost|\[::1\]):[0-9]{1,5}")
+
+
+class PortError(ValueError):
+    """A port that is not opened; one sentence."""
+
+
+class Port(Protocol):
+    """A line of bytes; both raise OSError when it is lost."""
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes."""
+        ...
+
+    def read(self, timeout: float) -> bytes:
+        """What is there, or what comes first within ``timeout`` seconds; empty when nothing does."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the port."""
+        ...
+
+
+class SerialPort:
+    """A port of pyserial's that never waits for longer than it was asked to."""
+
+    def __init__(self, target: str) -> None:
+        """``target`` is a device, or a socket of this machine; raises OSError when it cannot be opened."""
+        exclusive = None if _SOCKET.fullmatch(target) else True
+        try:
+            self._port = serial.serial_for_url(
+                target, BAUD, timeout=0, write_timeout=WRITE_PATIENCE, exclusive=exclusive
+            )
+        except termios.error as error:
+            raise OSError(f"{target} is no serial port: {error.args[-1]}") from None
+        _stay_up(self._port)
+
+    def write(self, data: bytes) -> None:
+        with _as_os_errors():
+            self._port.write(data)
+
+    def read(self, timeout: float) -> bytes:
+        with _as_os_errors():
+            if not select.select([self._port.fileno()], [], [], max(timeout, 0.0))[0]:
+                return b""
+            return bytes(self._port.read(max(1, self._port.in_waiting)))
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError, termios.error):
+            self._port.close()
+
+
+def checked(target: str) -> str:
+    """A target that may be opened: a device, or a socket of this machine; raises PortError.
+
+    Other kinds of pyserial's are refused, as some of them write files or listen.
+    """
+    if target == "emulated":
+        raise PortError("the emulated rig gives its port when it runs; name that port, such as /dev/pts/3")
+    if "://" in target:
+        if _SOCKET.fullmatch(target):
+            return target
+        raise PortError(f"'{target}' is no port of the rig, expected a device or socket://127.0.0.1:PORT")
+    if not target.startswith("/") or not os.path.realpath(target).startswith("/dev/"):
+        raise PortError(f"'{target}' is no device, expected one such as /dev/ttyACM0")
+    if not Path(target).is_char_device():
+        raise PortError(f"there is no serial port {target}; is the rig plugged in?")
+    return target
+
+
+@contextlib.contextmanager
+def _as_os_errors() -> Iterator[None]:
+    """What a port raises that went away, as OSError."""
+    try:
+        yield
+    except (termios.error, TypeError, ValueError) as error:
+        raise OSError(f"the port is gone: {error}") from None
+
+
+def _stay_up(port: serial.SerialBase) -> None:
+    """Keep DTR up when the port is closed: its fall and rise would reset the Arduino, which forgets where it is."""
+    with contextlib.suppress(OSError, termios.error, AttributeError, ValueError):
+        attributes = termios.tcgetattr(port.fileno())
+        attributes[2] &= ~termios.HUPCL
+        termios.tcsetattr(port.fileno(), termios.TCSANOW, attributes)

@@ -1,0 +1,111 @@
+"""The rig's serial protocol (Table 4.1): ``$COMMAND:ARG1,ARG2,...`` out, ``$ARG1,ARG2,...`` back, a line each.
+
+Numbers are in SI units and radians. Answers do not say to what: three numbers are POSITION's, one is STATUS's.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+BAUD = 115_200
+LONGEST = 96
+"""Bytes of the longest line that can be an answer."""
+FARTHEST = 10.0
+"""A position farther from the middle (m, rad) was garbled on the line."""
+
+_NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{1,9})?(?:[eE][-+]?[0-9]{1,2})?"
+_ANSWER = re.compile(rf"\$(?P<numbers>{_NUMBER}(?:,{_NUMBER}){{0,3}})\r?")
+
+
+class Word(StrEnum):
+    """The commands."""
+
+    GOTO = "GOTO"
+    RUN = "RUN"
+    STOP = "STOP"
+    CALIBRATE = "CALIBRATE"
+    POSITION = "POSITION"
+    STATUS = "STATUS"
+
+
+class Status(IntEnum):
+    """What the rig says of itself."""
+
+    IDLE = 0
+    MOVING = 1
+    HOMING = 2
+    LIMIT = 3
+    STALL = 4
+    HOT = 5
+    NOT_CALIBRATED = 6
+    WATCHDOG = 7
+    FAULT = 8
+
+
+SENTENCES = {
+    Status.LIMIT: "touched a limit switch and stopped",
+    Status.STALL: "lost steps, as a motor stalled",
+    Status.HOT: "has a motor driver that is too hot",
+    Status.NOT_CALIBRATED: "is not calibrated and does not know where it is",
+    Status.WATCHDOG: "heard nothing for 500 ms and braked by itself",
+    Status.FAULT: "reports a fault",
+}
+"""What a status means that ends a test, with the rig as subject."""
+
+
+@dataclass(frozen=True)
+class Position:
+    """Where the rig measures itself to be: m from the middle, forward and to the left, and rad from forward."""
+
+    x: float
+    y: float
+    yaw: float
+
+
+Answer = Position | Status
+
+
+def command(word: Word, *arguments: float) -> bytes:
+    """A command as its line; numbers have four decimals. Raises ValueError for one that is not finite."""
+    if not all(map(math.isfinite, arguments)):
+        raise ValueError(f"{word} takes finite numbers, not {', '.join(map(str, arguments))}")
+    numbers = ",".join(f"{round(a, 4) + 0.0:.4f}" for a in arguments)
+    return (f"${word}:{numbers}\n" if arguments else f"${word}\n").encode("ascii")
+
+
+def answer(line: str) -> Answer | None:
+    """What a line without its end says; None for one that is no answer."""
+    match = _ANSWER.fullmatch(line)
+    if match is None:
+        return None
+    numbers = [float(text) for text in match["numbers"].split(",")]
+    if len(numbers) == 3 and max(map(abs, numbers)) <= FARTHEST:
+        return Position(*numbers)
+    if len(numbers) == 1 and match["numbers"] in {str(int(status)) for status in Status}:
+        return Status(int(numbers[0]))
+    return None
+
+
+class Lines:
+    """Bytes as they come, put together to answers; what is none is counted in ``garbage``."""
+
+    def __init__(self) -> None:
+        self.garbage = 0
+        self._rest = b""
+        self._overlong = False
+
+    def feed(self, data: bytes) -> list[Answer]:
+        """The answers that these bytes complete; of a line only what begins with its last ``$`` counts."""
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        found = [self._answer(line) for line in lines]
+        if len(self._rest) > LONGEST:
+            self._rest, self._overlong = b"", True
+        return [one for one in found if one is not None]
+
+    def _answer(self, line: bytes) -> Answer | None:
+        overlong, self._overlong = self._overlong or len(line) > LONGEST, False
+        begin = max(line.rfind(b"$"), 0)
+        found = None if overlong else answer(line[begin:].decode("ascii", "replace"))
+        self.garbage += found is None and bool(line.strip())
+        return found

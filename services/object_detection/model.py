@@ -1,0 +1,156 @@
+"""The judge of a perception: the application's boxes against the true ones, frame by frame."""
+
+from collections.abc import Callable, Sequence
+
+from services.base import Verdict
+from services.object_detection.boxes import Box, Thing
+from services.object_detection.frames import Frame, Mark, Parts, Value
+from services.object_detection.score import Limits, Rules, Score
+from services.object_detection.sentences import verdict
+from services.object_detection.tally import compare
+from services.object_detection.truth import Truth
+
+MICROSECONDS = 1_000_000
+
+
+class UnjudgeableError(Exception):
+    """There is nothing to judge the application by: the test itself is at fault."""
+
+
+class Judge:
+    """Hears detections, and the truth where `truth` is None, in test time (microseconds) until `verdict` is there.
+
+    Time 0 is the first of `begin` and `update`; what came before `begin` is forgotten. A frame is forgotten as soon as
+    it is judged, but for its sample time.
+    """
+
+    def __init__(self, truth: Truth | None, rules: Rules, limits: Limits) -> None:
+        self.verdict: Verdict | None = None
+        self._truth, self._rules, self._limits = truth, rules, limits
+        self._score = Score()
+        self._frames: dict[int, Frame] = {}
+        self._judged: set[int] = set()
+        self._passed_over: set[int] = set()
+        self._pictures = set(truth.pictures) if truth else set[int]()
+        self._now = 0
+        self._zero: int | None = None
+        self._over: int | None = None
+        self._last = -1
+        self._begun = self._heard_truth = False
+
+    def begin(self, now: int) -> None:
+        """The test begins; only the first call counts."""
+        if self._begun:
+            return
+        self._begun, self._zero, self._now = True, now, max(now, self._now)
+        self._score = Score()
+        self._passed_over |= self._judged
+        self._judged.clear()
+        for frame in self._frames.values():
+            self._pass_over(frame.mark)
+        self._frames.clear()
+
+    def detect(self, mark: Mark, number: int, value: Value) -> None:
+        """The application said something of its detection `number` in a frame."""
+        self._hear(mark, number, value, lambda frame: frame.found)
+
+    def reveal(self, mark: Mark, number: int, value: Value) -> None:
+        """The truth about object `number` in a frame."""
+        self._heard_truth = True
+        self._hear(mark, number, value, lambda frame: frame.true)
+
+    def announce(self, mark: Mark, by_application: bool) -> None:
+        """There is such a frame; by the application: it has answered it."""
+        frame = self._frame(mark)
+        if frame is not None:
+            frame.answered |= by_application
+            frame.told |= not by_application
+
+    def update(self, now: int) -> None:
+        """Judge the frames whose time is over, and give the verdict when the test's is; may raise UnjudgeableError."""
+        self._now = now
+        if self.verdict is not None:
+            return
+        self._settle(lambda frame: now - frame.since >= self._rules.max_delay * MICROSECONDS)
+        if self._over is not None:
+            if now - self._over >= self._rules.max_delay * MICROSECONDS:
+                self._finish(f"before the input ended after {self._seconds(self._over):.2f} s")
+        elif self._seconds(now) > self._rules.max_time:
+            self._decide(f"within {self._rules.max_time:.2f} s")
+
+    def end(self, now: int) -> None:
+        """Nothing more will come but answers: the verdict follows after `max_delay`; may raise UnjudgeableError."""
+        if self._over is None and self.verdict is None:
+            self._over = now
+            self.update(now)
+
+    def _seconds(self, time: int) -> float:
+        if self._zero is None:
+            self._zero = time
+        return (time - self._zero) / MICROSECONDS
+
+    def _hear(self, mark: Mark, number: int, value: Value, side: Callable[[Frame], Parts]) -> None:
+        frame = self._frame(mark)
+        if frame is not None:
+            parts = side(frame)
+            parts.add(number, value)
+            frame.answered |= parts is frame.found
+        elif mark.time in self._judged and isinstance(value, Box):
+            self._score.late += 1
+
+    def _frame(self, mark: Mark) -> Frame | None:
+        """The frame that a message is about; None for one that is judged already, or does not count."""
+        frame = self._frames.get(mark.time)
+        if frame is not None or mark.time in self._judged or mark.time in self._passed_over:
+            return frame
+        if self._zero is not None and self._seconds(self._now) < self._rules.start:
+            self._pass_over(mark)
+            return None
+        return self._frames.setdefault(mark.time, Frame(mark, self._now))
+
+    def _pass_over(self, mark: Mark) -> None:
+        self._passed_over.add(mark.time)
+        if self._truth is not None and self._truth.frames != "one":
+            self._pictures.discard(self._truth.key(mark))
+
+    def _settle(self, due: Callable[[Frame], bool]) -> None:
+        for frame in [frame for frame in self._frames.values() if due(frame)]:
+            del self._frames[frame.mark.time]
+            self._judged.add(frame.mark.time)
+            self._judge(frame)
+
+    def _judge(self, frame: Frame) -> None:
+        true = self._true(frame)
+        self._score.repeated += frame.found.repeated
+        if true is None:
+            self._score.without_truth += 1
+            return
+        tallies = compare(frame.found.things(), true, self._rules.iou, self._rules.labels)
+        self._score.add(tallies, f"at {self._seconds(frame.since):.2f} s", frame.answered)
+
+    def _true(self, frame: Frame) -> Sequence[Thing] | None:
+        """What is in a frame; each picture of a file is there for one frame, unless there is one for all."""
+        if self._truth is None:
+            return frame.true.things() if frame.true or frame.told else None
+        key = self._truth.key(frame.mark)
+        if key not in self._pictures:
+            return None
+        if self._truth.frames != "one":
+            self._pictures.remove(key)
+            self._last = max(self._last, key)
+        return self._truth.pictures[key]
+
+    def _finish(self, during: str) -> None:
+        """All has been heard: the frames that are left count as they are."""
+        self._settle(lambda frame: True)
+        self._decide(during, all_pictures=True)
+
+    def _decide(self, during: str, all_pictures: bool = False) -> None:
+        """Judge also the pictures that the application never spoke of, up to the last of which it did, or all."""
+        if self._truth is None and not self._heard_truth:
+            raise UnjudgeableError(f"no true box came {during}")
+        for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
+            if self._truth and (all_pictures or key < self._last):
+                tallies = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
+                self._score.add(tallies, f"of picture {key}", False)
+        self.verdict = verdict(self._score, self._limits, during)

@@ -1,0 +1,110 @@
+"""How frames are judged, what is counted over all of them, and the checks made of it."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+
+from services.base import Check
+from services.object_detection.tally import Tallies, Tally
+
+MEASURES = ("precision", "recall", "f1")
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How frames are judged: overlap needed, classes that count (all when empty), and times in seconds.
+
+    Frames from before `start` do not count. A frame is judged `max_delay` after it was first heard of.
+    """
+
+    iou: float
+    labels: Collection[str]
+    max_delay: float
+    max_time: float
+    start: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The least that is asked, None where nothing is; `each_class` asks it of every class, too."""
+
+    precision: float | None = None
+    recall: float | None = None
+    f1: float | None = None
+    frames: int = 1
+    each_class: bool = False
+
+    def of(self, measure: str) -> float | None:
+        """The limit of one of MEASURES."""
+        limit: float | None = getattr(self, measure)
+        return limit
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The frame with the most mistakes, where it was, and what was wrong."""
+
+    place: str
+    tally: Tally
+
+    @property
+    def mistakes(self) -> int:
+        """False and missed ones together."""
+        return self.tally.false + self.tally.missed
+
+
+@dataclass
+class Score:
+    """Tallies of the judged frames, and what was left out.
+
+    `answered` of the `frames` had a word of the application. Detections may have been without a truth, late, or under
+    a detectionId that was taken.
+    """
+
+    tallies: Tallies = field(default_factory=Tallies)
+    frames: int = 0
+    answered: int = 0
+    without_truth: int = 0
+    late: int = 0
+    repeated: int = 0
+    worst: Worst | None = None
+
+    def add(self, tallies: Tallies, place: str, answered: bool) -> None:
+        """One more frame; `place` says which."""
+        self.frames += 1
+        self.answered += answered
+        for label, tally in tallies:
+            self.tallies.add(label, tally)
+        worst = Worst(place, tallies.total())
+        if worst.mistakes > (self.worst.mistakes if self.worst else 0):
+            self.worst = worst
+
+    def checks(self, limits: Limits) -> tuple[Check, ...]:
+        """Totals, what was counted, and a line of measures for each class; a measure without a value keeps no limit."""
+        total = self.tallies.total()
+        counts = {
+            "true-positives": total.hits,
+            "false-positives": total.false,
+            "false-negatives": total.missed,
+            "mean-iou": total.mean_overlap,
+            "frames": self.frames,
+        }
+        left_out = {"without-truth": self.without_truth, "late": self.late, "repeated": self.repeated}
+        return (
+            *(_check(name, getattr(total, name), limits.of(name)) for name in MEASURES),
+            *(Check(name, value) for name, value in counts.items()),
+            _check("answered", self.answered, limits.frames),
+            *(Check(name, value) for name, value in left_out.items()),
+            *self._classes(limits),
+        )
+
+    def _classes(self, limits: Limits) -> Iterator[Check]:
+        for label, tally in self.tallies:
+            for name in MEASURES:
+                limit = limits.of(name) if limits.each_class else None
+                yield _check(f"{name}-{label or 'unnamed'}", getattr(tally, name), limit)
+
+
+def _check(name: str, value: float | None, least: float | None) -> Check:
+    if least is None:
+        return Check(name, value)
+    return Check(name, value, {"min": least}, "", value is not None and value >= least)

@@ -1,0 +1,78 @@
+"""The verdict on a perception in one sentence."""
+
+from services.base import Check, Verdict
+from services.object_detection.score import MEASURES, Limits, Score
+
+
+def verdict(score: Score, limits: Limits, during: str) -> Verdict:
+    """Passed when every limit is kept; `during` says until when was heard."""
+    checks = score.checks(limits)
+    if not score.answered:
+        return Verdict("failed", _silence(score, during), checks)
+    faults = [_fault(check, score) for check in checks if not check.ok]
+    if faults:
+        return Verdict("failed", "; ".join(faults) + _worst(score) + _aside(score), checks)
+    total = score.tallies.total()
+    told = ", ".join(
+        f"{check.name} {_number(check)} ({_bound(check)})" for check in checks[: len(MEASURES)] if check.limit
+    )
+    found = f"found {total.hits} of {total.hits + total.missed} objects in {_count(score.frames, 'frame')}"
+    return Verdict("passed", f"{found}, with {_count(total.false, 'false detection')}: {told}{_aside(score)}", checks)
+
+
+def _silence(score: Score, during: str) -> str:
+    if not score.without_truth:
+        return f"no detection came {during}" + (f", in {_count(score.frames, 'frame')}" if score.frames else "")
+    others = _count(score.without_truth, "frame")
+    return f"there is no truth for any of {others} with detections: is their sample time that of the picture?"
+
+
+def _fault(check: Check, score: Score) -> str:
+    bound = _bound(check)
+    if check.name == "answered":
+        return f"only {_count(score.answered, 'frame')} had an answer ({bound})"
+    measure, _, label = check.name.partition("-")
+    name = f"{'F1' if measure == 'f1' else measure}{f' of {label}' if label else ''}"
+    if check.value is None:
+        return f"{name} has no value ({bound}), as {_nothing(measure)}"
+    tally = dict(score.tallies)["" if label == "unnamed" else label] if label else score.tallies.total()
+    wrong = {"precision": _count(tally.false, "false detection"), "recall": f"{tally.missed} missed"}
+    both = f"{wrong['precision']} and {wrong['recall']}"
+    return f"{name} is {_number(check)} ({bound}), with {wrong.get(measure, both)} beside {tally.hits} found"
+
+
+def _nothing(measure: str) -> str:
+    return {"precision": "nothing was detected", "recall": "there was nothing to detect"}.get(
+        measure, "there was nothing"
+    )
+
+
+def _worst(score: Score) -> str:
+    if score.worst is None:
+        return ""
+    tally = score.worst.tally
+    return f"; worst was the frame {score.worst.place}, with {tally.false} false and {tally.missed} missed"
+
+
+def _aside(score: Score) -> str:
+    notes = [
+        f"{_count(score.without_truth, 'frame')} without a truth" if score.without_truth else "",
+        f"{_count(score.late, 'detection')} too late" if score.late else "",
+        f"{_count(score.repeated, 'detection')} under a detectionId that was taken" if score.repeated else "",
+    ]
+    told = ", ".join(note for note in notes if note)
+    return f"; left out: {told}" if told else ""
+
+
+def _bound(check: Check) -> str:
+    return f"at least {check.limit['min']:.4g}"
+
+
+def _number(check: Check) -> str:
+    """In full where rounding would make it look as if it kept its limit."""
+    short = f"{check.value:.4g}"
+    return str(check.value) if not check.ok and short == f"{check.limit['min']:.4g}" else short
+
+
+def _count(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -1,0 +1,101 @@
+"""The judge of a perception on the bus."""
+
+import difflib
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from google.protobuf.message import Message
+
+from services.base import Context, Flags, Handler, Output, Service
+from services.object_detection.boxes import Box
+from services.object_detection.frames import Kind, Mark, Value
+from services.object_detection.model import Judge
+from services.object_detection.score import MEASURES, Limits, Rules
+from services.object_detection.truth import Truth, TruthError, load
+
+LOGIC = "opendlv.logic.perception.Detection"
+ANNOUNCEMENT = "opendlv.proxy.ImageReadingShm"
+
+Hear = Callable[[Mark, int, Value], None]
+
+VALUES: dict[str, Callable[[Any], Value]] = {
+    "BoundingBox": lambda message: Box(message.x, message.y, message.width, message.height),
+    "Property": lambda message: str(message.property),
+    "Type": lambda message: Kind(message.type),
+}
+
+
+class ObjectDetection(Service):
+    """Hears detections, truth and announcements of frames, each under its sender stamp."""
+
+    def __init__(self, context: Context) -> None:
+        flags = context.flags
+        truth = _truth(flags)
+        self.judge = Judge(truth, _rules(flags), _limits(flags))
+        self._sender = flags["sender"]
+        self.inputs: dict[tuple[str, int | None], Handler] = _handlers(flags["sender"], self.judge.detect)
+        if truth is None:
+            self.inputs |= _handlers(flags["truth-sender"], self.judge.reveal)
+        if flags["frame-sender"] is not None:
+            self.inputs[ANNOUNCEMENT, flags["frame-sender"]] = self._announced
+
+    def begin(self, now: int) -> None:
+        self.judge.begin(now)
+
+    def update(self, now: int) -> Iterable[Message | Output]:
+        self.judge.update(now)
+        self.verdict = self.judge.verdict
+        return ()
+
+    def end_of_input(self, now: int) -> None:
+        self.judge.end(now)
+        self.verdict = self.judge.verdict
+
+    def _announced(self, message: Any, sample_time: int) -> None:
+        by_application = (ANNOUNCEMENT, self._sender) in self.inputs
+        self.judge.announce(Mark(sample_time, message.sampleId), by_application)
+
+
+def build(context: Context) -> Service:
+    """The service from its flags; raises ValueError for what they leave open."""
+    return ObjectDetection(context)
+
+
+def _handlers(sender: int, hear: Hear) -> dict[tuple[str, int | None], Handler]:
+    return {(LOGIC + name, sender): _handler(value, hear) for name, value in VALUES.items()}
+
+
+def _handler(value: Callable[[Any], Value], hear: Hear) -> Handler:
+    return lambda message, time: hear(Mark(time, message.sampleId), message.detectionId, value(message))
+
+
+def _truth(flags: Flags) -> Truth | None:
+    """The truth from its file, None for one that comes live."""
+    path, sender, classes = flags["truth"], flags["truth-sender"], flags["classes"]
+    if (path is None) == (sender is None):
+        raise ValueError("give the true boxes either as a file, --truth, or as messages, --truth-sender")
+    if sender == flags["sender"]:
+        raise ValueError(f"--truth-sender={sender} is the --sender of the detections")
+    if path is None:
+        return None
+    truth = load(Path(path), flags["truth-frames"])
+    for name in classes:
+        if name not in truth.labels():
+            close = difflib.get_close_matches(name, truth.labels(), n=1)
+            hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(truth.labels())}"
+            raise TruthError(f"--classes: {path} has no box of class '{name}'; {hint}")
+    return truth
+
+
+def _rules(flags: Flags) -> Rules:
+    if flags["from"] + flags["max-delay"] >= flags["max-time"]:
+        raise ValueError("no frame could be judged: --max-time has to be longer than --from and --max-delay together")
+    return Rules(flags["iou"], flags["classes"], flags["max-delay"], flags["max-time"], flags["from"])
+
+
+def _limits(flags: Flags) -> Limits:
+    precision, recall, f1 = (flags[f"min-{name}"] for name in MEASURES)
+    if precision is recall is f1 is None:
+        raise ValueError("there is no limit to judge by: give one or more of --min-precision, --min-recall, --min-f1")
+    return Limits(precision, recall, f1, flags["min-frames"], flags["each-class"])

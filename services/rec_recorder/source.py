@@ -1,0 +1,146 @@
+"""Memories as the recorder is told of them, and the pictures that it takes from one without standing in line."""
+
+import logging
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
+
+RETRY = 200_000
+PATIENCE = 0.05
+COMMON_SIZES = (
+    (320, 240), (640, 360), (640, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024),
+    (1640, 1232), (1920, 1080), (2592, 1944), (3280, 2464),
+)  # fmt: skip
+HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3}  # twice the bytes a pixel
+
+_WRITTEN = re.compile(r"(?P<name>[^:]+)(:(?P<width>[1-9][0-9]{0,4})x(?P<height>[1-9][0-9]{0,4}))?")
+_log = logging.getLogger(__name__)
+
+
+class SourceError(ValueError):
+    """A memory that is written wrongly or holds no picture; one sentence."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A memory to record, and the size of its pictures where it is known (else 0 x 0)."""
+
+    name: str
+    width: int = 0
+    height: int = 0
+
+    def layout(self, size: int) -> tuple[str, int, int]:
+        """Format, width and height of the pictures in a memory of `size` bytes; raises SourceError."""
+        if self.width:
+            for kind, half in HALF_BYTES.items():
+                if self.width * self.height * half // 2 == size:
+                    return kind, self.width, self.height
+            text = f"which is no picture of {self.width} x {self.height} pixels"
+            raise SourceError(f"memory '{self.name}' has {size} bytes, {text}")
+        kinds = sorted(HALF_BYTES, key=lambda kind: kind not in self.name)  # a name that tells its format counts
+        for kind in kinds:
+            for width, height in COMMON_SIZES:
+                if width * height * HALF_BYTES[kind] // 2 == size:
+                    _log.info("memory '%s' is taken for %d x %d pixels of %s", self.name, width, height, kind)
+                    return kind, width, height
+        raise SourceError(f"memory '{self.name}' has {size} bytes, of no usual size: write {self.name}:WIDTHxHEIGHT")
+
+
+def parse(text: str) -> Wanted:
+    """`name` or `name:640x480`; raises SourceError."""
+    match = _WRITTEN.fullmatch(text)
+    if match is None:
+        raise SourceError(
+            f"'{text}' is no memory to record, expected a name such as video0.i420 or video0.i420:640x480"
+        )
+    return Wanted(match["name"], int(match["width"] or 0), int(match["height"] or 0))
+
+
+class Source:
+    """The newest picture of a memory, at most one each `period` microseconds of its own sample times.
+
+    It looks at the memory and never waits for a notification: a camera that counts its readers does not see it.
+    What was in the memory when it was found is left, as it may be no picture yet.
+    """
+
+    def __init__(self, wanted: Wanted, period: int, attach: Callable[[str], SharedMemory] | None = None) -> None:
+        self.wanted = wanted
+        self._period = period
+        self._attach = attach or SharedMemory.attach
+        self._memory: SharedMemory | None = None
+        self._retry = 0
+        self._last = 0
+        self._due: int | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes of the memory, 0 while there is none."""
+        return self._memory.size if self._memory else 0
+
+    def take(self, now: int) -> tuple[bytes, int] | None:
+        """The bytes and the sample time of a picture that is due and was not taken yet."""
+        try:
+            if self._memory is None and not self._found(now):
+                return None
+            assert self._memory is not None
+            with self._memory.lock(PATIENCE):
+                time = self._memory.sample_time()
+                return (bytes(self._memory.buffer), time) if self._is_due(time) else None
+        except SharedMemoryError as error:
+            _log.debug("no picture of '%s': %s", self.wanted.name, error)
+            if not self._is_there():
+                self.close()
+                self._retry = now + RETRY
+            return None
+
+    def skip(self) -> None:
+        """Leave the picture that is there now."""
+        if self._memory is not None:
+            with suppress(SharedMemoryError), self._memory.lock(PATIENCE):
+                self._last, self._due = self._memory.sample_time(), None
+
+    def close(self) -> None:
+        """Let go of the memory."""
+        if self._memory is not None:
+            self._memory.close()
+            self._memory = None
+
+    def _is_there(self) -> bool:
+        """Whether the memory was only locked for long, and not removed."""
+        if self._memory is None:
+            return False
+        try:
+            self._memory.readers_waiting()
+        except SharedMemoryError:
+            return False
+        return True
+
+    def _found(self, now: int) -> bool:
+        if now < self._retry:
+            return False
+        memory = self._attach(self.wanted.name)
+        try:
+            with memory.lock(PATIENCE):
+                self._last, self._due = memory.sample_time(), None
+        except SharedMemoryError:
+            memory.close()
+            raise
+        self._memory = memory
+        return True
+
+    def _is_due(self, time: int) -> bool:
+        """Pictures are taken on a grid of times, a tenth of the period early at most; it starts anew after a jump."""
+        if time == self._last:
+            return False
+        jumped = self._due is None or time < self._last or time - self._due > 10 * self._period
+        self._last = time
+        due = time if jumped or self._due is None else self._due
+        if time < due - self._period // 10:
+            return False
+        while due <= time + self._period // 10:
+            due += self._period
+        self._due = due
+        return True

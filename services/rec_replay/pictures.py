@@ -1,0 +1,118 @@
+"""Recorded pictures, decoded and put into shared memory."""
+
+import logging
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dodo_dsl.opendlv.codec import MessageError
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.varints import Numbers
+from dodo_dsl.opendlv.video import Frame, VideoDecoder, VideoError, has_key_frame
+from services.rec_replay.selection import IMAGE
+
+FARTHEST = 3000
+"""Pictures that are looked at for one that stands alone, before a place in the recording."""
+
+_log = logging.getLogger(__name__)
+
+
+class Picture(NamedTuple):
+    """A picture as B, G, R, A (height, width, 4) and as I420 (height * 3 / 2, width; None for odd sizes)."""
+
+    argb: NDArray[np.uint8]
+    i420: NDArray[np.uint8] | None
+
+
+class Decoder:
+    """Decodes one camera's ImageReading messages in their order; `undecoded` counts those that gave no picture."""
+
+    def __init__(self) -> None:
+        self.undecoded = 0
+        self._messages = MessageSet.standard()
+        self._format = ""
+        self._codec: VideoDecoder | None = None
+
+    def restart(self) -> None:
+        """What comes next does not follow on what came before."""
+        self._codec = None
+
+    def frame(self, envelope: Envelope) -> Frame | None:
+        """The picture of a message; raises VideoError for a format that is not known."""
+        image = self._image(envelope)
+        frame = None
+        if image is not None:
+            if self._codec is None or image.format != self._format:
+                self._codec, self._format = VideoDecoder(image.format), image.format
+            frame = self._codec.decode(image.data)
+        self.undecoded += frame is None
+        return frame
+
+    def stands_alone(self, envelope: Envelope) -> bool:
+        """Whether decoding can begin here."""
+        image = self._image(envelope)
+        return image is not None and has_key_frame(image.data)
+
+    def _image(self, envelope: Envelope) -> Any:
+        """Set 0.9 has the same fields under other names."""
+        try:
+            return self._messages.decode(IMAGE, envelope.payload)
+        except MessageError:
+            return None
+
+
+def pixels(frame: Frame) -> Picture:
+    """The picture in both formats of a camera."""
+    even = frame.width % 2 == 0 and frame.height % 2 == 0
+    return Picture(frame.pixels("argb"), frame.pixels("i420") if even else None)
+
+
+def first_frame(recording: Recording, rows: Numbers) -> Frame:
+    """The first picture of the rows that can be decoded; raises VideoError where none can."""
+    decoder = Decoder()
+    for envelope in recording.envelopes(rows):
+        frame = decoder.frame(envelope)
+        if frame is not None:
+            return frame
+    raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded")
+
+
+def lead_in(recording: Recording, rows: Numbers, before: int) -> Iterator[Envelope]:
+    """The messages to decode first so that row number `before` of the rows can be: from the last that stands alone."""
+    decoder, first = Decoder(), max(0, before - FARTHEST)
+    for number in range(before, first - 1, -1):
+        if number < len(rows) and decoder.stands_alone(recording.envelope(int(rows[number]))):
+            yield from recording.envelopes(rows[number:before])
+            return
+    yield from recording.envelopes(rows[first:before])
+
+
+class Screen:
+    """The memories of the pictures: each is copied and stamped under the lock, then told.
+
+    A picture of another size than the first is left out, and counted in `misfits`.
+    """
+
+    def __init__(self, argb: SharedMemory, i420: SharedMemory | None) -> None:
+        self.shown = self.misfits = 0
+        self._argb, self._i420 = argb, i420
+
+    def show(self, picture: Picture, sample_time: int) -> None:
+        """Publish a picture; raises SharedMemoryError when a reader keeps the lock."""
+        if picture.argb.nbytes != self._argb.size:
+            if not self.misfits:
+                _log.warning("the picture of %d us has another size than the first and is left out", sample_time)
+            self.misfits += 1
+            return
+        for memory, array in ((self._argb, picture.argb), (self._i420, picture.i420)):
+            if memory is not None and array is not None:
+                with memory.lock():
+                    memory.buffer[: array.nbytes] = np.ascontiguousarray(array).data.cast("B")
+                    memory.stamp(sample_time)
+                    memory.notify_all()
+        self.shown += 1

@@ -1,0 +1,100 @@
+"""What of a recording is played: a stretch of time, some messages, and the pictures of one camera."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dodo_dsl.opendlv.messages import OWN_IDS, MessageSet, UnknownMessage
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.varints import Marks, Numbers
+
+IMAGE = 1055
+MICROSECONDS = 1_000_000
+
+
+class SelectionError(ValueError):
+    """A selection that is written wrongly, or with which nothing is played; one sentence."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Seconds count from the recording's first message; `messages` and `without` name messages on the bus.
+
+    Of pictures (ImageReading) those of `video_sender` are shown, unless that is None; on the bus they come only
+    where `send_video` says so. DoDo's own messages of an earlier test are never sent.
+    """
+
+    start: float = 0.0
+    end: float | None = None
+    messages: Sequence[str] = ()
+    without: Sequence[str] = ()
+    video_sender: int | None = 0
+    send_video: bool = False
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows of a recording in the order in which they are played: when (microseconds from the start), and how.
+
+    `shown` marks the pictures for the memory, `sent` the messages for the bus; each row is one of them or both.
+    """
+
+    rows: Numbers
+    due: Numbers
+    sent: Marks
+    shown: Marks
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+def select(recording: Recording, selection: Selection, known: MessageSet, max_gap: int, timemod: float = 1.0) -> Part:
+    """The part that is played, ordered by sample times; raises SelectionError.
+
+    Gaps are those between neighbours of the whole stretch, whatever of it is chosen, none larger than `max_gap`
+    (microseconds); then all of it goes `timemod` times faster.
+    """
+    stretch = recording.by_time(_stretch(recording, selection))
+    index = recording.index[stretch]
+    gaps = np.diff(index["sampled"], prepend=index["sampled"][:1])
+    due = np.rint(np.cumsum(np.minimum(gaps, max_gap)) / timemod).astype(np.int64)
+    images = index["data_type"] == IMAGE
+    own = np.isin(index["data_type"], list(OWN_IDS))
+    sent = ~own & ~(images & (not selection.send_video)) & ~_named(index, selection.without, known)
+    if selection.messages:
+        sent &= _named(index, selection.messages, known)
+    shown = images & (index["sender_stamp"] == selection.video_sender)
+    chosen = np.flatnonzero(sent | shown)
+    if not len(chosen):
+        raise SelectionError(f"nothing of {recording.path} is played: the part that is chosen holds no message")
+    return Part(stretch[chosen], due[chosen], sent[chosen], shown[chosen])
+
+
+def _stretch(recording: Recording, selection: Selection) -> Numbers:
+    times = recording.index["time"]
+    valid = times[times > 0]
+    begin = int(valid.min()) if len(valid) else 0
+    # a part may begin anywhere; the whole has what bears no time, too
+    start = begin + round(selection.start * MICROSECONDS) if selection.start else None
+    end = None if selection.end is None else begin + round(selection.end * MICROSECONDS)
+    return recording.rows(start=start, end=end)
+
+
+def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:
+    marks: Marks = np.zeros(len(index), np.bool_)
+    for text in texts:
+        id_, stamp = _parsed(text, known)
+        marks |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
+    return marks
+
+
+def _parsed(text: str, known: MessageSet) -> tuple[int, int | None]:
+    name, slash, stamp = text.partition("/")
+    if slash and not stamp.isdecimal():
+        raise SelectionError(f"'{text}' is no message: after the slash stands a sender stamp, a number")
+    try:
+        id_ = int(name) if name.isdecimal() else known.id(name)
+    except UnknownMessage as error:
+        raise SelectionError(f"{error}, nor an id") from None
+    return id_, int(stamp) if slash else None

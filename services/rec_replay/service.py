@@ -1,0 +1,165 @@
+"""The player on the bus."""
+
+import logging
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dodo_dsl.opendlv import message_sets
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import Recording
+from services.base import Context, Service
+from services.base.service import Output, period_of
+from services.rec_replay.pictures import Screen, first_frame
+from services.rec_replay.player import Player
+from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Selection, SelectionError, select
+from services.rec_replay.stream import Stream
+
+LOOKS_HZ = 1000.0
+LARGEST_PAYLOAD = 65_400
+STATUS_PERIOD = MICROSECONDS
+COMMAND, STATUS = "cluon.data.PlayerCommand", "cluon.data.PlayerStatus"
+_PLAYING = 2
+
+_log = logging.getLogger(__name__)
+
+
+class Replay(Service):
+    """Sends what is due and shows pictures; when all has been played, the input ends `settle` microseconds later.
+
+    ``shifts`` gives messages and pictures the test time at which they are due, else they keep their sample times.
+    """
+
+    period = period_of(LOOKS_HZ)
+
+    def __init__(
+        self, player: Player, stream: Stream, screen: Screen | None, status: type[Any], shifts: bool, settle: int
+    ) -> None:
+        self.inputs = {(COMMAND, None): self._command}
+        self._player, self._stream, self._screen = player, stream, screen
+        self._status, self._shifts, self._settle = status, shifts, settle
+        self._too_large = 0
+        self._told = -STATUS_PERIOD
+        self._end: int | None = None
+
+    def begin(self, now: int) -> None:
+        self._player.play()
+
+    def update(self, now: int) -> Iterator[Output | Envelope]:
+        player = self._player
+        player.advance(now)
+        if player.jumped:
+            self._jump()
+        while (due := player.take()) is not None:
+            envelope = self._play(due[1])
+            if envelope is not None:
+                yield envelope
+        if not player.ended:
+            self._stream.prepare()
+            self._end = None
+        elif self._end is None:
+            self._end = now + self._settle
+        self.finished = self._end is not None and now >= self._end and not player.jumped
+        if now - self._told >= STATUS_PERIOD:
+            self._told = now
+            status = self._status(state=_PLAYING, numberOfEntries=len(player), currentEntryForPlayback=player.position)
+            yield Output(status, 0)
+
+    def close(self) -> None:
+        """Say what was not played as it should."""
+        if self._too_large:
+            _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
+        if self._stream.decoder.undecoded:
+            _log.warning("%d pictures could not be decoded and were not shown", self._stream.decoder.undecoded)
+        if self._screen is not None:
+            _log.info("%d pictures were shown", self._screen.shown)
+
+    def _command(self, message: Any, _sample_time: int) -> None:
+        self._player.command(message.command, message.seekTo)
+
+    def _jump(self) -> None:
+        self._stream.seek(self._player.position)
+        self._player.jumped = False
+
+    def _play(self, due: int) -> Envelope | None:
+        """Show an entry's picture and give what is to be sent."""
+        envelope, is_sent, picture = self._stream.take()
+        if self._shifts:
+            envelope = envelope._replace(sent=due, sample_time=due)
+        if picture is not None and self._screen is not None:
+            self._screen.show(picture, envelope.sample_time)
+        if not is_sent:
+            return None
+        if len(envelope.payload) > LARGEST_PAYLOAD:
+            self._too_large += 1
+            return None
+        return envelope
+
+
+def build(context: Context) -> Service:
+    """The service from its flags: the recording indexed, the memories made as large as its pictures are."""
+    flags = context.flags
+    recording = context.resources.enter_context(Recording(Path(flags["rec"])))
+    if not len(recording):
+        raise SelectionError(f"{recording.path} is empty: there is nothing to play")
+    if recording.damage:
+        _log.warning("%s: %s", recording.path, recording.damage)
+    part = _part(context, recording)
+    player, stream = Player(part.due, flags["autorewind"]), Stream(recording, part)
+    if not flags["await-begin"]:
+        player.play()
+    settle = round(flags["settle"] * MICROSECONDS)
+    status = context.messages.type(STATUS)
+    screen = _screen(context, recording, part)
+    service = Replay(player, stream, screen, status, flags["sample-times"] == "test", settle)
+    context.resources.callback(service.close)
+    return service
+
+
+def _part(context: Context, recording: Recording) -> Part:
+    flags = context.flags
+    version = flags["message-set"] if flags["message-set"] != "auto" else message_sets.version_of(recording)
+    own = (Path(path) for path in os.environ.get("DODO_ODVD", "").split(os.pathsep) if path)
+    selection = Selection(
+        start=flags["start"],
+        end=flags["end"],
+        messages=flags["messages"],
+        without=flags["without"],
+        video_sender=flags["video-sender"] if flags["video"] else None,
+        send_video=flags["send-video"],
+    )
+    max_gap = round(flags["max-gap"] * MICROSECONDS)
+    part = select(recording, selection, message_sets.load(version, *own), max_gap, flags["timemod"])
+    seconds = part.due[-1] / MICROSECONDS
+    _log.info("plays %d messages and %d pictures in %.1f s", part.sent.sum(), part.shown.sum(), seconds)
+    return part
+
+
+def _screen(context: Context, recording: Recording, part: Part) -> Screen | None:
+    """Memories for the pictures; None where there are none to show."""
+    flags = context.flags
+    if not flags["video"]:
+        return None
+    if not part.shown.any():
+        _refuse_other_senders(recording, flags["video-sender"])
+        _log.warning("%s holds no pictures in the part that is played: no shared memory is made", recording.path)
+        return None
+    frame = first_frame(recording, part.rows[part.shown])
+    argb = context.memory(flags["name.argb"], frame.width * frame.height * 4)
+    if frame.width % 2 or frame.height % 2:
+        _log.warning("pictures of %d x %d pixels cannot be had as I420", frame.width, frame.height)
+        return Screen(argb, None)
+    return Screen(argb, context.memory(flags["name.i420"], frame.width * frame.height * 3 // 2))
+
+
+def _refuse_other_senders(recording: Recording, sender: int) -> None:
+    index = recording.index
+    senders = np.unique(index["sender_stamp"][index["data_type"] == IMAGE]).tolist()
+    if senders and sender not in senders:
+        others = ", ".join(map(str, senders))
+        raise SelectionError(
+            f"{recording.path} has no pictures of sender {sender}, but of {others}: set --video-sender"
+        )

@@ -1,0 +1,102 @@
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import pytest
+
+from dodo_dsl.opendlv.envelope import Envelope
+from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
+
+PREFIX = "opendlv.logic.perception.Detection"
+
+
+def cone(time: int, number: int, label: str, x: float, sender_stamp: int = 0) -> list[Envelope]:
+    key = {"detectionId": number}
+    box = {"x": x, "y": 0.5, "width": 0.125, "height": 0.25}
+    return [
+        message(PREFIX + "Type", time, sender_stamp, type=4, **key),
+        *([message(PREFIX + "Property", time, sender_stamp, property=label, **key)] if label else []),
+        message(PREFIX + "BoundingBox", time, sender_stamp, **key, **box),
+    ]
+
+
+@pytest.fixture
+def drive(record: Callable[..., Path]) -> Path:
+    envelopes = [
+        *video(12),
+        *cone(BEGIN + 700_000, 0, "yellow", 0.25),
+        *cone(BEGIN + 700_000, 1, "color:blue", 0.5),
+        *cone(BEGIN + 1_000_000, 0, "", 0.0, 3),
+        *cone(BEGIN + 50_000, 0, "yellow", 0.75),
+        message(PREFIX + "Property", BEGIN, property="boxless"),
+        message(PREFIX + "BoundingBox", BEGIN, x=float("nan")),
+    ]
+    return record(envelopes)
+
+
+def test_frames_with_detections(drive: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    assert dodo_rec("export", drive, "--coco", "-o", folder) == (0, f"{folder}: 2 frames with 3 boxes\n", "")
+    found = json.loads((folder / "annotations.json").read_text())
+    names = {category["id"]: category["name"] for category in found["categories"]}
+    assert [(a["image_id"], names[a["category_id"]], a["bbox"], a["area"]) for a in found["annotations"]] == [
+        (1, "yellow", [16.0, 24.0, 8.0, 12.0], 96.0),
+        (1, "blue", [32.0, 24.0, 8.0, 12.0], 96.0),
+        (2, "type 4", [0.0, 24.0, 8.0, 12.0], 96.0),
+    ]
+    assert [image["sample_time"] for image in found["images"]] == [BEGIN + 700_000, BEGIN + 1_000_000]
+    for image, picture in zip(found["images"], (pictures(12)[7], pictures(12)[10]), strict=True):
+        written = cv2.imread(str(folder / image["file_name"]))
+        assert written.shape == (image["height"], image["width"], 3) == (HEIGHT, WIDTH, 3)
+        assert abs(written.astype(int) - picture).max() <= 6
+    assert {len({a["id"] for a in found["annotations"]}), len(names)} == {3}
+
+
+def test_all_frames_as_jpeg(drive: Path, tmp_path: Path) -> None:
+    words = ["--all", "--pictures", "jpg", "--start", "0.45", "--labels", "3"]
+    answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", *words)
+    assert answer.stdout.endswith("7 frames with 1 boxes\n")
+    assert len(list((tmp_path / "set" / "images").glob("0-*.jpg"))) == 7
+
+
+def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_path: Path) -> None:
+    path = record([*video(12)[2:], *cone(BEGIN + 700_000, 0, "yellow", 0.25)])
+    answer = dodo_rec("export", path, "--coco", "-o", tmp_path / "set")
+    assert (answer.code, answer.stderr) == (0, "dodo rec: 3 of 10 packets gave no frame\n")
+
+
+@pytest.mark.parametrize(
+    ("envelopes", "words", "text"),
+    [
+        (cone(BEGIN, 0, "", 0.0), [], "the selection of {path} holds no camera frames (opendlv.proxy.ImageReading)"),
+        (video(3), [], "{path} holds no detections with a box; --all exports frames without them"),
+        (video(3), ["--camera", "2"], "{path} holds no frames of camera 2; there is 0"),
+        ([*video(2), *video(2, 5, 1)], ["--all"], "{path} holds frames of the cameras 0, 1; choose one with --camera"),
+        (
+            video(3),
+            ["--message", "1055"],
+            "--message does not go with --coco; choose senders with --camera and --labels",
+        ),
+        (
+            [*video(3), *cone(5, 0, "", 0.0)],
+            [],
+            "no frame of {path} could be decoded at the sample time of a detection",
+        ),
+    ],
+)
+def test_what_cannot_be_exported(
+    envelopes: list[Envelope], words: list[str], text: str, record: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = record(envelopes)
+    answer = dodo_rec("export", path, "--coco", "-o", tmp_path / "set", *words)
+    assert answer == (2, "", f"dodo rec: {text.format(path=path)}\n")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["drive.rec"]
+
+
+def test_what_is_there_is_kept(drive: Path, tmp_path: Path) -> None:
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "annotations.json").write_text("{}")
+    assert "annotations.json is there already" in dodo_rec("export", drive, "--coco", "-o", tmp_path / "set").stderr
+    assert (tmp_path / "set" / "annotations.json").read_text() == "{}"
+    assert dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--force").code == 0

@@ -1,0 +1,98 @@
+import math
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base import Context
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.beacon.service import Beacon
+from services.beacon.way import WayError
+from tests.services.process import PATIENCE, ROOT, hear, launch, running, say
+
+FRAME, STATE = "opendlv.sim.Frame", "opendlv.sim.KinematicState"
+SECOND = 1_000_000
+
+
+def service(*flags: str) -> Beacon:
+    manifest = load_manifest(ROOT / "services" / "beacon")
+    return Beacon(Context("beacon", parse(manifest, ["--cid=1", *flags]), MessageSet.standard()))
+
+
+def sent(beacon: Beacon, now: int) -> list[Any]:
+    return list(beacon.update(now))
+
+
+def test_it_waits_for_the_test_and_ends_with_its_way() -> None:
+    beacon = service("--points=0 0,2 0", "--speed=1", "--freq=10", "--frame-id=3")
+    assert beacon.period == 100_000
+    for now in (0, 9 * SECOND):
+        (output,) = sent(beacon, now)
+        assert (output.message.x, output.sender_stamp, beacon.finished) == (0, 3, False)
+    beacon.begin(10 * SECOND)
+    beacon.begin(11 * SECOND)
+    assert sent(beacon, 11 * SECOND)[0].message.x == pytest.approx(1)
+    assert not beacon.finished
+    assert sent(beacon, 12 * SECOND)[0].message.x == 2
+    assert beacon.finished
+
+
+def test_it_holds_when_asked() -> None:
+    beacon = service("--length=1", "--speed=1", "--hold", "--start=at-once")
+    sent(beacon, 0)
+    assert sent(beacon, 99 * SECOND)[0].message.x == 1
+    assert not beacon.finished
+
+
+def test_without_a_length_it_never_ends() -> None:
+    beacon = service("--start=at-once", "--speed=2")
+    sent(beacon, 0)
+    assert sent(beacon, 1000 * SECOND)[0].message.x == 2000
+    assert not beacon.finished
+
+
+def test_the_state_is_sent_when_asked() -> None:
+    beacon = service("--length=9", "--yaw=90", "--speed=1.5", "--state-id=7")
+    still = sent(beacon, 0)[1]
+    assert (still.sender_stamp, still.message.vx) == (7, 0)
+    beacon.begin(0)
+    frame, state = sent(beacon, SECOND)
+    assert (state.message.vx, state.message.vy) == pytest.approx((1.5, 0))
+    assert (frame.message.x, frame.message.y) == pytest.approx((0, 1.5))
+    assert (frame.message.qz, frame.message.qw) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)))
+
+
+def test_two_ways_are_one_too_many() -> None:
+    with pytest.raises(WayError, match="--points and --length tell two ways"):
+        service("--points=0 0,1 1", "--length=3")
+
+
+def test_a_bad_table_ends_it_with_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "way.csv").write_text("x,y\n0,0\n1,here\n")
+    process = launch("beacon", tmp_path, "--cid=254", f"--path={tmp_path}/way.csv")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out) == (2, "")
+    assert err == f"beacon: CRITICAL: {tmp_path}/way.csv:3: y: 'here' is no finite number\n"
+
+
+def test_on_the_bus(cid: int, tmp_path: Path) -> None:
+    with (
+        Session(cid) as session,
+        running("beacon", tmp_path, f"--cid={cid}", "--length=0.1", "--speed=1", "--state-id=2") as process,
+    ):
+        assert hear(session, FRAME)[1].x == 0
+        say(session, "dodo.TestBegin")
+        _, end = hear(session, "dodo.EndOfInput")
+        assert end.source == "beacon"
+        assert process.wait(PATIENCE) == 0
+
+
+def test_a_signal_ends_it(cid: int, tmp_path: Path) -> None:
+    with Session(cid) as session, running("beacon", tmp_path, f"--cid={cid}") as process:
+        hear(session, FRAME)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 0

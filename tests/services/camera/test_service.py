@@ -1,0 +1,114 @@
+import signal
+import time
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dodo_dsl.opendlv.memory import SharedMemory
+from services.camera.v4l2 import V4l2Camera
+from tests.services.process import PATIENCE, launch, running
+
+SIZE = ["--width=64", "--height=48"]
+
+
+@pytest.fixture
+def names(cid: int) -> Iterator[list[str]]:
+    prefix = f"dodo-test-{uuid.uuid4().hex[:8]}"
+    yield [f"--cid={cid}", f"--name.argb={prefix}.argb", f"--name.i420={prefix}.i420"]
+
+
+def attached(names: list[str]) -> tuple[SharedMemory, SharedMemory]:
+    argb, i420 = (SharedMemory.attach(flag.partition("=")[2]) for flag in names[1:])
+    return argb, i420
+
+
+def test_a_video_goes_into_both_memories_at_its_times(tmp_path: Path, names: list[str], video: Path) -> None:
+    flags = [*names, *SIZE, "--source=file", f"--file={video}", "--freq=20"]
+    with running("camera", tmp_path, *flags):
+        argb, i420 = attached(names)
+        with argb, i420:
+            assert (argb.size, i420.size) == (64 * 48 * 4, 64 * 48 * 3 // 2)
+            times, greys = [], []
+            for _ in range(4):
+                assert argb.wait(PATIENCE)
+                with argb.lock():
+                    times.append(argb.sample_time())
+                    greys.append(round(float(np.frombuffer(argb.buffer, np.uint8).reshape(48, 64, 4)[..., 0].mean())))
+            with i420.lock():
+                assert i420.sample_time() >= times[-1] and np.frombuffer(i420.buffer, np.uint8).max() > 16
+    assert all(gap % 50_000 == 0 and gap > 0 for gap in np.diff(times))
+    assert all(any(abs(grey - shown) <= 2 for shown in (40, 80, 120, 160, 200)) for grey in greys)
+    assert len(set(greys)) > 1
+
+
+def test_the_pipe_of_a_raspberry_pi(tmp_path: Path, names: list[str], rpicam: Path) -> None:
+    before = time.time_ns() // 1000
+    with running("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05") as process:
+        argb, i420 = attached(names)
+        with argb, i420:
+            assert i420.wait(PATIENCE)
+            with i420.lock():
+                assert before < i420.sample_time() <= time.time_ns() // 1000
+                planes = np.frombuffer(i420.buffer, np.uint8).reshape(72, 64)
+                assert planes[0, 0] > 16 and (planes[48:] == 128).all()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 0
+
+
+def test_a_camera_that_is_lost_ends_it_with_a_sentence(
+    tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAKE_MODE", "lost")
+    process = launch("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05")
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "rpicam-vid ended with code 1: ERROR: *** Device timeout detected ***" in err and "Traceback" not in err
+
+
+def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
+    tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAKE_MODE", "silent")
+    process = launch("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05")
+    end = time.monotonic() + PATIENCE
+    while not rpicam.exists():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    time.sleep(0.1)
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--source=file"], "--file is missing"),
+        (["--source=file", "--file=/none.png"], "there is no file /none.png"),
+        (["--source=webcam"], "--source=webcam is no camera, expected a device such as /dev/video0"),
+        (["--source=/dev/video99"], "there is no camera /dev/video99; is it plugged in?"),
+        (["--source=/dev/null"], "the camera /dev/null cannot be opened"),
+        (["--source=emulated"], "an emulated camera belongs to the emulated rig"),
+        (["--source=rpicam", "--freq=20"], "--exposure=0.1 does not fit into the 0.05 s between two pictures"),
+        (["--source=file", "--width=63"], "--width=63 and --height=48 must be even"),
+    ],
+)
+def test_what_is_no_camera(tmp_path: Path, names: list[str], flags: list[str], words: str) -> None:
+    size = [word for word in SIZE if word.partition("=")[0] not in {flag.partition("=")[0] for flag in flags}]
+    process = launch("camera", tmp_path, *names, *size, *flags)
+    out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out) == (2, "")
+    assert words in err and "Traceback" not in err
+
+
+def test_a_v4l2_device() -> None:
+    devices = sorted(Path("/dev").glob("video*"))
+    if not devices:
+        pytest.skip("there is no V4L2 device here (/dev/video*)")
+    camera = V4l2Camera(devices[0], 640, 480, 10, 0.1)
+    picture = camera.read()
+    camera.close()
+    assert picture.argb.shape == (480, 640, 4) and picture.time is not None

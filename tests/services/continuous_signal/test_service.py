@@ -1,0 +1,143 @@
+import json
+import math
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base import Context, Flags
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.continuous_signal.service import ContinuousSignal
+from tests.services.continuous_signal.test_target import recording
+from tests.services.process import PATIENCE, ROOT, launch, running, say
+
+STEERING = "opendlv.proxy.GroundSteeringRequest"
+START = 1_700_000_000_000_000
+FLAGS = (f"--message={STEERING}", "--field=groundSteering", "--max-mean=0.05")
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    path = tmp_path / "ramp.csv"
+    path.write_text("time,groundSteering\n0,0\n10,1\n")
+    return path
+
+
+def flags(*words: str) -> Flags:
+    return parse(load_manifest(ROOT / "services" / "continuous_signal"), ["--cid=128", *FLAGS, *words])
+
+
+def service(*words: str) -> ContinuousSignal:
+    return ContinuousSignal(Context("continuous-signal", flags(*words), MessageSet.standard()))
+
+
+def steering(value: float) -> Any:
+    return MessageSet.standard().type(STEERING)(groundSteering=value)
+
+
+def test_a_table_is_met_from_the_begin_of_the_test(table: Path) -> None:
+    judge = service(f"--target={table}", "--sender=3", "--min-samples=1")
+    assert set(judge.inputs) == {(STEERING, 3)}
+    judge.begin(START)
+    judge.inputs[STEERING, 3](steering(0.5), START + 5_000_000)
+    judge.end_of_input(START + 6_000_000)
+    assert judge.verdict is not None and judge.verdict.outcome == "passed"
+
+
+def test_a_recording_is_met_at_its_sample_times(tmp_path: Path) -> None:
+    path = recording(tmp_path, (102_000_000, 3, 0.25), (104_000_000, 3, 0.75))
+    judge = service(f"--target={path}", "--sender=3", "--min-samples=1", "--align=sample-time", "--from=2.5")
+    judge.begin(START)
+    judge.inputs[STEERING, 3](steering(9.0), 102_400_000)
+    judge.inputs[STEERING, 3](steering(0.5), 103_000_000)
+    judge.update(START + 61_000_000)
+    assert judge.verdict is not None and judge.verdict.outcome == "passed"
+    assert {check.name: check.value for check in judge.verdict.checks}["samples"] == 1
+
+
+def test_a_live_target_has_its_own_message(table: Path) -> None:
+    judge = service("--target-sender=9", "--min-samples=1")
+    assert set(judge.inputs) == {(STEERING, 0), (STEERING, 9)}
+    judge.begin(START)
+    judge.inputs[STEERING, 9](steering(0.5), START)
+    judge.inputs[STEERING, 9](steering(0.5), START + 2_000_000)
+    judge.inputs[STEERING, 0](steering(0.5), START + 1_000_000)
+    judge.end_of_input(START + 3_000_000)
+    assert judge.verdict is not None and judge.verdict.outcome == "passed"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "there is no target: give --target, or --target-sender of one that comes live"),
+        (("--target=TABLE", "--min-share=0.9"), "--min-share needs --band, the distance that counts as inside"),
+        (("--target=TABLE", "--from=3", "--until=3"), "--until=3 is not after --from=3"),
+        (("--target=TABLE", "--target-field=angle"), "found time, groundSteering"),
+        (("--target-sender=9", "--target-field=angle"), "has no field 'angle'; it has groundSteering"),
+    ],
+)
+def test_flags_that_leave_something_open_are_refused(table: Path, words: tuple[str, ...], said: str) -> None:
+    with pytest.raises(ValueError) as raised:
+        service(*(word.replace("TABLE", str(table)) for word in words))
+    assert said in str(raised.value)
+
+
+def test_a_test_without_a_limit_is_refused(table: Path) -> None:
+    open_ended = Flags({**flags(f"--target={table}"), "max-mean": None})
+    with pytest.raises(
+        ValueError, match=r"^there is no limit to judge by: give one or more of --max-mean, --max-std, --"
+    ):
+        ContinuousSignal(Context("continuous-signal", open_ended, MessageSet.standard()))
+
+
+def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    output, errors = process.communicate(timeout=PATIENCE)
+    return process.returncode, output, errors
+
+
+def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
+    start = time.time_ns() // 1000
+    words = (f"--cid={cid}", *FLAGS, f"--target={table}", "--band=0.05", "--min-share=0.5")
+    with Session(cid) as session, running("continuous_signal", tmp_path, *words) as process:
+        say(session, "dodo.TestBegin", sample_time=start)
+        for step in range(101):
+            value = step / 100 + 0.04 * math.sin(step)
+            say(session, STEERING, sample_time=start + step * 100_000, groundSteering=value)
+            say(session, STEERING, sender_stamp=1, sample_time=start + step * 100_000, groundSteering=9.0)
+        say(session, "dodo.EndOfInput", source="recording")
+        code, output, errors = finished(process)
+    assert (code, errors) == (0, "")
+    verdict = json.loads(output)
+    assert (verdict["dodo"], verdict["outcome"]) == ("verdict", "passed")
+    checks = {check["name"]: check for check in verdict["checks"]}
+    expected = sum(abs(0.04 * math.sin(step)) for step in range(101)) / 101
+    assert checks["mean"] == {
+        "name": "mean", "value": pytest.approx(expected, abs=1e-6), "limit": {"max": 0.05}, "unit": "", "ok": True
+    }  # fmt: skip
+    assert checks["samples"]["value"] == 101
+
+
+def test_a_silent_application_fails_when_the_time_is_over(table: Path, cid: int, tmp_path: Path) -> None:
+    words = (f"--cid={cid}", *FLAGS, f"--target={table}", "--max-time=0.05")
+    with running("continuous_signal", tmp_path, *words) as process:
+        code, output, _ = finished(process)
+    verdict = json.loads(output)
+    assert (code, verdict["outcome"]) == (0, "failed")
+    assert verdict["reason"] == f"no sample of groundSteering of {STEERING}/0 came within 0.05 s"
+    assert verdict["checks"][0] == {"name": "mean", "value": None, "limit": {"max": 0.05}, "unit": "", "ok": False}
+
+
+def test_a_target_that_cannot_be_used_ends_it_before_it_is_ready(tmp_path: Path, cid: int) -> None:
+    (tmp_path / "bad.csv").write_text("time,value\n0,1\n0,2\n")
+    code, output, errors = finished(
+        launch("continuous_signal", tmp_path, f"--cid={cid}", *FLAGS, f"--target={tmp_path}/bad.csv")
+    )
+    assert (code, output) == (2, "")
+    assert errors.endswith(
+        f"{tmp_path}/bad.csv:3: the time 0 s comes twice, expected times that increase by at least a microsecond\n"
+    )

@@ -1,0 +1,136 @@
+"""A rig on a pseudo terminal that speaks the protocol and moves, in a thread; it can misbehave."""
+
+import math
+import os
+import pty
+import re
+import select
+import threading
+import time
+import tty
+from pathlib import Path
+
+COMMAND = re.compile(r"\$([A-Z]+):?([-+0-9.,]*)")
+WATCHDOG = 0.5
+TICK = 0.004
+QUICK = (8.0, 8.0, 40.0)
+
+
+class FakeRig:
+    """`path` is a link to its port; `plug` and `unplug` are the cable."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.at = [0.1, -0.1, 0.0]
+        self.velocity = [0.0, 0.0, 0.0]
+        self.status = 0
+        self.calibrated = True
+        self.silent = False
+        self.noise = b""
+        self.chopped = False
+        self.heard: list[tuple[str, tuple[float, ...]]] = []
+        self._goal: list[float] | None = None
+        self._last_run = 0.0
+        self._rest = b""
+        self._master: int | None = None
+        self._lock = threading.RLock()
+        self._over = False
+        self.plug()
+        self._thread = threading.Thread(target=self._live, daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> "FakeRig":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over = True
+        self._thread.join()
+        self.unplug()
+
+    def plug(self) -> None:
+        with self._lock:
+            self._master, slave = pty.openpty()
+            tty.setraw(slave)
+            self.path.unlink(missing_ok=True)
+            self.path.symlink_to(os.ttyname(slave))
+            os.close(slave)
+
+    def unplug(self) -> None:
+        with self._lock:
+            self.path.unlink(missing_ok=True)
+            if self._master is not None:
+                os.close(self._master)
+            self._master = None
+            self.velocity = [0.0, 0.0, 0.0]
+
+    def commands(self, word: str) -> list[tuple[float, ...]]:
+        return [arguments for name, arguments in list(self.heard) if name == word]
+
+    def last(self) -> str:
+        """The last command that moves or stops."""
+        return [name for name, _ in list(self.heard) if name in ("RUN", "STOP", "GOTO", "CALIBRATE")][-1]
+
+    def _live(self) -> None:
+        before = time.monotonic()
+        while not self._over:
+            with self._lock:
+                self._listen()
+                now = time.monotonic()
+                self._move(now - before, now)
+                before = now
+            time.sleep(TICK)
+
+    def _listen(self) -> None:
+        if self._master is None or not select.select([self._master], [], [], 0)[0]:
+            return
+        try:
+            data = os.read(self._master, 4096)
+        except OSError:  # nobody holds the other end
+            return
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in lines:
+            self._obey(line.decode())
+
+    def _obey(self, line: str) -> None:
+        match = COMMAND.fullmatch(line)
+        assert match is not None, line
+        word, arguments = match[1], tuple(float(a) for a in match[2].split(",") if a)
+        self.heard.append((word, arguments))
+        if word == "RUN":
+            self.velocity, self._last_run = list(arguments), time.monotonic()
+        elif word == "STOP":
+            self.velocity, self._goal = [0.0, 0.0, 0.0], None
+            self.status = 0 if self.status == 7 else self.status
+        elif word == "GOTO":
+            self._goal = list(arguments)
+        elif word == "CALIBRATE":
+            self.calibrated, self.at = True, [-0.9, -0.7, -2.6]
+        elif word == "POSITION":
+            self._answer(",".join(f"{value:.5f}" for value in self.at))
+        elif word == "STATUS":
+            self._answer(str(self._said()))
+
+    def _said(self) -> int:
+        if self.status or not self.calibrated:
+            return self.status or 6
+        return int(any(self.velocity) or self._goal is not None)
+
+    def _answer(self, text: str) -> None:
+        if self.silent or self._master is None:
+            return
+        data = self.noise + f"${text}\n".encode()
+        for part in [data[i : i + 1] for i in range(len(data))] if self.chopped else [data]:
+            os.write(self._master, part)
+
+    def _move(self, dt: float, now: float) -> None:
+        if any(self.velocity) and now - self._last_run > WATCHDOG:
+            self.velocity, self.status = [0.0, 0.0, 0.0], 7
+        self.at = [a + v * dt for a, v in zip(self.at, self.velocity, strict=True)]
+        if self._goal is not None:
+            way = [goal - a for a, goal in zip(self.at, self._goal, strict=True)]
+            if all(abs(w) <= q * dt for w, q in zip(way, QUICK, strict=True)):
+                self.at, self._goal = self._goal, None
+            else:
+                self.at = [
+                    a + math.copysign(min(abs(w), q * dt), w) for a, w, q in zip(self.at, way, QUICK, strict=True)
+                ]

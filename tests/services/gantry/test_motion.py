@@ -1,0 +1,81 @@
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from services.gantry.motion import FARTHEST, HOME, Limits, Shaper, Velocity, box, turned
+from services.gantry.protocol import Position
+
+MIDDLE = Position(0, 0, 0)
+velocities = st.builds(Velocity, st.floats(-3, 3), st.floats(-3, 3), st.floats(-4, 4))
+
+
+def settled(body: Velocity, at: Position) -> Velocity:
+    shaper = Shaper(Limits())
+    for _ in range(200):
+        told = shaper.step(body, at, 0.05)
+    return told
+
+
+def test_forward_is_where_the_rig_looks() -> None:
+    left = turned(Velocity(1, 0.5, 2), math.pi / 2)
+    assert (left.x, left.y, left.yaw) == pytest.approx((-0.5, 1, 2))
+
+
+def test_the_measured_heading_turns_the_body() -> None:
+    told = settled(Velocity(0.5, 0, 0.2), Position(0, 0, math.pi / 2))
+    assert (told.x, told.y, told.yaw) == pytest.approx((0, 0.5, 0.2))
+
+
+def test_too_fast_is_cut_without_a_change_of_direction() -> None:
+    told = settled(Velocity(4, 3, 9), MIDDLE)
+    assert told.y / told.x == pytest.approx(3 / 4)
+    assert math.hypot(told.x, told.y) == pytest.approx(1)
+    assert told.yaw == 1
+
+
+def test_speeds_change_no_faster_than_the_accelerations() -> None:
+    shaper = Shaper(Limits(acceleration=0.4, yaw_acceleration=0.8))
+    told = shaper.step(Velocity(1, 0, 1), MIDDLE, 0.05)
+    assert (told.x, told.y, told.yaw) == pytest.approx((0.02, 0, 0.04))
+    shaper.halt()
+    assert shaper.told == Velocity()
+
+
+@settings(deadline=None, max_examples=40)
+@given(velocities, st.sampled_from([0.01, 0.05, 0.2]))
+def test_no_request_drives_the_rig_out_of_its_workspace(body: Velocity, dt: float) -> None:
+    """The rig here does what it is told one step late, as real ones do at best."""
+    limits = Limits()
+    shaper, at, before = Shaper(limits), MIDDLE, Velocity()
+    for _ in range(int(6 / dt)):
+        told = shaper.step(body, at, dt)
+        at = Position(at.x + before.x * dt, at.y + before.y * dt, at.yaw + before.yaw * dt)
+        before = told
+        assert math.hypot(told.x, told.y) <= limits.speed + 1e-9 and abs(told.yaw) <= limits.yaw_rate
+        assert limits.low.x - 0.002 <= at.x <= limits.high.x + 0.002
+        assert limits.low.y - 0.002 <= at.y <= limits.high.y + 0.002
+        assert limits.low.yaw - 0.01 <= at.yaw <= limits.high.yaw + 0.01
+
+
+def test_from_beyond_the_edge_it_only_goes_back() -> None:
+    outside = Position(FARTHEST.x + 0.02, 0, 0)
+    assert settled(Velocity(1, 0, 0), outside).x == 0
+    assert settled(Velocity(-0.3, 0, 0), outside).x == pytest.approx(-0.3)
+
+
+def test_the_box_is_within_the_rig_whatever_the_ranges() -> None:
+    assert box(1.9, 1.4, math.radians(170)) == (HOME, FARTHEST)
+    low, high = box(0.5, 0.5, math.radians(90))
+    assert (low.x, low.y) == (HOME.x, HOME.y)
+    assert (high.x, high.y) == pytest.approx((-0.4, -0.2))
+    assert (low.yaw, high.yaw) == pytest.approx((-math.pi / 2, math.pi / 2))
+
+
+def test_home_and_the_far_end_are_those_of_the_conversions() -> None:
+    """Table 4.2: step 0 is home, 3320 full steps a metre, 0.55 a degree; the workspace is 1.9 by 1.4 m about 0."""
+    assert pytest.approx(-2988 / 3320, abs=1e-9) == HOME.x
+    assert pytest.approx(-2324 / 3320, abs=1e-9) == HOME.y
+    assert math.degrees(HOME.yaw) >= -83 / 0.55
+    assert (FARTHEST.x, FARTHEST.y) == (1.9 / 2, 1.4 / 2)

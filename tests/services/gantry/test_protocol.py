@@ -1,0 +1,119 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.gantry.protocol import LONGEST, Lines, Position, Status, Word, answer, command
+from tests.services.gantry.fakerig import COMMAND
+
+numbers = st.floats(-10, 10)
+positions = st.builds(Position, numbers, numbers, numbers)
+answers = positions | st.sampled_from(Status)
+
+
+def line(one: Position | Status) -> bytes:
+    """As a firmware prints it."""
+    text = f"{one.x:.6f},{one.y:.6f},{one.yaw:.6f}" if isinstance(one, Position) else str(int(one))
+    return f"${text}\n".encode()
+
+
+def same(a: Position | Status, b: Position | Status) -> bool:
+    if isinstance(a, Position) and isinstance(b, Position):
+        return (a.x, a.y, a.yaw) == pytest.approx((b.x, b.y, b.yaw), abs=1e-6)
+    return a == b
+
+
+@pytest.mark.parametrize(
+    ("word", "arguments", "text"),
+    [
+        (Word.STOP, (), b"$STOP\n"),
+        (Word.RUN, (0.5, -0.25, 1), b"$RUN:0.5000,-0.2500,1.0000\n"),
+        (Word.GOTO, (-0.00001, 1e-9, 1 / 3), b"$GOTO:0.0000,0.0000,0.3333\n"),
+    ],
+)
+def test_commands(word: Word, arguments: tuple[float, ...], text: bytes) -> None:
+    assert command(word, *arguments) == text
+
+
+@given(st.sampled_from(Word), st.lists(st.floats(-1e4, 1e4), max_size=3))
+def test_commands_say_what_they_are_given(word: Word, arguments: list[float]) -> None:
+    match = COMMAND.fullmatch(command(word, *arguments).decode().removesuffix("\n"))
+    assert match is not None and match[1] == word
+    assert [float(a) for a in match[2].split(",") if a] == pytest.approx(arguments, abs=5.1e-5)
+    assert "-0.0000" not in match[2].split(",")
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_commands_are_finite(value: float) -> None:
+    with pytest.raises(ValueError, match="finite"):
+        command(Word.RUN, 0, value, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("$0.1,-0.2,3", Position(0.1, -0.2, 3)),
+        ("$1e-1,+0.5,0\r", Position(0.1, 0.5, 0)),
+        ("$0", Status.IDLE),
+        ("$8\r", Status.FAULT),
+        ("$9", None),
+        ("$-1", None),
+        ("$1.0", None),
+        ("$01", None),
+        ("1", None),
+        ("$", None),
+        ("$1,2", None),
+        ("$1,2,3,4", None),
+        ("$1,2,99", None),
+        ("$1,2,", None),
+        ("$nan,1,1", None),
+        ("$ 1", None),
+        ("$STATUS", None),
+        ("$1_0,1,1", None),
+        ("$\u0661", None),
+    ],
+)
+def test_answers(text: str, found: Position | Status | None) -> None:
+    assert answer(text) == found
+
+
+@given(st.lists(answers, max_size=8), st.lists(st.integers(1, 20), min_size=1))
+def test_answers_come_through_however_they_are_cut(sent: list[Position | Status], cuts: list[int]) -> None:
+    data, lines, found = b"".join(map(line, sent)), Lines(), []
+    index = 0
+    while data:
+        size = cuts[index % len(cuts)]
+        found += lines.feed(data[:size])
+        data, index = data[size:], index + 1
+    assert len(found) == len(sent) and all(map(same, found, sent))
+    assert lines.garbage == 0
+
+
+@given(st.binary(max_size=300).map(lambda noise: noise.replace(b"$", b"!")), answers)
+def test_noise_before_an_answer_does_not_hide_it(noise: bytes, sent: Position | Status) -> None:
+    lines = Lines()
+    found = lines.feed(noise) + lines.feed(b"\n" + line(sent))
+    assert len(found) == 1 and same(found[0], sent)
+
+
+@given(st.lists(st.binary(max_size=150), max_size=10))
+def test_any_bytes_are_survived_and_the_next_answer_is_read(parts: list[bytes]) -> None:
+    lines = Lines()
+    for part in parts:
+        lines.feed(part)
+    assert lines.feed(b"\n" + line(Status.MOVING))[-1] == Status.MOVING
+
+
+def test_a_line_without_end_is_dropped_whole() -> None:
+    lines = Lines()
+    for _ in range(10):
+        assert lines.feed(b"1" * LONGEST) == []
+    assert lines.feed(b"$1\n") == []
+    assert lines.feed(b"$1\n") == [Status.MOVING]
+    assert lines.garbage == 1
+
+
+def test_a_line_that_broke_off_does_not_spoil_the_next() -> None:
+    lines = Lines()
+    assert lines.feed(b"$0.12,0.3$0.5,0.5,0.5\n") == [Position(0.5, 0.5, 0.5)]

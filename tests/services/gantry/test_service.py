@@ -1,0 +1,227 @@
+"""The service against a rig on a pseudo terminal, as a process and in this one."""
+
+import contextlib
+import math
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base import Context
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.gantry.link import Link
+from services.gantry.port import SerialPort
+from services.gantry.service import Gantry
+from tests.services.gantry.fakerig import FakeRig
+from tests.services.process import PATIENCE, ROOT, hear, launch, running, say
+
+FRAME, STATE, STATUS = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.system.SystemStatusMessage"
+MANIFEST = load_manifest(ROOT / "services" / "gantry")
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[FakeRig]:
+    with FakeRig(tmp_path / "rig") as one:
+        yield one
+
+
+def until(true: Callable[[], object]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < end, "it did not come to be"
+        time.sleep(0.005)
+
+
+@contextlib.contextmanager
+def gantry(cid: int, rig: FakeRig, *flags: str) -> Iterator["subprocess.Popen[str]"]:
+    with running("gantry", rig.path.parent, f"--cid={cid}", f"--serial={rig.path}", "--freq=50", *flags) as process:
+        yield process
+
+
+def drive(session: Session, true: Callable[[], object], **fields: float) -> None:
+    """Say the state again and again until something is true."""
+
+    def said() -> object:
+        say(session, STATE, **fields)
+        return true()
+
+    until(said)
+
+
+def test_it_starts_where_it_is_told_and_follows_the_vehicle(cid: int, rig: FakeRig) -> None:
+    with Session(cid) as session, gantry(cid, rig, "--x=-0.5", "--y=0.1", "--yaw=90", "--status-id=4"):
+        assert rig.at == pytest.approx([-0.5, 0.1, math.pi / 2], abs=1e-3)
+        assert not rig.commands("CALIBRATE")
+        _, frame = hear(session, FRAME)
+        assert [frame.x, frame.y, frame.z] == pytest.approx([-0.5, 0.1, 0], abs=1e-3)
+        assert [frame.qx, frame.qy, frame.qz, frame.qw] == pytest.approx([0, 0, 0.5**0.5, 0.5**0.5], abs=1e-3)
+        drive(session, lambda: rig.at[1] > 0.12, vx=0.2)
+        assert rig.at[0] == pytest.approx(-0.5, abs=0.01)
+        said = {hear(session, STATUS, 4)[1].description for _ in range(1)}
+        assert said <= {"the rig is idle", "the rig is moving"}
+        envelope, frame = hear(session, FRAME)
+        while frame.y < 0.12:
+            envelope, frame = hear(session, FRAME)
+        assert abs(envelope.sample_time - envelope.sent) < 1_000_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_stops_the_rig(cid: int, rig: FakeRig, number: signal.Signals) -> None:
+    with Session(cid) as session, gantry(cid, rig) as process:
+        drive(session, lambda: any(rig.velocity), vx=0.3)
+        process.send_signal(number)
+        assert process.wait(PATIENCE) == 0
+        assert rig.last() == "STOP" and not any(rig.velocity)
+
+
+def test_the_end_of_the_input_stops_the_rig_and_the_frames_go_on(cid: int, rig: FakeRig) -> None:
+    with Session(cid) as session, gantry(cid, rig):
+        drive(session, lambda: any(rig.velocity), vx=0.3)
+        say(session, "dodo.EndOfInput")
+        drive(session, lambda: rig.last() == "STOP", vx=0.3)
+        runs = len(rig.commands("RUN"))
+        for _ in range(5):
+            hear(session, FRAME)
+        assert len(rig.commands("RUN")) == runs
+
+
+def test_a_vehicle_that_falls_silent_is_not_driven_on(cid: int, rig: FakeRig) -> None:
+    with Session(cid) as session, gantry(cid, rig):
+        drive(session, lambda: any(rig.velocity), vx=0.3)
+        until(lambda: not any(rig.velocity))
+        assert rig.last() == "RUN" and rig.status == 0
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        (3, "touched a limit switch"),
+        (4, "a motor stalled"),
+        (5, "too hot"),
+        (6, "is not calibrated"),
+        (8, "reports a fault"),
+    ],
+)
+def test_a_status_that_ends_the_test(cid: int, rig: FakeRig, status: int, words: str) -> None:
+    with gantry(cid, rig) as process:
+        rig.status = status
+        assert process.wait(PATIENCE) == 1
+        assert process.stderr is not None
+        error = process.stderr.read()
+        assert words in error and f"(status {status})" in error and "at x = 0.000 m" in error and "Trace" not in error
+        assert rig.last() == "STOP"
+
+
+def test_a_watchdog_of_its_own_accord_ends_the_test(cid: int, rig: FakeRig) -> None:
+    with Session(cid) as session, gantry(cid, rig) as process:
+        for _ in range(60):  # longer than it is lenient after it opened the line
+            hear(session, FRAME)
+        rig.status = 7
+        assert process.wait(PATIENCE) == 1
+        assert process.stderr is not None
+        assert "heard nothing for 500 ms and braked by itself" in process.stderr.read()
+
+
+def test_garbage_and_lines_in_parts_do_no_harm(cid: int, rig: FakeRig) -> None:
+    rig.noise, rig.chopped = b"\xff\x00$0.\n$$,,\nok\n$12", True
+    with Session(cid) as session, gantry(cid, rig):
+        drive(session, lambda: rig.at[0] > 0.05, vx=0.3)
+        _, frame = hear(session, FRAME)
+        assert abs(frame.x) < 1
+
+
+def test_it_comes_back_when_the_cable_does(cid: int, rig: FakeRig) -> None:
+    with Session(cid) as session, gantry(cid, rig) as process:
+        drive(session, lambda: any(rig.velocity), vx=0.2)
+        rig.unplug()
+        rig.status = 7
+        time.sleep(0.3)
+        rig.plug()
+        drive(session, lambda: any(rig.velocity), vx=0.2)
+        assert process.poll() is None
+        hear(session, FRAME)
+
+
+def test_a_rig_that_stays_away_ends_the_test(cid: int, rig: FakeRig) -> None:
+    with gantry(cid, rig) as process:
+        rig.unplug()
+        assert process.wait(PATIENCE) == 1
+        assert process.stderr is not None
+        assert f"the rig at {rig.path} has been away for 5 s" in process.stderr.read()
+
+
+def test_a_rig_that_falls_silent_ends_the_test_and_is_told_to_stop(cid: int, rig: FakeRig) -> None:
+    with gantry(cid, rig) as process:
+        rig.silent = True
+        assert process.wait(PATIENCE) == 1
+        assert process.stderr is not None
+        assert "has been away for 5 s: it does not answer" in process.stderr.read()
+        assert rig.last() == "STOP"
+
+
+def refused(cid: int, rig: FakeRig, *flags: str) -> str:
+    process = launch("gantry", rig.path.parent, f"--cid={cid}", *(flags or (f"--serial={rig.path}",)))
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode in (1, 2) and out == "" and "Traceback" not in err
+    return err
+
+
+def test_it_calibrates_only_when_told(cid: int, rig: FakeRig) -> None:
+    rig.calibrated = False
+    error = refused(cid, rig)
+    assert "is not calibrated and does not know where it is (status 6); --calibrate lets it find its home" in error
+    assert not rig.commands("CALIBRATE") and not rig.commands("GOTO")
+    with gantry(cid, rig, "--calibrate"):
+        assert rig.commands("CALIBRATE") == [()]
+        assert rig.at == pytest.approx([0, 0, 0], abs=1e-3)
+
+
+def test_a_signal_on_the_way_to_the_start_stops_the_rig(cid: int, rig: FakeRig) -> None:
+    rig.status = 1  # never idle
+    process = launch("gantry", rig.path.parent, f"--cid={cid}", f"--serial={rig.path}")
+    until(lambda: rig.commands("GOTO"))
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out, err) == (0, "", "")
+    assert rig.last() == "STOP"
+
+
+def test_a_start_that_is_not_reached(cid: int, rig: FakeRig) -> None:
+    rig.status = 2
+    error = refused(cid, rig, f"--serial={rig.path}", "--patience=1", "--x=0.2")
+    assert "has not reached x = 0.2 m, y = 0 m, yaw = 0 degrees after 1 s" in error
+    assert rig.last() == "STOP"
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--serial=spy:///dev/ttyACM0?file=/tmp/x"], "is no port of the rig"),
+        (["--serial=socket://10.0.0.1:80"], "is no port of the rig"),
+        (["--serial=loop://"], "is no port of the rig"),
+        (["--serial=/etc/passwd"], "is no device"),
+        (["--serial=ttyACM0"], "is no device"),
+        (["--serial=/dev/ttyNONE7"], "there is no serial port /dev/ttyNONE7; is the rig plugged in?"),
+        (["--serial=emulated"], "the emulated rig gives its port when it runs"),
+        (["--serial=/dev/null", "--range-x=0.5"], "the start is out of the rig's ranges: at x = 0.000 m"),
+    ],
+)
+def test_what_is_no_rig(cid: int, rig: FakeRig, flags: list[str], words: str) -> None:
+    assert words in refused(cid, rig, *flags)
+
+
+def test_the_rigs_frame_in_the_world(rig: FakeRig) -> None:
+    flags = parse(MANIFEST, ["--cid=1", f"--serial={rig.path}", "--origin-x=5", "--origin-y=1", "--origin-yaw=90"])
+    link = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
+    with contextlib.closing(link):
+        model = Gantry(Context("gantry", flags, MessageSet.standard()), link)
+        outputs = [output for now in range(20) for output in model.update(now)]
+    frame = outputs[-1].message
+    assert [frame.x, frame.y] == pytest.approx([5 + 0.1, 1 + 0.1], abs=1e-3)
+    assert [frame.qz, frame.qw] == pytest.approx([0.5**0.5] * 2, abs=1e-3)

@@ -1,0 +1,57 @@
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from pycocotools import mask
+
+from services.object_detection.boxes import Box, overlaps
+
+sizes = st.integers(100, 10_000).map(lambda n: n / 10_000)
+places = st.integers(-5_000, 10_000).map(lambda n: n / 10_000)
+boxes = st.builds(Box, places, places, sizes, sizes)
+UNIT = Box(0, 0, 1, 1)
+
+
+@given(st.lists(boxes, max_size=6), st.lists(boxes, max_size=6))
+def test_overlaps_are_those_of_pycocotools_and_shapely(found: list[Box], true: list[Box]) -> None:
+    scores = overlaps(found, true)
+    assert scores.shape == (len(found), len(true))
+    if found and true:
+        peer = mask.iou(np.array(found, np.float64), np.array(true, np.float64), [0] * len(true))
+        assert scores == pytest.approx(peer, abs=1e-9)
+    for row, a in enumerate(found):
+        for column, b in enumerate(true):
+            one, other = (shapely.box(x, y, x + w, y + h) for x, y, w, h in (a, b))
+            expected = one.intersection(other).area / one.union(other).area
+            assert scores[row, column] == pytest.approx(expected, abs=1e-9)
+
+
+def test_known_overlaps() -> None:
+    true = [UNIT, Box(0.5, 0, 1, 1), Box(1, 0, 1, 1), Box(0.25, 0.25, 0.5, 0.5)]
+    assert overlaps([UNIT], true).tolist() == [[1.0, 1 / 3, 0.0, 0.25]]
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        Box(0, 0, 0, 1),
+        Box(0, 0, -1, -1),
+        Box(1, 1, -1, -1),
+        Box(math.nan, 0, 1, 1),
+        Box(0, 0, math.inf, 1),
+        Box(-math.inf, 0, math.inf, 1),
+        Box(0, 0, 1e308, 1e308),
+        Box(-1e308, 0, 1.7e308, 1.7e308),
+    ],
+)
+def test_boxes_that_are_none_agree_with_nothing(bad: Box) -> None:
+    assert overlaps([bad], [UNIT, bad]).tolist() == [[0.0, 0.0]]
+
+
+@given(st.lists(st.builds(Box, *[st.floats(width=32)] * 4), max_size=4))
+def test_any_boxes_have_scores_from_0_to_1(found: list[Box]) -> None:
+    scores = overlaps(found, [UNIT, *found])
+    assert ((scores >= 0) & (scores <= 1 + 1e-9)).all()

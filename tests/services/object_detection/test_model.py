@@ -1,0 +1,319 @@
+import pytest
+
+from services.base import Verdict
+from services.object_detection.boxes import Box, Thing
+from services.object_detection.frames import Kind, Mark
+from services.object_detection.model import Judge, UnjudgeableError
+from services.object_detection.score import Limits, Rules
+from services.object_detection.truth import Truth
+
+SECOND = 1_000_000
+BEGIN = 7_000 * SECOND
+A, B, FAR = Box(0.1, 0.1, 0.1, 0.1), Box(0.5, 0.1, 0.1, 0.1), Box(0.8, 0.8, 0.1, 0.1)
+YELLOW, BLUE = Thing("yellow", A), Thing("blue", B)
+BOARD = Truth("one", {0: (YELLOW, BLUE)})
+FILM = Truth("sample-time", {number * SECOND: (YELLOW, BLUE) for number in range(1, 6)})
+
+
+def judge(truth: Truth | None = BOARD, limits: Limits | None = None, **rules: float | list[str]) -> Judge:
+    """A judge whose test has begun; ``rules`` replace the usual ones."""
+    usual = {"iou": 0.5, "labels": [], "max_delay": 1.0, "max_time": 60.0}
+    it = Judge(truth, Rules(**{**usual, **rules}), limits or Limits(recall=0.9))  # type: ignore[arg-type]
+    it.update(BEGIN - SECOND)
+    it.begin(BEGIN)
+    return it
+
+
+def detect(it: Judge, frame: float, *things: Thing) -> None:
+    """All detections of the frame whose sample time is so many seconds."""
+    mark = Mark(round(frame * SECOND), round(frame))
+    for number, (label, box) in enumerate(things):
+        it.detect(mark, number, label)
+        it.detect(mark, number, box)
+
+
+def reveal(it: Judge, frame: float, *things: Thing) -> None:
+    mark = Mark(round(frame * SECOND), round(frame))
+    for number, (label, box) in enumerate(things):
+        it.reveal(mark, number, box)
+        it.reveal(mark, number, label)
+
+
+def at(it: Judge, seconds: float) -> None:
+    it.update(BEGIN + round(seconds * SECOND))
+
+
+def decided(it: Judge, seconds: float = 10.0) -> Verdict:
+    """The verdict when the input has ended after so many seconds."""
+    it.end(BEGIN + round(seconds * SECOND))
+    at(it, seconds + 1)
+    assert it.verdict is not None
+    return it.verdict
+
+
+def values(verdict: Verdict) -> dict[str, float | None]:
+    return {check.name: check.value for check in verdict.checks}
+
+
+def test_what_is_found_passes() -> None:
+    it = judge(limits=Limits(0.7, 0.7, 0.7, frames=2))
+    detect(it, 1, YELLOW, BLUE)
+    at(it, 0.5)
+    detect(it, 2, BLUE, Thing("red", FAR))
+    verdict = decided(it)
+    assert (verdict.outcome, verdict.reason) == (
+        "passed",
+        "found 3 of 4 objects in 2 frames, with 1 false detection: precision 0.75 (at least 0.7), "
+        "recall 0.75 (at least 0.7), f1 0.75 (at least 0.7)",
+    )
+    assert values(verdict) == {
+        "precision": 0.75, "recall": 0.75, "f1": 0.75, "true-positives": 3, "false-positives": 1, "false-negatives": 1,
+        "mean-iou": pytest.approx(1.0), "frames": 2, "answered": 2, "without-truth": 0, "late": 0, "repeated": 0,
+        "precision-yellow": 1.0, "recall-yellow": 0.5, "f1-yellow": 2 / 3,
+        "precision-blue": 1.0, "recall-blue": 1.0, "f1-blue": 1.0,
+        "precision-red": 0.0, "recall-red": None, "f1-red": 0.0,
+    }  # fmt: skip
+    assert all(check.ok for check in verdict.checks)
+
+
+def test_every_limit_that_is_broken_is_named_with_the_worst_frame() -> None:
+    it = judge(limits=Limits(0.9, 0.9, 0.9, frames=3))
+    detect(it, 1, YELLOW, BLUE)
+    at(it, 0.5)
+    detect(it, 2, Thing("yellow", FAR))
+    assert (decided(it).outcome, decided(it).reason) == (
+        "failed",
+        "precision is 0.6667 (at least 0.9), with 1 false detection beside 2 found; "
+        "recall is 0.5 (at least 0.9), with 2 missed beside 2 found; "
+        "F1 is 0.5714 (at least 0.9), with 1 false detection and 2 missed beside 2 found; "
+        "only 2 frames had an answer (at least 3); worst was the frame at 0.50 s, with 1 false and 2 missed",
+    )
+
+
+def test_colours_swapped_are_false_and_missed() -> None:
+    it = judge()
+    detect(it, 1, Thing("blue", A), Thing("yellow", B))
+    found = values(decided(it))
+    assert (found["true-positives"], found["false-positives"], found["false-negatives"]) == (0, 2, 2)
+
+
+@pytest.mark.parametrize(("limit", "outcome"), [(0.5, "passed"), (0.500001, "failed")])
+def test_a_limit_is_kept_by_what_equals_it(limit: float, outcome: str) -> None:
+    it = judge(limits=Limits(recall=limit))
+    detect(it, 1, YELLOW)
+    assert decided(it).outcome == outcome
+
+
+def test_a_share_without_a_whole_keeps_no_limit() -> None:
+    it = judge(truth=None, limits=Limits(0.0, 0.0, 0.0), labels=["yellow"])
+    it.announce(Mark(2 * SECOND, 1), by_application=True)
+    reveal(it, 2, Thing("red", FAR))
+    assert decided(it).reason == (
+        "precision has no value (at least 0), as nothing was detected; recall has no value (at least 0), "
+        "as there was nothing to detect; F1 has no value (at least 0), as there was nothing"
+    )
+    assert [check.value for check in decided(it).checks[:3]] == [None] * 3
+
+
+def test_a_silent_application_fails() -> None:
+    assert decided(judge(), 12.5).reason == "no detection came before the input ended after 12.50 s"
+    it = judge(truth=None)
+    reveal(it, 1, YELLOW)
+    reveal(it, 2, YELLOW)
+    assert (decided(it).outcome, decided(it).reason) == (
+        "failed",
+        "no detection came before the input ended after 10.00 s, in 2 frames",
+    )
+    assert values(decided(it))["recall"] == 0.0
+
+
+def test_a_frame_that_was_announced_counts_without_a_detection() -> None:
+    for by_application in (True, False):
+        it = judge()
+        detect(it, 1, YELLOW, BLUE)
+        it.announce(Mark(2 * SECOND, 2), by_application)
+        found = values(decided(it))
+        assert (found["frames"], found["false-negatives"], found["answered"]) == (2, 2, 1 + by_application)
+
+
+def test_a_frame_of_a_live_truth_counts_without_a_detection_and_one_without_truth_does_not() -> None:
+    it = judge(truth=None)
+    reveal(it, 1, YELLOW, BLUE)
+    reveal(it, 2, YELLOW, BLUE)
+    detect(it, 2, YELLOW)
+    detect(it, 3, YELLOW, BLUE, BLUE)
+    found = values(decided(it))
+    assert (found["frames"], found["true-positives"], found["false-negatives"]) == (2, 1, 3)
+    assert (found["without-truth"], found["false-positives"]) == (1, 0)
+    assert decided(it).reason.endswith("; left out: 1 frame without a truth")
+
+
+def test_an_announced_frame_of_a_live_truth_may_be_empty() -> None:
+    it = judge(truth=None)
+    reveal(it, 1, YELLOW)
+    it.announce(Mark(2 * SECOND, 2), by_application=False)
+    detect(it, 2, YELLOW)
+    assert values(decided(it))["false-positives"] == 1
+
+
+def test_without_a_live_truth_there_is_no_verdict() -> None:
+    it = judge(truth=None)
+    detect(it, 1, YELLOW)
+    with pytest.raises(UnjudgeableError, match=r"^no true box came before the input ended after 10.00 s$"):
+        decided(it)
+
+
+def test_sample_times_that_never_meet_are_said() -> None:
+    it = judge(truth=None)
+    reveal(it, 1, YELLOW)
+    detect(it, 1.01, YELLOW)
+    detect(it, 2.01, YELLOW)
+    assert decided(it).reason == (
+        "there is no truth for any of 2 frames with detections: is their sample time that of the picture?"
+    )
+
+
+def test_pictures_of_a_film_that_were_not_answered_are_missed() -> None:
+    it = judge(FILM)
+    detect(it, 2, YELLOW, BLUE)
+    detect(it, 4, YELLOW, BLUE)
+    detect(it, 4.5, YELLOW)
+    found = values(decided(it))
+    assert (found["frames"], found["answered"], found["false-negatives"], found["without-truth"]) == (5, 2, 6, 1)
+
+
+def test_pictures_behind_the_last_answer_do_not_count_when_the_time_is_over() -> None:
+    it = judge(FILM)
+    detect(it, 2, YELLOW, BLUE)
+    detect(it, 4, YELLOW, BLUE)
+    at(it, 60)
+    assert it.verdict is None
+    at(it, 60.01)
+    assert it.verdict is not None and values(it.verdict)["frames"] == 4
+
+
+def test_pictures_by_number() -> None:
+    it = judge(Truth("number", {1: (YELLOW,), 2: (BLUE,)}))
+    detect(it, 1.3, YELLOW)
+    detect(it, 1.4, YELLOW)
+    detect(it, 2.2, BLUE)
+    found = values(decided(it))
+    assert (found["true-positives"], found["frames"], found["without-truth"]) == (2, 2, 1)
+
+
+def test_detections_that_come_late_do_not_count() -> None:
+    it = judge()
+    detect(it, 1, YELLOW)
+    at(it, 0.99)
+    detect(it, 1, YELLOW, BLUE)
+    at(it, 1.0)
+    it.detect(Mark(SECOND, 1), 7, BLUE.box)
+    found = values(decided(it))
+    assert (found["true-positives"], found["false-positives"], found["late"], found["repeated"]) == (2, 0, 1, 1)
+    assert decided(it).reason.endswith(
+        "; left out: 1 detection too late, 1 detection under a detectionId that was taken"
+    )
+
+
+def test_a_frame_that_is_young_when_the_time_is_over_does_not_count() -> None:
+    it = judge(max_time=5.0)
+    detect(it, 1, YELLOW, BLUE)
+    at(it, 4.9)
+    detect(it, 2, YELLOW)
+    at(it, 5.1)
+    assert it.verdict is not None and values(it.verdict)["frames"] == 1
+
+
+def test_answers_may_come_for_a_while_after_the_end() -> None:
+    it = judge()
+    it.end(BEGIN + 5 * SECOND)
+    detect(it, 1, YELLOW, BLUE)
+    at(it, 5.99)
+    assert it.verdict is None
+    at(it, 6.0)
+    assert it.verdict is not None and it.verdict.outcome == "passed"
+
+
+def test_without_a_delay_the_end_is_the_verdict() -> None:
+    it = judge(max_delay=0.0)
+    detect(it, 1, YELLOW, BLUE)
+    it.end(BEGIN + SECOND)
+    assert it.verdict is not None and it.verdict.outcome == "passed"
+
+
+def test_the_begin_forgets_what_was_before() -> None:
+    it = Judge(FILM, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
+    it.update(BEGIN - 9 * SECOND)
+    detect(it, 1)
+    detect(it, 2, YELLOW)
+    it.update(BEGIN - 5 * SECOND)
+    detect(it, 3, YELLOW)
+    it.begin(BEGIN)
+    it.begin(BEGIN + SECOND)
+    for frame in (2, 3, 4):
+        detect(it, frame, YELLOW, BLUE)
+    found = values(decided(it))
+    assert (found["true-positives"], found["late"]) == (2, 0)
+    assert found["frames"] == 3  # 1 and 5 were never spoken of
+
+
+def test_frames_before_the_start_do_not_count() -> None:
+    it = judge(start=2.0)
+    detect(it, 1, Thing("red", FAR))
+    at(it, 1.999)
+    detect(it, 2, Thing("red", FAR))
+    at(it, 2.0)
+    detect(it, 2, Thing("red", FAR))
+    detect(it, 3, YELLOW, BLUE)
+    found = values(decided(it))
+    assert (found["frames"], found["false-positives"], found["late"]) == (1, 0, 0)
+
+
+def test_classes_that_do_not_count() -> None:
+    it = judge(labels=["yellow"], limits=Limits(1.0, 1.0))
+    detect(it, 1, YELLOW, Thing("red", FAR), Thing("", FAR))
+    assert decided(it).outcome == "passed" and "recall-blue" not in values(decided(it))
+
+
+def test_a_detection_without_a_property_is_of_its_type_or_of_no_class() -> None:
+    it = judge()
+    it.detect(Mark(SECOND, 1), 0, A)
+    it.detect(Mark(SECOND, 1), 1, B)
+    it.detect(Mark(SECOND, 1), 1, Kind(2))
+    found = values(decided(it))
+    assert (found["false-positives"], found["precision-unnamed"], found["precision-type 2"]) == (2, 0.0, 0.0)
+
+
+def test_limits_of_each_class() -> None:
+    limits = Limits(recall=0.5, each_class=True)
+    it = judge(limits=limits)
+    detect(it, 1, YELLOW)
+    assert decided(it).reason == (
+        "recall of blue is 0 (at least 0.5), with 1 missed beside 0 found; "
+        "worst was the frame at 0.00 s, with 0 false and 1 missed"
+    )
+
+
+def test_the_worst_may_be_a_picture_that_was_never_answered() -> None:
+    it = judge(FILM)
+    detect(it, 2, YELLOW)
+    assert decided(it).reason.endswith("; worst was the frame of picture 1000000, with 0 false and 2 missed")
+
+
+def test_the_first_verdict_stands() -> None:
+    it = judge()
+    detect(it, 1, YELLOW, BLUE)
+    first = decided(it)
+    detect(it, 2, Thing("red", FAR))
+    assert decided(it, 99) is first
+
+
+def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
+    it = Judge(BOARD, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
+    it.update(BEGIN + 5 * SECOND)
+    it.begin(BEGIN)
+    detect(it, 1, YELLOW)
+    at(it, 5.9)
+    it.detect(Mark(SECOND, 1), 7, BLUE.box)
+    it.detect(Mark(SECOND, 1), 7, BLUE.label)
+    assert decided(it).outcome == "passed"

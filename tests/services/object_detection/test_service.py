@@ -1,0 +1,137 @@
+import json
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base import Context, Flags
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.object_detection.service import ANNOUNCEMENT, LOGIC, ObjectDetection
+from tests.services.object_detection.test_truth import single, write
+from tests.services.process import PATIENCE, ROOT, launch, running, say
+
+YELLOW, BLUE = ("color:yellow", (0.1, 0.1, 0.05, 0.05)), ("blue", (-0.015, 0.0, 0.031, 0.042))
+LIMITS = ("--min-recall=0.9", "--min-precision=0.9", "--min-frames=2")
+
+
+@pytest.fixture
+def truth(tmp_path: Path) -> Path:
+    return write(tmp_path, single())
+
+
+def flags(*words: str) -> Flags:
+    return parse(load_manifest(ROOT / "services" / "object_detection"), ["--cid=128", *words])
+
+
+def service(*words: str) -> ObjectDetection:
+    return ObjectDetection(Context("object-detection", flags(*words), MessageSet.standard()))
+
+
+def send(session: Session, sample_time: int, *things: Any, sender: int = 0, number: int = 0) -> None:
+    """The detections of a frame, as applications send them."""
+    for detection, (label, (x, y, width, height)) in enumerate(things):
+        key: dict[str, Any] = {
+            "sender_stamp": sender, "sample_time": sample_time, "sampleId": number, "detectionId": detection
+        }  # fmt: skip
+        say(session, LOGIC + "Type", type=1, **key)
+        say(session, LOGIC + "Property", property=label, **key)
+        say(session, LOGIC + "BoundingBox", x=x, y=y, width=width, height=height, **key)
+
+
+def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    output, errors = process.communicate(timeout=PATIENCE)
+    return process.returncode, output, errors
+
+
+def test_it_hears_what_its_flags_name(truth: Path) -> None:
+    kinds = {LOGIC + name for name in ("BoundingBox", "Property", "Type")}
+    judge = service(f"--truth={truth}", "--sender=3", "--frame-sender=3", *LIMITS)
+    assert set(judge.inputs) == {(name, 3) for name in kinds} | {(ANNOUNCEMENT, 3)}
+    assert judge.period is not None
+    judge = service("--truth-sender=9", *LIMITS)
+    assert set(judge.inputs) == {(name, sender) for name in kinds for sender in (0, 9)}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (LIMITS, "give the true boxes either as a file, --truth, or as messages, --truth-sender"),
+        ((*LIMITS, "--truth=TRUTH", "--truth-sender=9"), "give the true boxes either as a file"),
+        ((*LIMITS, "--truth-sender=0"), "--truth-sender=0 is the --sender of the detections"),
+        (
+            ("--truth=TRUTH",),
+            "there is no limit to judge by: give one or more of --min-precision, --min-recall, --min-f1",
+        ),
+        (
+            (*LIMITS, "--truth=TRUTH", "--max-time=1"),
+            "no frame could be judged: --max-time has to be longer than --from",
+        ),
+        ((*LIMITS, "--truth=TRUTH", "--classes=yelow"), "has no box of class 'yelow'; did you mean 'yellow'?"),
+        ((*LIMITS, "--truth=TRUTH", "--classes=x"), "has no box of class 'x'; it has blue, yellow"),
+    ],
+)
+def test_flags_that_leave_something_open_are_refused(truth: Path, words: tuple[str, ...], said: str) -> None:
+    with pytest.raises(ValueError) as raised:
+        service(*(word.replace("TRUTH", str(truth)) for word in words))
+    assert said in str(raised.value)
+
+
+def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
+    now = time.time_ns() // 1000
+    words = (f"--cid={cid}", f"--truth={truth}", *LIMITS)
+    with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
+        say(session, "dodo.TestBegin", sample_time=now)
+        for frame in range(20):
+            send(session, now + frame * 100_000, YELLOW, BLUE, number=frame)
+            send(session, now + frame * 100_000, ("red", (0, 0, 1, 1)), sender=4)
+        say(session, "dodo.EndOfInput", source="recording")
+        code, output, errors = finished(process)
+    assert (code, errors) == (0, "")
+    verdict = json.loads(output)
+    assert (verdict["outcome"], verdict["reason"]) == (
+        "passed",
+        "found 40 of 40 objects in 20 frames, with 0 false detections: "
+        "precision 1 (at least 0.9), recall 1 (at least 0.9)",
+    )
+    assert verdict["checks"][1] == {"name": "recall", "value": 1.0, "limit": {"min": 0.9}, "unit": "", "ok": True}
+
+
+def test_a_live_truth_on_the_bus(cid: int, tmp_path: Path) -> None:
+    now = time.time_ns() // 1000
+    words = (f"--cid={cid}", "--truth-sender=9", "--frame-sender=9", *LIMITS)
+    with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
+        say(session, "dodo.TestBegin", sample_time=now)
+        for frame in range(3):
+            send(session, now + frame, YELLOW, BLUE, sender=9)
+            send(session, now + frame, BLUE)
+        say(session, ANNOUNCEMENT, sender_stamp=9, sample_time=now + 7)
+        send(session, now + 7, YELLOW)
+        say(session, "dodo.EndOfInput", source="camera")
+        code, output, _ = finished(process)
+    checks = {check["name"]: check["value"] for check in json.loads(output)["checks"]}
+    assert code == 0 and json.loads(output)["outcome"] == "failed"
+    assert [checks[name] for name in ("true-positives", "false-positives", "false-negatives", "frames")] == [3, 1, 3, 4]
+
+
+def test_a_silent_application_fails_when_the_time_is_over(truth: Path, cid: int, tmp_path: Path) -> None:
+    words = (f"--cid={cid}", f"--truth={truth}", "--max-delay=0.01", "--max-time=0.05", *LIMITS)
+    with running("object_detection", tmp_path, *words) as process:
+        code, output, _ = finished(process)
+    assert (code, json.loads(output)["reason"]) == (0, "no detection came within 0.05 s")
+
+
+def test_a_truth_that_cannot_be_used_ends_it_before_it_is_ready(tmp_path: Path, cid: int) -> None:
+    path = write(tmp_path, "{}")
+    code, output, errors = finished(launch("object_detection", tmp_path, f"--cid={cid}", f"--truth={path}", *LIMITS))
+    assert (code, output) == (2, "")
+    assert errors.endswith(f"{path}: expected an object with a list 'images'\n")
+
+
+def test_help_says_what_it_does(tmp_path: Path, cid: int) -> None:
+    code, output, errors = finished(launch("object_detection", tmp_path, "--help"))
+    assert (code, errors) == (0, "") and "(equation 4.3)" in output

@@ -1,0 +1,128 @@
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.object_detection.boxes import Box, Thing
+from services.object_detection.frames import Mark
+from services.object_detection.truth import TruthError, load
+from tests.services.process import ROOT
+
+COCO = {
+    "images": [
+        {"id": 4, "width": 640, "height": 480, "sample_time": 1_000_000},
+        {"id": 5, "width": 320, "height": 240, "sample_time": 1_100_000},
+    ],
+    "categories": [{"id": 1, "name": "color:yellow"}, {"id": 2, "name": "blue"}],
+    "annotations": [
+        {"id": 1, "image_id": 4, "category_id": 1, "bbox": [64, 48, 32, 24.0], "iscrowd": 0},
+        {"id": 2, "image_id": 4, "category_id": 2, "bbox": [-10, 0, 20, 20]},
+    ],
+}
+YELLOW = Thing("yellow", Box(0.1, 0.1, 0.05, 0.05))
+
+
+def write(folder: Path, document: Any) -> Path:
+    path = folder / "truth.json"
+    path.write_text(document if isinstance(document, str) else json.dumps(document), encoding="utf-8")
+    return path
+
+
+def single() -> dict[str, Any]:
+    return {**copy.deepcopy(COCO), "images": [dict(COCO["images"][0])]}
+
+
+def test_one_picture_holds_for_every_frame(tmp_path: Path) -> None:
+    truth = load(write(tmp_path, single()), "one")
+    things = truth.of(Mark(1, 2))
+    assert things is not None and things == truth.of(Mark(3, 4))
+    assert things[0].label == "yellow" and things[0].box == pytest.approx(YELLOW.box)
+    assert truth.labels() == ["blue", "yellow"]
+
+
+def test_pictures_by_sample_time_and_by_number(tmp_path: Path) -> None:
+    path = write(tmp_path, COCO)
+    by_time, by_number = load(path, "sample-time"), load(path, "number")
+    assert [len(by_time.of(Mark(time, 4)) or "") for time in (1_000_000, 1_100_000)] == [2, 0]
+    assert by_time.of(Mark(1_100_000, 9)) == () and by_time.of(Mark(1_000_001, 4)) is None
+    assert by_number.of(Mark(1, 5)) == () and by_number.of(Mark(1_000_000, 6)) is None
+
+
+def change(path: tuple[Any, ...], value: Any) -> Callable[[dict[str, Any]], None]:
+    def apply(document: Any) -> None:
+        for key in path[:-1]:
+            document = document[key]
+        document[path[-1]] = value
+
+    return apply
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (("images",), None, ": expected an object with a list 'images'"),
+        (("annotations",), [], ": has no boxes (annotations)"),
+        (("annotations", 0), 3, ": annotations[0]: expected an object"),
+        (("annotations", 0, "image_id"), 6, ": annotations[0].image_id: there is none with the id 6"),
+        (("annotations", 1, "category_id"), "2", ": annotations[1].category_id: expected a whole number, 0 or more"),
+        (
+            ("annotations", 1, "bbox"),
+            [1, 2, 3],
+            ": annotations[1].bbox: expected four numbers [x, y, width, height] in",
+        ),
+        (("annotations", 1, "bbox"), [1, 2, 3, True], ": annotations[1].bbox: expected four numbers"),
+        (("annotations", 1, "bbox"), [1, 2, 3, float("nan")], ": annotations[1].bbox: expected four numbers"),
+        (("annotations", 1, "bbox"), [1, 2, 3, 10**400], ": annotations[1].bbox: expected four numbers"),
+        (("annotations", 1, "bbox"), [1, 2, 3, 0], ": annotations[1].bbox: has no area, 3 x 0 pixels"),
+        (("annotations", 1, "bbox"), [640, 2, 3, 3], ": annotations[1].bbox: lies outside its image of 640 x 480"),
+        (("annotations", 1, "bbox"), [-3, 2, 3, 3], ": annotations[1].bbox: lies outside its image of 640 x 480"),
+        (("annotations", 0, "iscrowd"), 1, ": annotations[0]: is a crowd (iscrowd), expected the box of one object"),
+        (("categories", 0, "name"), "color: ", ": categories[0].name: expected a text"),
+        (("images", 0, "width"), 0, ": images[0].width: expected a whole number, 1 or more"),
+        (("images", 0, "sample_time"), 1.5, ": images[0].sample_time: expected a whole number, 0 or more"),
+        (("images", 1, "id"), 4, ": images: two of them have the same id"),
+        (("images", 1, "sample_time"), 1_000_000, ": images: two of them have the same sample_time"),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said: str) -> None:
+    document = copy.deepcopy(COCO)
+    change(path, value)(document)
+    file = write(tmp_path, document)
+    with pytest.raises(TruthError) as raised:
+        load(file, "sample-time")
+    assert str(raised.value).startswith(f"{file}{said}")
+
+
+def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TruthError, match=r"has 2 images, and one was to hold for every frame: see --truth-frames$"):
+        load(write(tmp_path, COCO), "one")
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2", "\x00", "[" * 100_000])
+def test_files_that_are_no_json(tmp_path: Path, text: str) -> None:
+    for path in (write(tmp_path, text), tmp_path / "absent.json", tmp_path):
+        with pytest.raises(TruthError, match=r"cannot be read as COCO JSON: "):
+            load(path, "one")
+
+
+KEYS = ["images", "annotations", "categories", "id", "name", "bbox", "width", "height", "image_id", "category_id"]
+values = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=3)
+
+
+@given(st.recursive(values, lambda v: st.lists(v, max_size=3) | st.dictionaries(st.sampled_from(KEYS), v)))
+def test_any_json_is_a_truth_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, document: Any) -> None:
+    path = write(tmp_path_factory.getbasetemp(), document)
+    with pytest.raises(TruthError, match=r"truth\.json: "):
+        load(path, "number")
+
+
+def test_the_registry_has_truths_that_can_be_used() -> None:
+    paths = sorted((ROOT / "tests_registry" / "truths").glob("*.json"))
+    assert paths
+    for path in paths:
+        assert load(path, "one").labels() == ["blue", "yellow"]

@@ -1,0 +1,91 @@
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from services.rec_replay.selection import Selection, SelectionError, select
+
+S = 1_000_000
+T0 = 1_600_000_000 * S
+STEERING, PEDAL, IMAGE = 1090, 1086, 1055
+ENTRIES = [  # id, sender stamp, sample time in s after T0; None for zero
+    (STEERING, 0, 0.5),
+    (PEDAL, 0, 0.0),
+    (IMAGE, 0, 1.0),
+    (IMAGE, 1, 1.1),
+    (2900, 0, 1.2),
+    (STEERING, 2, 9.0),
+    (4711, 0, None),
+]
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Iterator[Recording]:
+    path = tmp_path / "drive.rec"
+    with RecordingWriter(path) as writer:
+        for id_, stamp, time in ENTRIES:
+            sampled = 0 if time is None else T0 + round(time * S)
+            writer.write(Envelope(id_, b"", T0 + 2 * S, 0, sampled, stamp))
+    with Recording(path) as recording:
+        yield recording
+
+
+def chosen(recording: Recording, selection: Selection, timemod: float = 1.0) -> list[tuple[int, float, str]]:
+    part = select(recording, selection, MessageSet.standard(), S, timemod)
+    how = [
+        f"{'sent ' * sent}{'shown' * shown}".strip()
+        for sent, shown in zip(part.sent.tolist(), part.shown.tolist(), strict=True)
+    ]
+    return list(zip(part.rows.tolist(), (part.due / S).tolist(), how, strict=True))
+
+
+def test_all_in_the_order_of_sample_times_with_gaps_cut(recording: Recording) -> None:
+    assert chosen(recording, Selection()) == [
+        (6, 0.0, "sent"),
+        (1, 1.0, "sent"),
+        (0, 1.5, "sent"),
+        (2, 2.0, "shown"),
+        (5, 3.2, "sent"),
+    ]
+
+
+def test_faster(recording: Recording) -> None:
+    assert [due for _, due, _ in chosen(recording, Selection(), 10.0)] == [0.0, 0.1, 0.15, 0.2, 0.32]
+
+
+@pytest.mark.parametrize(
+    ("selection", "rows"),
+    [
+        (Selection(messages=["opendlv.proxy.GroundSteeringRequest"]), [0, 2, 5]),
+        (Selection(messages=["opendlv.proxy.GroundSteeringRequest/2", "4711"], video_sender=None), [6, 5]),
+        (Selection(without=["opendlv.proxy.GroundSteeringRequest/0", "1086"]), [6, 2, 5]),
+        (Selection(video_sender=1), [6, 1, 0, 3, 5]),
+        (Selection(video_sender=None, send_video=True), [6, 1, 0, 2, 3, 5]),
+        (Selection(start=0.4, end=1.05), [0, 2]),
+        (Selection(start=1.5), [6, 5]),  # a message without a sample time counts from when it was sent
+    ],
+)
+def test_parts(recording: Recording, selection: Selection, rows: list[int]) -> None:
+    assert [row for row, _, _ in chosen(recording, selection)] == rows
+
+
+def test_filters_do_not_change_the_times(recording: Recording) -> None:
+    some = chosen(recording, Selection(messages=["4711", "opendlv.proxy.GroundSteeringRequest/2"], video_sender=None))
+    assert [due for _, due, _ in some] == [0.0, 3.2]
+
+
+@pytest.mark.parametrize(
+    ("selection", "problem"),
+    [
+        (Selection(start=60), "is played: the part that is chosen holds no message"),
+        (Selection(messages=["1090/x"]), "'1090/x' is no message: after the slash stands a sender stamp, a number"),
+        (Selection(without=["opendlv.GroundSteeringRequest"]), "did you mean `opendlv.proxy.GroundSteeringRequest`"),
+    ],
+)
+def test_wrong_parts(recording: Recording, selection: Selection, problem: str) -> None:
+    with pytest.raises(SelectionError, match=problem):
+        chosen(recording, selection)

@@ -1,0 +1,82 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.video import VideoError
+from services.rec_replay.pictures import Screen, first_frame, pixels
+from services.rec_replay.selection import Selection, select
+from services.rec_replay.stream import Stream
+from tests.services.rec_replay.recordings import IMAGE, S, images, message, picture, write
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    times = [n / 10 for n in range(10)]
+    pedals = [message("opendlv.proxy.PedalPositionRequest", time + 0.05, position=time) for time in times]
+    return write(tmp_path / "drive.rec", [*images(times), *pedals])
+
+
+def stream(recording: Recording) -> Stream:
+    return Stream(recording, select(recording, Selection(), MessageSet.standard(), S))
+
+
+def shown(one: Stream) -> list[int | None]:
+    """The number of the next entry's picture, and so on to the end; None where an entry has none."""
+    numbers: list[int | None] = []
+    while True:
+        try:
+            entry = one.take()
+        except StopIteration:
+            return numbers
+        found = [n for n in range(10) if entry.picture and np.array_equal(entry.picture.i420, picture(n))]
+        numbers.append(found[0] if found else None)
+
+
+def test_all_pictures_between_messages(path: Path) -> None:
+    with Recording(path) as recording:
+        one = stream(recording)
+        one.prepare()
+        one.prepare()
+        assert shown(one) == [number for n in range(10) for number in (n, None)]
+        assert one.decoder.undecoded == 0
+
+
+@pytest.mark.parametrize("position", [0, 1, 2, 9, 10, 15, 19])
+def test_pictures_are_whole_wherever_one_seeks(path: Path, position: int) -> None:
+    with Recording(path) as recording:
+        one = stream(recording)
+        all_ = shown(one)
+        one.seek(position)
+        assert shown(one) == all_[position:]
+        assert one.decoder.undecoded == 0
+
+
+def test_pictures_that_cannot_be_decoded_are_counted(tmp_path: Path) -> None:
+    good = images([n / 10 for n in range(6)])
+    broken = [good[1], message(IMAGE, 0.15, format="h264", data=b"nothing"), good[4], good[5]]
+    strange = message(IMAGE, 0.6, format="jpegxl", width=64, height=48, data=b"x")
+    with Recording(write(tmp_path / "bad.rec", [*broken, strange])) as recording:
+        one = stream(recording)
+        assert shown(one) == [None, None, 4, 5, None]
+        assert one.decoder.undecoded == 3
+
+
+def test_a_recording_without_a_decodable_picture(tmp_path: Path) -> None:
+    path = write(tmp_path / "bad.rec", images([0, 0.1])[1:])
+    with Recording(path) as recording, pytest.raises(VideoError) as caught:
+        first_frame(recording, np.array([0]))
+    assert str(caught.value) == f"none of the 1 pictures in {path} can be decoded"
+
+
+def test_a_picture_of_another_size_is_left_out(path: Path) -> None:
+    class Memory:
+        size = 4
+
+    with Recording(path) as recording:
+        one = pixels(first_frame(recording, np.arange(10)))
+    screen = Screen(Memory(), None)  # type: ignore[arg-type]
+    screen.show(one, 5)
+    assert (screen.shown, screen.misfits) == (0, 1)
