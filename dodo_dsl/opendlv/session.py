@@ -20,11 +20,14 @@ RECEIVE_BUFFER_BYTES = 26_214_400
 CIDS = range(1, 255)
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
+_IP_MULTICAST_ALL = 49  # Linux: linux/in.h
 _SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
 _SO_RXQ_OVFL = 40
 _TIMESPEC = struct.Struct("@qq")
 _COUNT = struct.Struct("@I")
 _ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
+
+Address = tuple[str, int]
 
 
 class SessionError(OSError):
@@ -46,6 +49,9 @@ class Session:
         self.messages = messages or MessageSet.standard()
         self.garbage = 0
         self.lost = 0
+        self.is_member = True
+        self.source: Address = ("", 0)
+        """Host and port from which the last datagram came."""
         group = (f"225.0.0.{cid}", PORT)
         try:
             self._receiver = _receiver(group)
@@ -59,20 +65,18 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._receiver, select.POLLIN)
 
-    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> Envelope:
-        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now); returns how.
+    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> bytes:
+        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now); returns the frame.
 
         Raises MessageError, FrameError or SessionError.
         """
         now = time.time_ns() // 1000
         sampled = now if sample_time is None else sample_time
         id_, payload = self.messages.id(message), self.messages.encode(message)
-        envelope = Envelope(id_, payload, now, 0, sampled, sender_stamp)
-        self.send_envelope(envelope)
-        return envelope
+        return self.send_envelope(Envelope(id_, payload, now, 0, sampled, sender_stamp))
 
-    def send_envelope(self, envelope: Envelope) -> None:
-        """Send an envelope as it is; raises FrameError, and SessionError above 65,507 bytes."""
+    def send_envelope(self, envelope: Envelope) -> bytes:
+        """Send an envelope as it is, and return its frame; raises FrameError, and SessionError above 65,507 bytes."""
         frame = encode_frame(envelope)
         if len(frame) > MAX_DATAGRAM_BYTES:
             raise SessionError(
@@ -82,6 +86,7 @@ class Session:
             self._sender.send(frame)
         except OSError as error:
             raise SessionError(f"the bus does not take a message: {error.strerror}") from None
+        return frame
 
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
         """The next envelope of another member, with `received` set; None when `timeout` seconds are over.
@@ -106,6 +111,19 @@ class Session:
         """The file descriptor to select on for reading."""
         return self._receiver.fileno()
 
+    def deafen(self) -> None:
+        """Hear nothing from now on, so that this process is not woken for it; sending goes on."""
+        if self.is_member:
+            membership = _membership(f"225.0.0.{self.cid}")
+            self._receiver.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
+            self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
+            self.is_member = False
+
+    @property
+    def port(self) -> int:
+        """From which this session's datagrams come."""
+        return int(self._own_address[1])
+
     def close(self) -> None:
         """Leave the bus."""
         self._receiver.close()
@@ -125,6 +143,7 @@ class Session:
             self.lost = _lost(ancillary)
         if address == self._own_address:
             return None
+        self.source = address
         try:
             return decode_frame(bytes(self._view[:size]), _received(ancillary))
         except FrameError:
@@ -174,10 +193,13 @@ def _receiver(group: tuple[str, int]) -> socket.socket:
         receiver.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         receiver.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
         receiver.bind(group)
-        membership = socket.inet_aton(group[0]) + socket.inet_aton("0.0.0.0")  # noqa: S104
-        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(group[0]))
         receiver.setblocking(False)
     except OSError:
         receiver.close()
         raise
     return receiver
+
+
+def _membership(group: str) -> bytes:
+    return socket.inet_aton(group) + socket.inet_aton("0.0.0.0")  # noqa: S104

@@ -27,6 +27,11 @@ class Inbox(Protocol):
         """Let the service have it."""
         ...
 
+    @property
+    def observes(self) -> bool:
+        """Whether the service looks at all that is on the bus."""
+        ...
+
     def overhear(self, envelope: Envelope) -> None:
         """It is on the bus, but the service is not to act upon it."""
         ...
@@ -48,7 +53,7 @@ class Clock(Protocol):
         """
         ...
 
-    def sent(self, envelope: Envelope) -> None:
+    def sent(self, frame: bytes) -> None:
         """The service has sent this."""
         ...
 
@@ -86,7 +91,7 @@ class RealTimeClock:
             due += period
             due += self._skipped(due, period)
 
-    def sent(self, envelope: Envelope) -> None:
+    def sent(self, frame: bytes) -> None:
         """Time goes on by itself."""
 
     def memory(self, name: str, size: int) -> SharedMemory:

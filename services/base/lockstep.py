@@ -4,31 +4,34 @@ What a service hears comes inside the step message and nowhere else, and what it
 that no lost or late datagram can change a result (``docs/lockstep.md``).
 """
 
-import time
+from collections import deque
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.memory import SharedMemory
 from dodo_dsl.opendlv.session import Session
+from services.base.announced import AnnouncedMemory, Screen
 from services.base.clock import Inbox
-from services.base.parts import STEP, STEP_DONE, Pieces, cut, frames
+from services.base.ear import Ear, Reply
+from services.base.parts import STEP_DONE, cut
 
 EPOCH = 1_700_000_000_000_000
 """The time at which every test in lockstep begins, in microseconds since the epoch."""
 
-_SLICE = 0.1
-_LOOK = 0.0002
+LONGEST = 2 * 86_400_000_000
+"""No test lasts longer, in microseconds."""
+
+_GOODBYES = 3
 
 
-class AnnouncedMemory(SharedMemory):
-    """Shared memory that leaves it to the clock to wake its readers."""
+class Order(NamedTuple):
+    """What the clock wants: go on to ``time``, knowing what was ``heard``; ``show`` the pictures that are new."""
 
-    news: "list[AnnouncedMemory]"
-
-    def notify_all(self) -> None:
-        """There is a new picture; the clock tells of it when the step has been answered."""
-        if self not in self.news:
-            self.news.append(self)
+    number: int
+    time: int
+    show: bool
+    heard: list[Envelope]
 
 
 class LockstepClock:
@@ -37,16 +40,15 @@ class LockstepClock:
     relays = True
 
     def __init__(self, session: Session, name: str, readers: int) -> None:
-        self._session, self._name, self._readers = session, name, readers
-        self._step, self._done = (session.messages.type(kind) for kind in (STEP, STEP_DONE))
-        self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
-        self._now = EPOCH
-        self._pieces = Pieces()
+        self._session, self._name = session, name
+        self._done = session.messages.type(STEP_DONE)
+        self._ear = Ear(session, name)
+        self._now = EPOCH - 1
         self._number = -1
-        self._answer: list[object] = []
-        self._sent: list[Envelope] = []
-        self._memories: list[AnnouncedMemory] = []
-        self._new: list[AnnouncedMemory] = []
+        self._open = False
+        self._sent: list[bytes] = []
+        self._screen = Screen(readers)
+        self._overheard: list[Envelope] = []
         self.next = 0
         """When the service has something to say next, in us of test time; 0 when that is not known."""
 
@@ -56,94 +58,86 @@ class LockstepClock:
     def steps(self, period: int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
         due = EPOCH
-        while True:
-            step = self._wait(inbox, stopped)
-            if step is None:
-                return
-            until, heard = step
-            heard.sort(key=lambda envelope: envelope.sample_time)
-            waiting = iter(heard)
-            envelope = next(waiting, None)
-            while due <= until:
-                while envelope is not None and envelope.sample_time <= due:
-                    inbox.handle(envelope)
-                    envelope = next(waiting, None)
+        while (order := self._next_order(inbox, stopped)) is not None:
+            self._look(inbox, order.time)
+            heard = deque(sorted(order.heard, key=lambda envelope: envelope.sample_time))
+            while due <= order.time:
+                while heard and heard[0].sample_time <= due:
+                    inbox.handle(heard.popleft())
                 if stopped():
                     return
                 self._now = due
                 yield due
                 due += period
-            while envelope is not None:
+            self._now = order.time
+            for envelope in heard:
                 inbox.handle(envelope)
-                envelope = next(waiting, None)
-            self._now = until
-            if stopped():
+            if stopped() or (order.show and not self._screen.await_readers(stopped)):
                 return
-            self._reply(ended=False)
-            self._announce(stopped)
+            self._answer(order.show)
 
-    def sent(self, envelope: Envelope) -> None:
+    def sent(self, frame: bytes) -> None:
         """The service has sent this."""
-        self._sent.append(envelope)
-
-    def close(self) -> None:
-        """The service ends: the step that it is in is answered."""
-        if self._number >= 0:
-            self._reply(ended=True)
+        self._sent.append(frame)
 
     def memory(self, name: str, size: int) -> SharedMemory:
         """New shared memory whose pictures are announced once, when their readers wait for them."""
         memory = AnnouncedMemory.create(name, size)
-        memory.news = self._new
-        self._memories.append(memory)
+        self._screen.memories.append(memory)
         return memory
 
-    def _announce(self, stopped: Callable[[], bool]) -> None:
-        """Tell of new pictures as soon as the readers wait, so that none is missed and none is read twice."""
-        if not self._new:
-            return
-        while sum(memory.readers_waiting() for memory in self._memories) < self._readers:
-            if stopped():
-                return
-            time.sleep(_LOOK)
-        for memory in self._new:
-            SharedMemory.notify_all(memory)
-        self._new.clear()
+    def close(self) -> None:
+        """The service ends: the step that it is in is answered, and its answer has arrived."""
+        if self._open:
+            self._open = False
+            self._ear.answer(self._reply(ended=True))
+            for _ in range(_GOODBYES):
+                if self._ear.is_acknowledged():
+                    break
+                self._ear.repeat()
+        self._ear.close()
 
-    def _wait(self, inbox: Inbox, stopped: Callable[[], bool]) -> tuple[int, list[Envelope]] | None:
-        """The next step that is for this service: its time, and what is to be heard; None when it is to stop."""
+    def _next_order(self, inbox: Inbox, stopped: Callable[[], bool]) -> Order | None:
+        """The next step that is for this service; None when it is to stop."""
         while not stopped():
-            envelope = inbox.receive(_SLICE)
-            if envelope is None:
-                continue
-            if envelope.data_type != self._step_id:
-                if envelope.data_type != self._done_id:
-                    inbox.overhear(envelope)
-                continue
-            step = self._session.messages.decode(envelope.data_type, envelope.payload)
-            if self._name not in step.services.split(","):
-                continue
-            if step.number == self._number:
-                self._repeat()
-                continue
-            data = self._pieces.take(step.number, step.part, step.parts, step.frames)
-            if data is not None:
-                self._number = step.number
-                return step.time, list(frames(data))
+            step = self._ear.listen(inbox.observes, self._overhear)
+            if step is not None:
+                self._number, self._open = step.number, True
+                return Order(step.number, step.time, step.show, [said.envelope for said in step.heard])
         return None
 
-    def _reply(self, ended: bool) -> None:
-        pieces = cut(self._sent)
-        self._answer = [
-            self._done(
-                number=self._number, service=self._name, part=part, parts=len(pieces), frames=data,
-                pictures=len(self._new), ended=ended, next=self.next,
-            )
-            for part, data in enumerate(pieces)
-        ]  # fmt: skip
-        self._sent = []
-        self._repeat()
+    def _overhear(self, envelope: Envelope) -> None:
+        self._overheard.append(envelope)
 
-    def _repeat(self) -> None:
-        for message in self._answer:
-            self._session.send(message)  # type: ignore[arg-type]
+    def _look(self, inbox: Inbox, until: int) -> None:
+        """Let the service look at what was on the bus; what belongs to a later step waits for that."""
+        later = []
+        for envelope in self._overheard:
+            if until < envelope.sample_time <= EPOCH + LONGEST:
+                later.append(envelope)
+            else:
+                inbox.overhear(envelope)
+        self._overheard = later
+
+    def _answer(self, show: bool) -> None:
+        """A picture is announced behind the answer, so that all that its readers say stands behind that, too."""
+        self._open = False
+        self._ear.answer(self._reply(ended=False), on_the_bus=show)
+        if show:
+            self._screen.announce()
+
+    def _reply(self, ended: bool) -> Reply:
+        pieces = cut(self._sent)
+        self._sent = []
+        facts = {
+            "number": self._number,
+            "service": self._name,
+            "parts": len(pieces),
+            "memories": len(self._screen.memories),
+            "pictures": len(self._screen.new),
+            "sampled": self._screen.sampled,
+            "ended": ended,
+            "next": self.next,
+            "port": self._session.port,
+        }
+        return [self._done(part=part, frames=data, **facts) for part, data in enumerate(pieces)]

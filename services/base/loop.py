@@ -62,6 +62,11 @@ class Loop:
         """For the clock: the next envelope within ``timeout`` seconds."""
         return self.session.receive(timeout)
 
+    @property
+    def observes(self) -> bool:
+        """For the clock: whether the service looks at all that is on the bus."""
+        return self.service.observe is not None
+
     def overhear(self, envelope: Envelope) -> None:
         """For the clock: an envelope that the service may only look at."""
         if self.service.observe is not None:
@@ -86,8 +91,7 @@ class Loop:
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         if isinstance(output, Envelope):
-            self.session.send_envelope(output)
-            self.clock.sent(output)
+            self.clock.sent(self.session.send_envelope(output))
             return
         message, stamp = output if isinstance(output, Output) else (output, self.sender_stamp)
         self.clock.sent(self.session.send(message, now, stamp))

@@ -4,12 +4,12 @@ import sys
 from pathlib import Path
 
 from services.base import Context, Service, run
+from services.base.channel import Channel
+from services.base.clock import MICROSECONDS
 from services.base.service import period_of
 from services.clock.answers import Answers, kinds
 from services.clock.model import Patience, Roles
 from services.clock.service import ClockService
-
-_MICROSECONDS = 1_000_000
 
 
 def build(context: Context) -> Service:
@@ -19,15 +19,11 @@ def build(context: Context) -> Service:
     answers = Answers(kinds(flags["answers"], ids), kinds(flags["hears"], ids), done[0] if done else None)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"
-    return ClockService(
-        context.session,
-        roles,
-        answers,
-        period_of(flags["freq"]),
-        round(flags["timeout"] * _MICROSECONDS),
-        Patience(flags["first-patience"], flags["patience"]),
-        flags["wall-timeout"],
-    )
+    channel = Channel(context.session.cid, context.messages)
+    context.resources.callback(channel.close)
+    timeout = round(flags["timeout"] * MICROSECONDS)
+    patience = Patience(flags["first-patience"], flags["patience"])
+    return ClockService(context.session, channel, roles, answers, period_of(flags["freq"]), timeout, patience)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Which of the application's messages answer a frame."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from dodo_dsl.opendlv.envelope import Envelope
@@ -38,7 +38,7 @@ class Answers:
     _is_done: bool = False
 
     def open(self, time: int) -> None:
-        """The frame of this time (us) is made; what came since the last one is dropped, unless only listened to."""
+        """The frame of this sample time (us) is about to be seen: answers before this were not to it."""
         self._time = time
         self._times.add(time)
         self._chosen, self._is_done = {}, False
@@ -47,21 +47,26 @@ class Answers:
         """Something came on the bus.
 
         An answer counts by the frame's sample time, or as the first after it where the application does not copy
-        sample times, so that its own are those of no frame.
+        sample times, so that its own are those of no frame; it then gets the frame's.
         """
         stale = envelope.sample_time != self._time and envelope.sample_time in self._times
+        known = envelope if envelope.sample_time in self._times else envelope._replace(sample_time=self._time)
         if self.done is not None and self.done.is_of(envelope) and not stale:
             self._is_done = True
         for kind in self.wanted:
             if kind.is_of(envelope):
-                if stale or kind in self._chosen or self.complete:
+                if stale or kind in self._chosen or not self._time:
                     self.surplus += 1
                 else:
-                    self._chosen[kind] = envelope._replace(sample_time=self._time)
+                    self._chosen[kind] = known
                 return
-        if any(kind.is_of(envelope) for kind in self.heard):
-            known = envelope.sample_time in self._times
-            self._others.append(envelope if known else envelope._replace(sample_time=self._time))
+        if self._time and any(kind.is_of(envelope) for kind in self.heard):
+            self._others.append(known)
+
+    @property
+    def asked(self) -> bool:
+        """Whether anything is known that answers a frame."""
+        return bool(self.wanted) or self.done is not None
 
     @property
     def complete(self) -> bool:
@@ -81,13 +86,16 @@ class Answers:
         """The answer, in an order that does not depend on which sender was faster."""
         others, self._others = self._others, []
         others.sort(key=lambda e: (e.sample_time, e.data_type, e.sender_stamp))
-        return [*others, *(self._chosen[kind] for kind in self.wanted if kind in self._chosen)]
+        chosen, self._chosen = self._chosen, {}
+        return [*others, *(chosen[kind] for kind in self.wanted if kind in chosen)]
 
 
-def kinds(names: Iterable[str], ids: dict[str, int]) -> tuple[Kind, ...]:
-    """Messages written as ``name`` or ``name/senderStamp``; raises KeyError for an unknown name."""
+def kinds(names: Iterable[str], ids: Mapping[str, int]) -> tuple[Kind, ...]:
+    """Messages written as ``name`` or ``name/senderStamp``; raises ValueError for an unknown name."""
     found = []
     for text in names:
         name, _, stamp = text.partition("/")
+        if name not in ids or not (stamp.isdecimal() or not stamp):
+            raise ValueError(f"'{text}' is no message, expected a name such as opendlv.proxy.GroundSteeringRequest/0")
         found.append(Kind(text, ids[name], int(stamp) if stamp else None))
     return tuple(found)

@@ -1,47 +1,41 @@
-"""The clock on the bus: steps that are repeated until they are answered, and what the runner is told."""
+"""The clock on the bus: it waits for the test's begin, steps it to its end, and tells the runner how far it got."""
 
 import json
 import time
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
 
-from dodo_dsl.opendlv.envelope import Envelope, FrameError
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
+from services.base.channel import Channel
 from services.base.lockstep import EPOCH
-from services.base.parts import STEP, STEP_DONE, Pieces, cut, frames
 from services.base.service import Service
 from services.clock.answers import Answers
-from services.clock.model import Done, Patience, Roles, Stepper, TimedOut, Unanswered
+from services.clock.exchange import Exchange
+from services.clock.model import Patience, Roles, Stepper, Stuck, TimedOut, Unanswered
 
-REPEAT_S = 0.2
 _TELL_S = 1.0
 _SLICE = 0.05
 
 
 class ClockService(Service):
-    """Drives a test by its Stepper."""
+    """Drives a test by its Stepper; ``period`` and ``timeout`` in us of test time."""
 
     def __init__(
         self,
         session: Session,
+        channel: Channel,
         roles: Roles,
         answers: Answers,
         period: int,
         timeout: int,
         patience: Patience,
-        wall_timeout: float,
     ) -> None:
         self._session, self._answers = session, answers
-        self._step = session.messages.type(STEP)
-        self._done_id, self._begin_id = session.messages.id(STEP_DONE), session.messages.id("dodo.TestBegin")
-        self._stepper = Stepper(roles, period, timeout, patience, answers, self._exchange, self._wait)
-        self._wall_timeout = wall_timeout
-        self._number = 0
-        self._dones: dict[tuple[int, str], Done] = {}
-        self._pieces: dict[str, Pieces] = {}
+        self._begin_id = session.messages.id("dodo.TestBegin")
+        exchange = Exchange(session, channel, answers.take, self._over)
+        self._stepper = Stepper(roles, period, timeout, patience, answers, exchange, self._over)
         self._told = 0.0
         self._stopped: Callable[[], bool] = lambda: False
-        self._deadline = float("inf")
         self.drive = self._drive
 
     def _drive(self, stopped: Callable[[], bool]) -> None:
@@ -49,20 +43,21 @@ class ClockService(Service):
         begin = self._await_begin()
         if begin is None:
             return
-        self._deadline = time.monotonic() + self._wall_timeout
+        self._told = time.monotonic()
         try:
-            self._stepper.run(begin._replace(sample_time=EPOCH), self._over)
-        except Unanswered as unanswered:
-            self._say("unanswered", reason=str(unanswered))
+            self._stepper.meet()
+            self._stepper.run(begin._replace(sample_time=EPOCH))
+        except Unanswered as problem:
+            self._say("unanswered", reason=str(problem))
+        except Stuck as problem:
+            self._say("stuck", reason=str(problem))
         except TimedOut:
-            self._say("timeout", reason="")
-        self._tell_time(last=True)
+            self._say("timeout")
+        self._tell_time()
 
     def _over(self) -> bool:
-        if time.monotonic() > self._deadline:
-            self._say("timeout", reason=f"the test took more than {self._wall_timeout:g} s of wall time")
-            self._deadline = float("inf")
-            return True
+        if time.monotonic() - self._told > _TELL_S:
+            self._tell_time()
         return self._stopped()
 
     def _await_begin(self) -> Envelope | None:
@@ -72,56 +67,10 @@ class ClockService(Service):
                 return envelope
         return None
 
-    def _exchange(self, orders: Sequence[tuple[str, int, list[Envelope]]]) -> list[Done]:
-        """Sends the steps again until each is answered; a service that has died ends the test from outside."""
-        messages: dict[tuple[int, str], list[Any]] = {}
-        for name, until, heard in orders:
-            self._number += 1
-            pieces = cut(heard)
-            messages[(self._number, name)] = [
-                self._step(number=self._number, services=name, time=until, part=part, parts=len(pieces), frames=data)
-                for part, data in enumerate(pieces)
-            ]
-        repeat = 0.0
-        while missing := [key for key in messages if key not in self._dones]:
-            if self._over():
-                return []
-            if time.monotonic() >= repeat:
-                for key in missing:
-                    for message in messages[key]:
-                        self._session.send(message)
-                repeat = time.monotonic() + REPEAT_S
-            self._wait(max(0.0, repeat - time.monotonic()))
-        self._tell_time()
-        return [self._dones.pop(key) for key in messages]
-
-    def _wait(self, timeout: float) -> None:
-        """Take what comes next on the bus."""
-        envelope = self._session.receive(min(timeout, _SLICE))
-        if envelope is None:
-            return
-        if envelope.data_type == self._done_id:
-            self._take_done(envelope)
-        else:
-            self._answers.take(envelope)
-
-    def _take_done(self, envelope: Envelope) -> None:
-        try:
-            done: Any = self._session.messages.decode(envelope.data_type, envelope.payload)
-            pieces = self._pieces.setdefault(done.service, Pieces())
-            data = pieces.take(done.number, done.part, done.parts, done.frames)
-            if data is not None:
-                sent = tuple(frames(data))
-                self._dones[(done.number, done.service)] = Done(
-                    done.service, sent, done.pictures, done.ended, done.next
-                )
-        except (FrameError, ValueError):
-            return  # not from one of ours
-
-    def _tell_time(self, last: bool = False) -> None:
-        if last or time.monotonic() - self._told > _TELL_S:
-            self._told = time.monotonic()
-            self._say("time", s=(self._stepper.now - EPOCH) / 1e6, surplus=self._answers.surplus)
+    def _tell_time(self) -> None:
+        self._told = time.monotonic()
+        seconds = (self._stepper.now - EPOCH) / 1e6
+        self._say("time", s=seconds, frames=self._stepper.frames, surplus=self._answers.surplus)
 
     @staticmethod
     def _say(kind: str, **facts: object) -> None:
