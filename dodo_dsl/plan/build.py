@@ -6,10 +6,14 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dodo_dsl.check.context import Context
+from dodo_dsl.check.lockstep import rates
+from dodo_dsl.check.wiring import wire
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
 from dodo_dsl.plan.files import Copy, FilesError, copies
+from dodo_dsl.plan.lockstep import CLOCK, clock_flags, lockstep
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
@@ -20,6 +24,11 @@ from dodo_dsl.spec.values import Value, convert, default_value
 
 RECORDER = "dodo-recorder"
 RECORDING = "test.rec"
+
+
+def _readers(application: ApplicationSource) -> int:
+    """How many processes of the application wait for each picture."""
+    return sum(own.readers for own in application.declared.values() if own and own.readers) or 1
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,7 @@ def build(
         _Builder(spec, manifests, deployment, out, cid, index, tree, planned)
         for index, (spec, cid) in enumerate(zip(ordered, cids, strict=True))
     ]
-    plans = tuple(builder.plan(application.spans) for builder in builders)
+    plans = tuple(builder.plan(application) for builder in builders)
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
     return Compiled(Suite(plans, deployment.gates), files), problems
@@ -102,11 +111,14 @@ class _Builder:
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
 
-    def plan(self, application: Container[str]) -> Plan:
-        """The instance's Plan; ``application`` holds the names of the application's services."""
+    def plan(self, application: ApplicationSource) -> Plan:
+        """The instance's Plan with this application."""
         spec, rig = self.spec, self.rig
+        steps = spec.clock == "lockstep"
         services = (*self._recorder(), *(self._service(use) for use in spec.uses))
-        self._names_apart(services, application)
+        if steps:
+            services = (self._clock(application), *services)
+        self._names_apart(services, application.spans)
         judges = tuple(s.name for s in services if s.judge)
         for key in ("name", "level", "kind", "timeout", "clock", "rig", "matrix", "seed", "isolation", "record"):
             if key in spec.spans:
@@ -132,6 +144,7 @@ class _Builder:
             sandbox_image=self._image("sandbox"),
             services=services,
             application=self.application(self.cid, isolated, judges, hardware, privileged),
+            lockstep=lockstep(spec.timeout_s or 0.0, _readers(application)) if steps else None,
             rig=rig.name if rig else "",
             messages=messages,
             source_map=self.places,
@@ -167,6 +180,14 @@ class _Builder:
         flags = (Flag("rec", RECORDING, "report"), *frames, Flag("cid", str(self.cid)))
         image = self._image(manifest.image)
         return [Service("environment", RECORDER, manifest.name, image, manifest.process, flags)]
+
+    def _clock(self, application: ApplicationSource) -> Service:
+        """The service that steps the test."""
+        manifest = self.manifests["clock"]
+        context = Context(self.spec, self.manifests, {}, self.deployment, application.declared)
+        flags = (*clock_flags(self.spec, wire(context), rates(context), (RECORDER,)), Flag("cid", str(self.cid)))
+        image = self._image(manifest.image)
+        return Service("environment", CLOCK, manifest.name, image, manifest.process, flags)
 
     def _names_apart(self, services: Sequence[Service], application: Container[str]) -> None:
         for service in services:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.lockstep import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.events import (
     Backend,
@@ -16,6 +17,8 @@ from dodo_dsl.run.events import (
     Lost,
     Malformed,
     Ready,
+    Stopped,
+    Time,
     Unstartable,
     Verdict,
 )
@@ -23,6 +26,7 @@ from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended
 
 ORDER = ("environment", "action", "evaluation", "application")
 READY_PATIENCE_S = 60.0
+LAST_TIME_PATIENCE_S = 2.0
 
 
 class _Ended(Exception):
@@ -43,6 +47,7 @@ class Engine:
     began: float | None = None
     finished: float | None = None
     setup_s: float | None = None
+    time: Time | None = None
 
     def __post_init__(self) -> None:
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
@@ -62,7 +67,7 @@ class Engine:
             self._find("error", "the run was interrupted")
             asyncio.current_task().uncancel()  # type: ignore[union-attr]
         finally:
-            self.finished = time.monotonic()
+            self.finished = self.finished or time.monotonic()
             self.say("taking down")
             kept = await self._closed(keep)
         return self._outcome(), kept
@@ -111,13 +116,32 @@ class Engine:
         self.began = time.monotonic()
         await self.backend.begin()
         self.say("running")
-        deadline = self.began + self.plan.timeout_s
+        lockstep = self.plan.lockstep
+        deadline = self.began + (lockstep.wall_timeout_s if lockstep else self.plan.timeout_s)
         while not self._all_judged():
             event = await self._next(deadline)
-            if event is None:
-                self._time_out()
-            else:
+            if event is not None:
                 self._take(event)
+            elif lockstep:
+                self._give_up(lockstep.wall_timeout_s)
+            else:
+                self._time_out()
+        self.finished = time.monotonic()
+        if lockstep:
+            await self._last_time()
+
+    async def _last_time(self) -> None:
+        """How far the clock got, which it says when the last evaluator has ended."""
+        deadline = time.monotonic() + LAST_TIME_PATIENCE_S
+        while not (self.time and self.time.last) and CLOCK not in self.exits:
+            event = await self._next(deadline)
+            if event is None:
+                return
+            self._take(event)
+
+    def _give_up(self, wall_timeout_s: float) -> None:
+        got = f" and got to {self.time.seconds:.1f} s of its own" if self.time else ""
+        self._end("error", f"the test took more than {wall_timeout_s:g} s of wall time{got}", CLOCK)
 
     def _all_judged(self) -> bool:
         return all(judge in self.exits for judge in self.facts.judges)
@@ -144,6 +168,14 @@ class Engine:
                 self._end("error", f"service '{service}' could not be started: {why}", service)
             case Lost(why):
                 self._end("error", why)
+            case Time():
+                self.time = event
+            case Stopped("unanswered", reason):
+                self._end("failed", reason, self._who_answers())
+            case Stopped("timedout"):
+                self._time_out()
+            case Stopped(_, reason):
+                self._end("error", reason, CLOCK)
             case Exited(service, code, out_of_memory):
                 self.exits[service] = code
                 self._take_exit(service, code, out_of_memory)
@@ -169,6 +201,10 @@ class Engine:
             return "during set-up"
         return f"after {time.monotonic() - self.began:.1f} s"
 
+    def _who_answers(self) -> str:
+        """The application's service whose last lines may tell why there is no answer."""
+        return next((s.name for s in self.plan.application.services), "")
+
     def _find(self, result: Any, reason: str, service: str = "") -> None:
         self.facts.findings.append(Finding(result, reason, service))
 
@@ -191,10 +227,11 @@ class Engine:
             reason=finding.reason,
             cid=self.backend.cid,
             seed=plan.seed,
-            clock="realtime",
+            clock=plan.clock,
             backend=self.backend.name,
             setup_s=self.setup_s,
             execution_s=self.finished - self.began if self.finished and self.began else None,
+            sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
             checks=tuple(checks),
             last_lines=tuple(self.backend.tail(finding.service)) if finding.result != "passed" else (),

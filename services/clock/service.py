@@ -44,16 +44,15 @@ class ClockService(Service):
         if begin is None:
             return
         self._told = time.monotonic()
+        kind, reason = "", ""
         try:
             self._stepper.meet()
             self._stepper.run(begin._replace(sample_time=EPOCH))
-        except Unanswered as problem:
-            self._say("unanswered", reason=str(problem))
-        except Stuck as problem:
-            self._say("stuck", reason=str(problem))
-        except TimedOut:
-            self._say("timeout")
-        self._tell_time()
+        except (Unanswered, Stuck, TimedOut) as problem:
+            kind, reason = type(problem).__name__.lower(), str(problem)
+        self._tell_time(last=True)
+        if kind:
+            self._say(kind, reason=reason)
 
     def _over(self) -> bool:
         if time.monotonic() - self._told > _TELL_S:
@@ -67,10 +66,10 @@ class ClockService(Service):
                 return envelope
         return None
 
-    def _tell_time(self) -> None:
+    def _tell_time(self, last: bool = False) -> None:
         self._told = time.monotonic()
         seconds = (self._stepper.now - EPOCH) / 1e6
-        self._say("time", s=seconds, frames=self._stepper.frames, surplus=self._answers.surplus)
+        self._say("time", s=seconds, frames=self._stepper.frames, surplus=self._answers.surplus, last=last)
 
     @staticmethod
     def _say(kind: str, **facts: object) -> None:
