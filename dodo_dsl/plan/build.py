@@ -2,33 +2,24 @@
 
 import functools
 import itertools
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl.check.context import Context
-from dodo_dsl.check.lockstep import rates
-from dodo_dsl.check.wiring import wire
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
 from dodo_dsl.plan.files import Copy, FilesError, copies
-from dodo_dsl.plan.lockstep import CLOCK, clock_flags, lockstep
+from dodo_dsl.plan.lockstep import clock, lockstep
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
+from dodo_dsl.plan.recorder import MANIFEST, recorder
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import EMULATED_FILE, Rig
 from dodo_dsl.spec.values import Value, convert, default_value
-
-RECORDER = "dodo-recorder"
-RECORDING = "test.rec"
-
-
-def _readers(application: ApplicationSource) -> int:
-    """How many processes of the application wait for each picture."""
-    return sum(own.readers for own in application.declared.values() if own and own.readers) or 1
 
 
 @dataclass(frozen=True)
@@ -114,10 +105,8 @@ class _Builder:
     def plan(self, application: ApplicationSource) -> Plan:
         """The instance's Plan with this application."""
         spec, rig = self.spec, self.rig
-        steps = spec.clock == "lockstep"
-        services = (*self._recorder(), *(self._service(use) for use in spec.uses))
-        if steps:
-            services = (self._clock(application), *services)
+        uses = (self._service(use) for use in spec.uses)
+        services = (*self._automatic(application), *uses)
         self._names_apart(services, application.spans)
         judges = tuple(s.name for s in services if s.judge)
         for key in ("name", "level", "kind", "timeout", "clock", "rig", "matrix", "seed", "isolation", "record"):
@@ -144,7 +133,7 @@ class _Builder:
             sandbox_image=self._image("sandbox"),
             services=services,
             application=self.application(self.cid, isolated, judges, hardware, privileged),
-            lockstep=lockstep(spec.timeout_s or 0.0, _readers(application)) if steps else None,
+            lockstep=lockstep(spec, application.declared),
             rig=rig.name if rig else "",
             messages=messages,
             source_map=self.places,
@@ -173,21 +162,14 @@ class _Builder:
         bare = "/" not in image and ":" not in image
         return f"{self.deployment.image_prefix}/{image}:{self.deployment.image_tag}" if bare else image
 
-    def _recorder(self) -> list[Service]:
-        manifest = self.manifests["rec-recorder"]
-        can = "frames" in manifest.parameters
-        frames = (Flag("frames", f"{self.spec.frames_hz:g}"),) if self.spec.frames_hz and can else ()
-        flags = (Flag("rec", RECORDING, "report"), *frames, Flag("cid", str(self.cid)))
-        image = self._image(manifest.image)
-        return [Service("environment", RECORDER, manifest.name, image, manifest.process, flags)]
-
-    def _clock(self, application: ApplicationSource) -> Service:
-        """The service that steps the test."""
-        manifest = self.manifests["clock"]
-        context = Context(self.spec, self.manifests, {}, self.deployment, application.declared)
-        flags = (*clock_flags(self.spec, wire(context), rates(context), (RECORDER,)), Flag("cid", str(self.cid)))
-        image = self._image(manifest.image)
-        return Service("environment", CLOCK, manifest.name, image, manifest.process, flags)
+    def _automatic(self, application: ApplicationSource) -> Iterator[Service]:
+        """The services that DoDo adds: the recorder, and in lockstep the clock."""
+        spec, manifests = self.spec, self.manifests
+        image = self._image(manifests[MANIFEST].image)
+        yield recorder(spec, manifests, self.rig, image, self.cid)
+        if spec.clock == "lockstep":
+            context = Context(spec, manifests, {}, self.deployment, application.declared)
+            yield clock(context, self._image(manifests["clock"].image), (RECORDER,), self.cid)
 
     def _names_apart(self, services: Sequence[Service], application: Container[str]) -> None:
         for service in services:

@@ -2,29 +2,35 @@
 
 from collections.abc import Mapping, Sequence
 
-from dodo_dsl.check.lockstep import answers, cameras_of, heard, step_hz
-from dodo_dsl.check.wiring import ANYTHING, Wiring
-from dodo_dsl.plan.model import Flag, Lockstep
+from dodo_dsl.check.context import Context, Declared
+from dodo_dsl.check.lockstep import answers, cameras_of, heard, rates, step_hz
+from dodo_dsl.check.wiring import ANYTHING, Wiring, wire
+from dodo_dsl.plan.model import Flag, Lockstep, Service
 from dodo_dsl.spec.model import Spec
 
 CLOCK = "dodo-clock"
+MANIFEST = "clock"
 
 _WALL_FACTOR, _WALL_SPARE_S = 10.0, 60.0
 
 
-def lockstep(timeout_s: float, readers: int) -> Lockstep:
-    """How a test steps; it may take much longer than its own time before it is given up."""
-    return Lockstep(readers, timeout_s * _WALL_FACTOR + _WALL_SPARE_S)
+def lockstep(spec: Spec, declared: Mapping[str, Declared | None]) -> Lockstep | None:
+    """How a test steps, None in real time; it may take much longer than its own time before it is given up."""
+    if spec.clock != "lockstep":
+        return None
+    readers = sum(own.readers for own in declared.values() if own)
+    return Lockstep(readers or 1, (spec.timeout_s or 0.0) * _WALL_FACTOR + _WALL_SPARE_S)
 
 
-def clock_flags(spec: Spec, wiring: Wiring, rates: Mapping[str, float], watch: Sequence[str]) -> tuple[Flag, ...]:
-    """The clock's flags; ``rates`` are the services' in Hz, ``watch`` those that only look on."""
+def clock(context: Context, image: str, watch: Sequence[str], cid: int) -> Service:
+    """The service that steps a test; ``watch`` are services that only look on."""
+    manifest, spec, wiring = context.manifests[MANIFEST], context.spec, wire(context)
     layers = {layer: [u.name for u in spec.uses if u.layer == layer] for layer in ("environment", "action")}
     sense = _ordered(layers["environment"], wiring)
     cameras = cameras_of(wiring)
     sense.sort(key=lambda name: name in cameras)
     values = {
-        "freq": f"{step_hz(wiring, rates):g}",
+        "freq": f"{step_hz(wiring, rates(context)):g}",
         "advance": ",".join(_ordered(layers["action"], wiring)),
         "sense": ",".join(sense),
         "judge": ",".join(u.name for u in spec.uses if u.layer == "evaluation"),
@@ -33,8 +39,10 @@ def clock_flags(spec: Spec, wiring: Wiring, rates: Mapping[str, float], watch: S
         "hears": ",".join(heard(wiring)),
         "done": wiring.done,
         "timeout": f"{spec.timeout_s or 0.0:g}",
+        "cid": str(cid),
     }
-    return tuple(Flag(name, value) for name, value in values.items() if value)
+    flags = tuple(Flag(name, value) for name, value in values.items() if value)
+    return Service("environment", CLOCK, manifest.name, image, manifest.process, flags)
 
 
 def _ordered(names: Sequence[str], wiring: Wiring) -> list[str]:

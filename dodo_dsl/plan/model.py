@@ -4,7 +4,7 @@ import dataclasses
 import json
 import re
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import orjson
 
@@ -14,7 +14,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 LAYERS = ("environment", "action", "evaluation", "application")
 
-FlagKind = Literal["text", "path", "memory", "report"]
+FlagKind = Literal["text", "path", "memory", "memories", "report"]
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _is_lockstep(lockstep: Lockstep) -> bool:
 
 
 def _is_flag(flag: Flag) -> bool:
-    kinds = ("text", "path", "memory", "report")
+    kinds = get_args(FlagKind)
     plain = isinstance(flag.name, str) and isinstance(flag.value, str) and isinstance(flag.kind, str)
     inside = flag.kind not in ("path", "report") or _is_inside(flag.value)
     return plain and flag.kind in kinds and inside

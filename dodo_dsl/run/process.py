@@ -196,6 +196,7 @@ class ProcessBackend:
             "path": lambda: str(self.folder / "files" / flag.value),
             "report": lambda: str(self.report / flag.value),
             "memory": lambda: memory_name(flag.value, self.lane.memory_prefix),
+            "memories": lambda: ",".join(memory_name(m, self.lane.memory_prefix) for m in flag.value.split(",")),
         }
         value = values.get(flag.kind, lambda: flag.value)()
         return f"--{flag.name}={self.lane.cid if flag.name == 'cid' else value}"

@@ -45,10 +45,14 @@ def _divide(face: Face, node: _Node, sides: tuple[list[Face], list[Face]]) -> No
 
 
 class Tree:
-    """The partition of some faces; ``leaves`` counts the convex regions that they leave."""
+    """The partition of some faces; ``leaves`` counts the convex regions that they leave.
 
-    def __init__(self, faces: list[Face]) -> None:
+    Large faces divide space first, or those that come first in the list.
+    """
+
+    def __init__(self, faces: list[Face], by_area: bool = True) -> None:
         self.leaves = 0
+        self._by_area = by_area
         self._root: _Node | int = -1
         tasks: list[tuple[list[Face], _Node | None, int]] = [(faces, None, 0)]
         while tasks:
@@ -63,7 +67,7 @@ class Tree:
         if not faces:
             self.leaves += 1
             return self.leaves - 1
-        first = max(range(len(faces)), key=lambda i: _area(faces[i]))
+        first = max(range(len(faces)), key=lambda i: _area(faces[i])) if self._by_area else 0
         node = _Node(faces[first].normal, faces[first].offset, [faces[first]])
         sides: tuple[list[Face], list[Face]] = ([], [])
         for face in faces[:first] + faces[first + 1 :]:
@@ -83,6 +87,24 @@ class Tree:
             before = points[members] @ node.normal > node.offset
             tasks += [(node.children[0], members[~before]), (node.children[1], members[before])]
         return leaf
+
+    def distribute(self, faces: list[Face]) -> dict[int, list[Face]]:
+        """Other faces by the leaf that they lie in, cut where they cross a plane of the partition."""
+        found: dict[int, list[Face]] = {}
+        tasks = [(self._root, faces)]
+        while tasks:
+            node, parts = tasks.pop()
+            if isinstance(node, int):
+                found[node] = parts
+                continue
+            sides: tuple[list[Face], list[Face]] = ([], [])
+            for face in parts:
+                if (np.abs(face.points @ node.normal - node.offset) <= _THICK).all():
+                    sides[int(float(face.normal @ node.normal) > 0.0)].append(face)
+                else:
+                    _divide(face, node, sides)
+            tasks += [(child, side) for child, side in zip(node.children, sides, strict=True) if side]
+        return found
 
     def back_to_front(self, eye: Array) -> Iterator[Face | int]:
         """Faces that show their front to the eye (3,), and leaves, the farthest first."""

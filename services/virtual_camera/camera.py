@@ -72,7 +72,7 @@ class Pinhole:
             raise ValueError(f"a picture of {width} x {height} pixels cannot be drawn")
         if not 0.0 < fovy < math.pi:
             raise ValueError(f"fovy must lie between 0 and 180 degrees, not {math.degrees(fovy):g}")
-        self.width, self.height = width, height
+        self.width, self.height, self.fovy = width, height, fovy
         self.focal = height / 2 / math.tan(fovy / 2)
         self.centre = np.array([(width - 1) / 2, (height - 1) / 2])
         f = self.focal

@@ -13,25 +13,42 @@ from services.virtual_camera.textures import Texture
 
 @dataclass(frozen=True, eq=False)
 class TextureMap:
-    """Where a texture lies in the world: its first corner and the edges of one tile, each (3,), in m."""
+    """Where a texture lies in the world: its first corner and the edges of one tile, each (3,), in m.
+
+    ``shade`` is what the light leaves of its brightness.
+    """
 
     texture: Texture
     corner: Array
     along: Array
     up: Array
+    shade: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A convex polygon ``points`` (k, 3) in world m, seen from where ``normal . p > offset`` only."""
+    """A convex polygon ``points`` (k, 3) in world m, seen from where ``normal . p > offset`` only.
+
+    ``owner`` is the number of the model's copy that it belongs to, if any.
+    """
 
     points: Array
     normal: Array
     offset: float
     paint: Colour | TextureMap
+    owner: int = -1
 
     def part(self, points: Array) -> "Face":
         return replace(self, points=points)
+
+    def shaded(self, shade: float) -> "Face":
+        """The same face, made darker (or brighter) by a factor."""
+        if shade == 1.0:
+            return self
+        if isinstance(self.paint, TextureMap):
+            return replace(self, paint=replace(self.paint, shade=self.paint.shade * shade))
+        *colour, alpha = self.paint
+        return replace(self, paint=(*(min(part * shade, 255.0) for part in colour), alpha))
 
 
 def rotation_of(angle: float) -> Array:

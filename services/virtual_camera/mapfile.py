@@ -43,12 +43,31 @@ class BlockEntry:
 
 
 @dataclass(frozen=True)
+class OverlayEntry:
+    """A picture laid over the camera's: its size and places (upper left corners) as fractions of that picture."""
+
+    name: str
+    file: Path
+    size: tuple[float, float]
+    places: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class ObstacleEntry:
+    """Lines on the ground, each x1, y1, x2, y2 in m."""
+
+    name: str
+    lines: tuple[tuple[float, float, float, float], ...]
+
+
+@dataclass(frozen=True)
 class MapFile:
-    """What there is to draw; things that stand nowhere are left out, and obstacles are invisible."""
+    """What there is to draw; things that stand nowhere are left out."""
 
     path: Path
     models: tuple[ModelEntry, ...]
     blocks: tuple[BlockEntry, ...]
+    overlays: tuple[OverlayEntry, ...] = ()
 
 
 def _triple(node: Node, names: str) -> Vector3:
@@ -104,6 +123,31 @@ def _block(node: Node) -> BlockEntry | None:
     return BlockEntry(node.required("name").text(), dimension, _paint(node), tile, instances)
 
 
+def _overlay(node: Node) -> OverlayEntry | None:
+    rows = [item.numbers(_names(item, "x y")) for item in node.items("instances")]
+    if not rows:
+        return None
+    wide, high = _positive(node.required("dimension"), "width height")
+    if max(wide, high) > 1.0:
+        node.required("dimension").fail("the numbers [width, height], fractions of the picture up to 1")
+    file = node.required("textureFile").resource()
+    places = tuple((row[0], row[1]) for row in rows)
+    return OverlayEntry(node.required("name").text(), file, (wide, high), places)
+
+
+def _names(item: Node, names: str) -> str:
+    """OpenDLV reads the first two numbers of an overlay's place; maps often write four as elsewhere."""
+    return "x y z angle" if isinstance(item.value, list) and len(item.value) == 4 else names
+
+
+def _obstacle(node: Node) -> ObstacleEntry | None:
+    rows = [item.numbers("x1 y1 x2 y2") for item in node.items("lines")]
+    name = node.member("name")
+    if not rows or name is None:
+        return None
+    return ObstacleEntry(name.text(), tuple((a, b, c, d) for a, b, c, d in rows))
+
+
 def _limit(path: Path, what: str, count: int, limit: int) -> None:
     if count > limit:
         raise MapError(f"{path}: {count} instances of {what} are more than the {limit} that a map may have")
@@ -122,4 +166,11 @@ def read_map(path: Path) -> MapFile:
     blocks = tuple(b for b in map(_block, root.items("block")) if b)
     _limit(file, "models", sum(len(m.instances) for m in models), MAX_INSTANCES)
     _limit(file, "blocks", sum(len(b.instances) for b in blocks), MAX_BLOCKS)
-    return MapFile(file, models, blocks)
+    overlays = tuple(o for o in map(_overlay, root.items("overlay")) if o)
+    return MapFile(file, models, blocks, overlays)
+
+
+def read_obstacles(path: Path) -> tuple[ObstacleEntry, ...]:
+    """The map's obstacles that have lines; MapError names the file and the JSON path."""
+    root = Node.load(find_map(path))
+    return tuple(o for o in map(_obstacle, root.items("obstacles")) if o)

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 
 from services.virtual_camera.camera import Pose, quaternion_rotation
+from services.virtual_camera.motion import LONGEST_GAP, between, still
+from services.virtual_camera.optics import Optics
 from services.virtual_camera.raster import Image
 from services.virtual_camera.render import Renderer
 
@@ -53,17 +55,29 @@ def to_i420(argb: Image, out: Image | None = None) -> Image:
 
 
 class VirtualCamera:
-    """Draws from the latest frame; before the first one there is nothing to draw from and no picture."""
+    """Draws from the latest frame; before the first one from where the vehicle starts, if that is known."""
 
-    def __init__(self, renderer: Renderer, mounted: Pose, publish: Publish) -> None:
-        """``mounted`` is the camera in the body frame; ValueError when I420 cannot hold the picture."""
-        width, height = renderer.camera.width, renderer.camera.height
+    def __init__(
+        self,
+        renderer: Renderer,
+        mounted: Pose,
+        publish: Publish,
+        optics: Optics | None = None,
+        start: Pose | None = None,
+    ) -> None:
+        """``mounted`` is the camera in the body frame, ``start`` the body before any frame.
+
+        The renderer draws what ``optics`` need. ValueError when I420 cannot hold the picture.
+        """
+        self._optics = optics or Optics(renderer.camera)
+        width, height = self._optics.camera.width, self._optics.camera.height
         if width % 2 or height % 2:
             raise ValueError(f"width and height must be even for I420, and {width} x {height} are not")
         self._renderer, self._mounted, self._publish = renderer, mounted, publish
         self._argb = np.empty((height, width, 4), np.uint8)
         self._i420 = np.empty((height * 3 // 2, width), np.uint8)
-        self._body: Pose | None = None
+        self._motion = still(start) if start else None
+        self._framed: int | None = None
         self._log = logging.getLogger(__name__)
         self.refused = 0
         """How many frames told no pose; the camera stays where it was."""
@@ -71,16 +85,25 @@ class VirtualCamera:
     def take_frame(self, frame: Frame, sample_time: int) -> None:
         """The vehicle is where the frame says; ``sample_time`` in us of test time."""
         try:
-            self._body = body_pose(frame)
+            pose = body_pose(frame)
         except ValueError as error:
             if not self.refused:
                 self._log.warning("refused the frame of %d us, the first of its kind: %s", sample_time, error)
             self.refused += 1
-
-    def update(self, now: int) -> None:
-        """Draws and publishes one picture, sampled at ``now`` (us of test time)."""
-        if self._body is None:
             return
-        self._renderer.render(self._body.carrying(self._mounted), self._argb)
+        if self._motion is None or self._framed is None:
+            self._motion = still(pose)
+        else:
+            self._motion = between(self._motion.pose, pose, sample_time - self._framed)
+        self._framed = sample_time
+
+    def update(self, now: int) -> Pose | None:
+        """Draws and publishes one picture, sampled at ``now`` (us of test time); the camera's pose in the world."""
+        if self._motion is None:
+            return None
+        if self._framed is not None and now - self._framed > LONGEST_GAP * 1e6:
+            self._motion = still(self._motion.pose)
+        self._optics.expose(self._renderer, self._motion, self._mounted, now, self._argb)
         to_i420(self._argb, self._i420)
         self._publish(self._argb, self._i420, now)
+        return self._motion.pose.carrying(self._mounted)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from services.virtual_camera.camera import Array, clip
 
 Image = npt.NDArray[np.uint8]
+Canvas = Image | npt.NDArray[np.int32]
 Fixed = npt.NDArray[np.int32]
 Colour = tuple[float, ...]
 
@@ -25,7 +26,7 @@ def fixed(points: Array) -> Fixed:
     return np.rint(points * (1 << SHIFT)).astype(np.int32)
 
 
-def fill_fixed(image: Image, points: Fixed, colour: Colour) -> None:
+def fill_fixed(image: Canvas, points: Fixed, colour: Colour) -> None:
     cv2.fillConvexPoly(image, points, colour, cv2.LINE_8, SHIFT)
 
 
@@ -47,7 +48,7 @@ def inset(polygon: Array, amount: float = HALF_PIXEL) -> Array:
     return polygon
 
 
-def fill(image: Image, polygon: Array, colour: Colour, amount: float = HALF_PIXEL) -> None:
+def fill(image: Canvas, polygon: Array, colour: Colour, amount: float = HALF_PIXEL) -> None:
     """Fills the pixels whose centres lie in a convex polygon (k, 2) given in picture coordinates."""
     if len(polygon) > 2:
         fill_fixed(image, fixed(inset(polygon, amount)), colour)

@@ -1,14 +1,20 @@
 """Pictures of a scene from anywhere, drawn with OpenCV and numpy."""
 
-import numpy as np
+from collections.abc import Iterator
 
-from services.virtual_camera.bodies import Bodies
+import numpy as np
+import numpy.typing as npt
+
+from services.virtual_camera.bodies import Bodies, Drawn
 from services.virtual_camera.bsp import Tree
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import Pinhole, Pose, View
 from services.virtual_camera.faces import Face
 from services.virtual_camera.raster import Image, fill_fixed
 from services.virtual_camera.scene import Scene
-from services.virtual_camera.surfaces import draw_backdrop, draw_face
+from services.virtual_camera.shading import Piece
+from services.virtual_camera.surfaces import cover_face, draw_backdrop, draw_face
+
+Labels = npt.NDArray[np.int32]
 
 
 class Renderer:
@@ -17,9 +23,9 @@ class Renderer:
     def __init__(self, scene: Scene, width: int, height: int, fovy: float) -> None:
         """The picture's size in pixels, the vertical field of view in rad; ValueError where they make no sense."""
         self.camera = Pinhole(width, height, fovy)
-        self._scene = scene
+        self.scene = scene
         self._tree = Tree(list(scene.faces))
-        self._bodies = Bodies(scene.crowds, self._tree)
+        self.bodies = Bodies(scene.crowds, self._tree, scene.light, scene.faces)
 
     def render(self, pose: Pose, out: Image | None = None) -> Image:
         """What a camera sees: (height, width, 4) in the order B, G, R, A.
@@ -29,12 +35,33 @@ class Renderer:
         """
         image = np.empty((self.camera.height, self.camera.width, 4), np.uint8) if out is None else out
         view = self.camera.view(pose)
-        draw_backdrop(image, view, self._scene.sky, self._scene.ground)
-        regions = self._bodies.pieces(view)
-        for item in self._tree.back_to_front(view.position):
+        draw_backdrop(image, view, self.scene.sky, self.scene.ground)
+        for item in self._back_to_front(view):
             if isinstance(item, Face):
                 draw_face(image, view, item)
             else:
-                for points, colour in regions.get(item, ()):
+                for points, colour in item[1]:
                     fill_fixed(image, points, colour)
         return image
+
+    def labels(self, pose: Pose) -> tuple[Labels, dict[int, list[Piece]]]:
+        """For each pixel (height, width) the number of the body that it shows, or -1; and all that is drawn of each."""
+        view = self.camera.view(pose)
+        image = np.full((self.camera.height, self.camera.width), -1, np.int32)
+        bodies: dict[int, list[Piece]] = {}
+        for item in self._back_to_front(view):
+            if isinstance(item, Face):
+                cover_face(image, view, item, -1)
+            else:
+                bodies.setdefault(item[0], []).extend(item[1])
+                for points, _ in item[1]:
+                    fill_fixed(image, points, (item[0],))
+        return image, bodies
+
+    def _back_to_front(self, view: View) -> Iterator[Face | Drawn]:
+        regions = self.bodies.pieces(view)
+        for item in self._tree.back_to_front(view.position):
+            if isinstance(item, Face):
+                yield item
+            else:
+                yield from regions.get(item, ())

@@ -1,17 +1,22 @@
 """A map loaded for drawing: shapes and where they stand, flat faces, colours of sky and ground."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from services.virtual_camera.camera import Array
+from services.virtual_camera.clutter import clutter
+from services.virtual_camera.crowd import Crowd
 from services.virtual_camera.faces import Covering, Face, TextureMap, box_faces
-from services.virtual_camera.mapfile import BlockEntry, ModelEntry, Vector3, read_map
+from services.virtual_camera.light import Light
+from services.virtual_camera.lines import line_faces, pick
+from services.virtual_camera.mapfile import BlockEntry, MapFile, ModelEntry, OverlayEntry, Vector3, read_map
 from services.virtual_camera.meshes import load_obj
 from services.virtual_camera.raster import Colour
-from services.virtual_camera.shape import Shape, make_shape
+from services.virtual_camera.shape import make_shape
 from services.virtual_camera.textures import Texture, default_ground, load_picture
 
 SKY: Colour = (206.0, 190.0, 176.0, 255.0)
@@ -19,15 +24,15 @@ GROUND: Colour = (112.0, 114.0, 116.0, 255.0)
 _GROUND_REACH = 40.0
 
 
-@dataclass(frozen=True, eq=False)
-class Crowd:
-    """Copies of one shape: ``positions`` (n, 3) in m, ``turns`` (n,) in rad counter-clockwise about z."""
+@dataclass(frozen=True)
+class Wishes:
+    """What a scene has beyond its map: the light, lines of these obstacles on the ground, and boxes around it."""
 
-    shape: Shape
-    colour: Array
-    """Blue, green, red from 0 to 255."""
-    positions: Array
-    turns: Array
+    light: Light = field(default_factory=Light.usual)
+    lines: tuple[str, ...] = ()
+    line_width: float = 0.02
+    clutter: int = 0
+    seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +43,8 @@ class Scene:
     faces: tuple[Face, ...]
     sky: Colour = SKY
     ground: Colour = GROUND
+    light: Light = field(default_factory=Light.usual)
+    overlays: tuple[OverlayEntry, ...] = ()
 
 
 def _bgr(colour: Vector3) -> Array:
@@ -49,7 +56,7 @@ def _crowd(entry: ModelEntry) -> Crowd:
     colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
     positions = np.array([instance.position for instance in entry.instances])
     turns = np.array([math.pi - instance.angle for instance in entry.instances])
-    return Crowd(make_shape(*load_obj(entry.file)), colour, positions, turns)
+    return Crowd(make_shape(*load_obj(entry.file)), colour, positions, turns, entry.name)
 
 
 def _cover(entry: BlockEntry) -> Colour | Covering:
@@ -73,8 +80,23 @@ def _block_faces(entry: BlockEntry) -> list[Face]:
     return [face for i in entry.instances for face in box_faces(entry.dimension, i, cover)]
 
 
-def load_scene(path: Path) -> Scene:
+def _faces(entries: MapFile, wishes: Wishes) -> Iterator[Face]:
+    blocks = [face for block in entries.blocks for face in _block_faces(block)]
+    lines = pick(entries.path, wishes.lines)
+    for face in [*(blocks or [_default_floor()]), *line_faces(lines, wishes.line_width)]:
+        yield face.shaded(wishes.light.on(face.normal))
+
+
+def load_scene(path: Path, wishes: Wishes | None = None) -> Scene:
     """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
-    entries = read_map(path)
-    faces = [face for block in entries.blocks for face in _block_faces(block)]
-    return Scene(tuple(map(_crowd, entries.models)), tuple(faces or [_default_floor()]))
+    entries, wishes = read_map(path), wishes or Wishes()
+    crowds = tuple(map(_crowd, entries.models))
+    around = clutter(wishes.clutter, wishes.seed, crowds)
+    shade = wishes.light.on(np.array([0.0, 0.0, 1.0]))
+    return Scene(
+        crowds=crowds + around,
+        faces=tuple(_faces(entries, wishes)),
+        ground=(*(min(part * shade, 255.0) for part in GROUND[:3]), 255.0),
+        light=wishes.light,
+        overlays=entries.overlays,
+    )

@@ -7,12 +7,9 @@ import cv2
 import numpy as np
 
 from services.virtual_camera.camera import Array, View
+from services.virtual_camera.light import Light
 from services.virtual_camera.raster import HALF_PIXEL, Colour, Fixed, fixed, inset
 from services.virtual_camera.shape import Shape
-
-AMBIENT, DIFFUSE = 0.62, 0.38
-LIGHT = np.array([-0.35, -0.25, 0.9]) / np.linalg.norm([-0.35, -0.25, 0.9])
-"""The direction towards the light, in the world."""
 
 Piece = tuple[Fixed, Colour]
 
@@ -22,7 +19,7 @@ class Group:
     """``n`` copies of a shape seen by a camera.
 
     ``turn`` (n, 3, 3) and ``shift`` (n, 3) take the shape's frame to the camera's; ``eye`` and
-    ``light`` (n, 3) are the camera's place and the direction to the light in the shape's frame.
+    ``towards`` (n, 3) are the camera's place and the direction to the light in the shape's frame.
     """
 
     view: View
@@ -31,10 +28,11 @@ class Group:
     turn: Array
     shift: Array
     eye: Array
-    light: Array
+    towards: Array
+    light: Light
 
 
-def gather(view: View, shape: Shape, colour: Array, positions: Array, turns: Array) -> Group:
+def gather(view: View, shape: Shape, colour: Array, positions: Array, turns: Array, light: Light) -> Group:
     """The copies at ``positions`` (n, 3), turned by ``turns`` (n,) rad about z."""
     rotation = np.zeros((len(turns), 3, 3))
     rotation[:, 0, 0] = rotation[:, 1, 1] = np.cos(turns)
@@ -44,7 +42,7 @@ def gather(view: View, shape: Shape, colour: Array, positions: Array, turns: Arr
     turn = view.axes @ rotation
     shift = view.to_camera(positions)
     eye = np.einsum("ni,nij->nj", view.position - positions, rotation)
-    return Group(view, shape, colour, turn, shift, eye, LIGHT @ rotation)
+    return Group(view, shape, colour, turn, shift, eye, light.direction @ rotation, light)
 
 
 def _in_camera(group: Group, vertices: Array) -> Array:
@@ -66,7 +64,7 @@ def _facing(group: Group) -> Array:
 
 def _shades(group: Group) -> Array:
     """The light (n, F) of each face by Lambert's cosine law, and some from everywhere."""
-    return np.asarray(AMBIENT + DIFFUSE * np.maximum(group.light @ group.shape.normals.T, 0.0), np.float64)
+    return group.light.shades(group.towards @ group.shape.normals.T)
 
 
 def _paint(group: Group, shades: Array) -> list[Any]:

@@ -5,12 +5,15 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from services.virtual_camera.camera import NEAR, Array, Pinhole, View, clip
 from services.virtual_camera.faces import Face, TextureMap
 from services.virtual_camera.raster import OVERLAPPING, Colour, Image, fill, fill_fixed, fixed, inset
 
 _DEPTH = np.array([0.0, 0.0, 1.0])
+_UNDER = 3.0
+"""So many pixels below the horizon the sky ends: the ground hides that."""
 _SHARPER = 0.3
 """Levels change this much (in octaves of resolution) later than where sizes match best."""
 
@@ -22,11 +25,14 @@ def corner_rays(camera: Pinhole) -> Array:
 
 
 def draw_backdrop(image: Image, view: View, sky: Colour, ground: Colour) -> None:
-    """Sky everywhere, then ground wherever the line of sight falls."""
-    cv2.rectangle(image, (0, 0), (image.shape[1], image.shape[0]), sky, cv2.FILLED)
-    below = clip(corner_rays(view.camera), -view.axes[:, 2], 0.0)
+    """Sky down to a little below the horizon, then ground wherever the line of sight falls."""
+    rays, camera = corner_rays(view.camera), view.camera
+    above = clip(rays, view.axes[:, 2], _UNDER * float(np.linalg.norm(view.axes[:2, 2])) / camera.focal)
+    if len(above):
+        fill_fixed(image, fixed(camera.project(above)), sky)
+    below = clip(rays, -view.axes[:, 2], 0.0)
     if len(below):
-        fill(image, view.camera.project(below), ground)
+        fill(image, camera.project(below), ground)
 
 
 def draw_face(image: Image, view: View, face: Face) -> None:
@@ -38,6 +44,13 @@ def draw_face(image: Image, view: View, face: Face) -> None:
         _draw_texture(image, view, visible, face.paint)
     else:
         fill(image, view.camera.project(visible), face.paint, OVERLAPPING)
+
+
+def cover_face(labels: npt.NDArray[np.int32], view: View, face: Face, label: int) -> None:
+    """Writes a number wherever ``draw_face`` would draw."""
+    visible = view.visible_part(view.to_camera(face.points))
+    if len(visible) > 2:
+        fill(labels, view.camera.project(visible), (label,), OVERLAPPING)
 
 
 def _texture_to_picture(view: View, paint: TextureMap) -> Array:
@@ -100,11 +113,18 @@ def _draw_band(image: Image, polygon: Array, inverse: Array, paint: TextureMap, 
     size = (right - left, bottom - top)
     if _fills_window(polygon, left, right, top, bottom):
         cv2.warpPerspective(canvas, warp, size, dst=window, flags=flags, borderMode=border)
+        _shade(window, paint.shade)
         return
-    picture = cv2.warpPerspective(canvas, warp, size, flags=flags, borderMode=border)
+    picture = np.asarray(cv2.warpPerspective(canvas, warp, size, flags=flags, borderMode=border), np.uint8)
+    _shade(picture, paint.shade)
     mask = np.zeros(window.shape[:2], np.uint8)
     fill_fixed(mask, fixed(inset(polygon, OVERLAPPING) - [left, top]), (255,))
     cv2.copyTo(picture, mask, window)
+
+
+def _shade(picture: Image, shade: float) -> None:
+    if shade != 1.0:
+        cv2.multiply(picture, np.array([shade, shade, shade, 1.0]), dst=picture)
 
 
 def _lookup(polygon: Array, inverse: Array, paint: TextureMap, level: int) -> tuple[Array, Image, int]:

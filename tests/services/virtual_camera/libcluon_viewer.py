@@ -1,6 +1,6 @@
 """An application with libcluon in it (pycluon): sends frames and reports the first picture that follows.
 
-Run: python libcluon_viewer.py CID SENDER_STAMP FRAME_AS_HEX NAME_ARGB NAME_I420
+Run: python libcluon_viewer.py CID SENDER_STAMP FRAME_AS_HEX NAME...
 """
 
 import datetime
@@ -30,13 +30,13 @@ def look(memory: pycluon.SharedMemory) -> dict[str, object]:
     return {"size": len(data), "sha256": hashlib.sha256(data).hexdigest(), "time": microseconds}
 
 
-def main(cid: str, stamp: str, payload: str, argb: str, i420: str) -> None:
+def main(cid: str, stamp: str, payload: str, *names: str) -> None:
     session = pycluon.OD4Session(int(cid), lambda _envelope: None)
-    memories = [pycluon.SharedMemory(name, 0) for name in (argb, i420)]
+    memories = [pycluon.SharedMemory(name, 0) for name in names]
     over = threading.Event()
     sender = threading.Thread(target=keep_sending, args=(session, bytes.fromhex(payload), int(stamp), over))
     sender.start()
-    memories[1].wait()
+    memories[-1].wait()
     print(json.dumps([look(memory) for memory in memories]), flush=True)
     over.set()
     sender.join()

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -49,10 +50,11 @@ def start(tmp_path):
 
 def test_libcluon_gets_the_pictures_of_the_frames_it_sends(start, cid):
     pytest.importorskip("pycluon")
-    names = [f"dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420")]
+    names = [f"dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420", "bgr")]
     camera = start(
         f"--cid={cid}", f"--map-path={STRAIGHT}", "--width=320", "--height=240", "--freq=20", "--z=0.095",
         "--x=0.1", "--frame-id=7", f"--name.argb={names[0]}", f"--name.i420={names[1]}",
+        f"--name.bgr={names[2]}",
     )  # fmt: skip
     assert select.select([camera.stdout], [], [], 20)[0]
     assert json.loads(camera.stdout.readline()) == {"dodo": "ready"}
@@ -67,7 +69,8 @@ def test_libcluon_gets_the_pictures_of_the_frames_it_sends(start, cid):
     yaw = 2 * math.atan2(frame.qz, frame.qw)
     renderer = Renderer(load_scene(STRAIGHT), 320, 240, math.radians(48.8))
     expected = renderer.render(Pose.at(0.1 * math.cos(yaw), 1.5 + 0.1 * math.sin(yaw), 0.095, yaw=yaw))
-    for memory, picture in zip(seen, (expected, to_i420(expected)), strict=True):
+    bgr = np.ascontiguousarray(expected[..., :3])
+    for memory, picture in zip(seen, (expected, to_i420(expected), bgr), strict=True):
         assert (memory["size"], memory["sha256"]) == (picture.nbytes, hashlib.sha256(picture).hexdigest())
         assert begun - 1 < memory["time"] / 1e6 < time.time() + 1
     camera.send_signal(signal.SIGTERM)

@@ -1,0 +1,178 @@
+"""Pictures a second: the virtual camera beside OpenGL on llvmpipe, one core, 1280 x 720, 90 cones on a textured floor.
+
+    python benchmarks/bench_camera.py [FOLDER]
+
+Both draw the same drive, in turns; each picture ends in memory. FOLDER keeps the pictures of both. The cost of each
+condition follows, alone. Without moderngl or EGL only the virtual camera is measured.
+"""
+
+import json
+import math
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+
+import cv2
+import numpy as np
+
+from benchmarks.gl_peer import GlPeer, ssim
+from dodo_dsl import data
+from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.lens import Distortion
+from services.virtual_camera.light import Light
+from services.virtual_camera.motion import Motion, still
+from services.virtual_camera.optics import Optics
+from services.virtual_camera.raster import Image
+from services.virtual_camera.render import Renderer
+from services.virtual_camera.scene import Wishes, load_scene
+from services.virtual_camera.sensor import Sensor
+from services.virtual_camera.truth import Limits, Truth, classes_of
+
+SIZE, FOVY = (1280, 720), math.radians(48.8)
+CONES = 90
+ROUNDS, FRAMES = 7, 40
+BODY = Pose.at(0, 0, 0)
+ONE_THREAD = dict.fromkeys(("LP_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+
+def make_map(folder: Path) -> Path:
+    """An oval of 45 yellow cones inside 45 blue ones, on the shipped textured floor."""
+    straight = data.registry() / "maps" / "straight"
+    for name in ("cone.obj", "floor.png"):
+        shutil.copy(straight / name, folder / name)
+    angles = np.arange(CONES // 2) * 2 * math.pi / (CONES // 2)
+    rows = {
+        name: [[reach * math.cos(a), reach * math.sin(a), 0.0, 0.0] for a in angles]
+        for name, reach in (("cone_yellow", 1.75), ("cone_blue", 2.25))
+    }
+    colours = {"cone_yellow": [1.0, 0.85, 0.0], "cone_blue": [0.0, 0.1, 0.9]}
+    models = [{"name": n, "file": "cone.obj", "color": colours[n], "instances": rows[n]} for n in rows]
+    floor = {
+        "name": "floor",
+        "dimension": [10.0, 10.0, 0.2],
+        "textureFile": "floor.png",
+        "textureSize": [1.0, 1.0],
+        "instances": [[0.0, 0.0, -0.1, 0.0]],
+    }
+    (folder / "map.json").write_text(json.dumps({"model": models, "block": [floor]}))
+    return folder
+
+
+def drive() -> list[Pose]:
+    """Along the oval's middle, counter-clockwise."""
+    turns = [2 * math.pi * k / FRAMES for k in range(FRAMES)]
+    return [Pose.at(2 * math.cos(t), 2 * math.sin(t), 0.095, yaw=t + math.pi / 2) for t in turns]
+
+
+def rate(draw: Callable[[Pose], object]) -> float:
+    """Pictures a second over the whole drive."""
+    start = time.perf_counter()
+    for pose in drive():
+        draw(pose)
+    return FRAMES / (time.perf_counter() - start)
+
+
+def peer(folder: Path) -> GlPeer | None:
+    try:
+        return GlPeer(folder, *SIZE, FOVY)
+    except Exception as error:  # noqa: BLE001 - moderngl raises just that without EGL
+        print(f"llvmpipe is not here ({type(error).__name__}: {error}): the virtual camera alone")
+        return None
+
+
+def beside(folder: Path, keep: Path | None) -> None:
+    """The rates of both in turns, and how alike their pictures are."""
+    camera, gl = Renderer(load_scene(folder), *SIZE, FOVY), peer(folder)
+    image = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
+
+    def ours(pose: Pose) -> Image:
+        return camera.render(pose, image)
+
+    def theirs(pose: Pose) -> Image:
+        assert gl is not None
+        view = camera.camera.view(pose)
+        return gl.render(view.position, view.axes)
+
+    draws = [ours, theirs] if gl else [ours]
+    rates = [[rate(draw) for draw in draws] for _ in range(ROUNDS)]
+    print(f"virtual-camera {median(r[0] for r in rates):7.1f} pictures/s")
+    if gl is None:
+        return
+    print(f"moderngl       {median(r[1] for r in rates):7.1f} pictures/s on {gl.name}")
+    print(f"ratio          {median(r[0] / r[1] for r in rates):7.2f} (target 3)")
+    alike = [ssim(ours(pose), theirs(pose)) for pose in drive()]
+    print(f"SSIM           {min(alike):7.4f} at worst, {np.mean(alike):.4f} on average (target 0.95)")
+    if keep is not None:
+        for number, pose in enumerate(drive()[::10]):
+            cv2.imwrite(str(keep / f"{number}-virtual-camera.png"), ours(pose))
+            cv2.imwrite(str(keep / f"{number}-moderngl.png"), theirs(pose))
+
+
+CONDITIONS: dict[str, tuple[Wishes, dict[str, object]]] = {
+    "nothing": (Wishes(), {}),
+    "light": (Wishes(light=Light.asked(90, 30, 0.4)), {}),
+    "clutter of 40": (Wishes(clutter=40), {}),
+    "exposure": (Wishes(), {"sensor": Sensor(exposure=0.4)}),
+    "noise": (Wishes(), {"sensor": Sensor(noise=0.03)}),
+    "shutter 20 ms": (Wishes(), {"shutter": 0.02}),
+    "distortion": (Wishes(), {"distortion": Distortion(-0.25, 0.05)}),
+    "boxes": (Wishes(), {}),
+}
+
+
+def condition(folder: Path, name: str) -> Callable[[Pose], object]:
+    wishes, parts = CONDITIONS[name]
+    optics = Optics(Pinhole(*SIZE, FOVY), **parts)  # type: ignore[arg-type]
+    renderer = Renderer(load_scene(folder, wishes), optics.wide.width, optics.wide.height, optics.wide.fovy)
+    truth = Truth(renderer, classes_of([], renderer.bodies.names), Limits()) if name == "boxes" else None
+    out = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
+
+    def draw(pose: Pose) -> None:
+        forward = pose.rotation[:, 0] * 0.5
+        motion = Motion(pose, forward, np.array([0, 0, 0.3])) if "shutter" in parts else still(pose)
+        optics.expose(renderer, motion, BODY, int(pose.position[0] * 1e6) % 10**9, out)
+        if truth is not None:
+            truth.boxes(pose)
+
+    return draw
+
+
+def costs(folder: Path) -> Iterator[str]:
+    """What each condition adds to a picture, in ms, measured in turns with none."""
+    draws = {name: condition(folder, name) for name in CONDITIONS}
+    rounds = [{name: 1000 / rate(draw) for name, draw in draws.items()} for _ in range(ROUNDS)]
+    for name in list(CONDITIONS)[1:]:
+        added = median(r[name] - r["nothing"] for r in rounds)
+        times = median(r[name] / r["nothing"] for r in rounds)
+        yield f"{name:<14} {added:+7.2f} ms a picture, {times:.2f} times the time"
+
+
+@contextmanager
+def map_folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as name:
+        yield make_map(Path(name))
+
+
+def main(argv: list[str]) -> int:
+    os.sched_setaffinity(0, {sorted(os.sched_getaffinity(0))[-1]})
+    cv2.setNumThreads(1)
+    keep = Path(argv[0]) if argv else None
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+    with map_folder() as folder:
+        beside(folder, keep)
+        for line in costs(folder):
+            print(line)
+    return 0
+
+
+if __name__ == "__main__":
+    if not ONE_THREAD.items() <= os.environ.items():  # libraries read these when they are loaded
+        os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **ONE_THREAD})
+    sys.exit(main(sys.argv[1:]))

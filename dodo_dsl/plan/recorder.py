@@ -1,0 +1,40 @@
+"""The recorder that every test has: all messages, and camera frames where the test asks for them."""
+
+import re
+from collections.abc import Iterator, Mapping
+
+from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.spec import arguments
+from dodo_dsl.spec.manifest import Manifest
+from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.rig import Rig
+
+RECORDER = "dodo-recorder"
+MANIFEST = "rec-recorder"
+RECORDING = "test.rec"
+
+_PARAMETER = re.compile(r"\{([a-z0-9.-]+)\}")
+
+
+def recorder(spec: Spec, manifests: Mapping[str, Manifest], rig: Rig | None, image: str, cid: int) -> Service:
+    """The recorder's service; ``record: {frames: ...}`` adds the pictures of each service that makes some."""
+    manifest = manifests[MANIFEST]
+    flags = [Flag("rec", RECORDING, "report")]
+    if spec.frames_hz:
+        memories = ",".join(_memories(spec, manifests, rig))
+        flags += [Flag("frames", f"{spec.frames_hz:g}"), Flag("memories", memories, "memories")] if memories else []
+    return Service("environment", RECORDER, MANIFEST, image, manifest.process, (*flags, Flag("cid", str(cid))))
+
+
+def _memories(spec: Spec, manifests: Mapping[str, Manifest], rig: Rig | None) -> Iterator[str]:
+    """One memory of each camera, I420 where it has that, as no colour is converted then; with its size if known."""
+    for use in spec.uses:
+        manifest = manifests[use.uses.text]
+        values = arguments.texts(spec, use, manifest, rig)
+        names = [_PARAMETER.sub(lambda m: values.get(m[1], ""), port) for port in _formats(manifest)]  # noqa: B023
+        size = f":{values['width']}x{values['height']}" if {"width", "height"} <= values.keys() else ""
+        yield from (f"{name.lstrip('/')}{size}" for name in filter(None, names[:1]))
+
+
+def _formats(manifest: Manifest) -> list[str]:
+    return sorted(manifest.memory.outputs, key=lambda port: "i420" not in port)

@@ -1,0 +1,134 @@
+"""The virtual camera on the bus and in shared memory."""
+
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.messages import MessageSet
+from services.base import Context, Flags, Output, Service, period_of
+from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.lens import Distortion
+from services.virtual_camera.light import Light
+from services.virtual_camera.model import Publish, VirtualCamera, mount
+from services.virtual_camera.optics import Optics
+from services.virtual_camera.overlays import load_overlays
+from services.virtual_camera.raster import Image
+from services.virtual_camera.render import Renderer
+from services.virtual_camera.scene import Scene, Wishes, load_scene
+from services.virtual_camera.sensor import Sensor
+from services.virtual_camera.truth import Box, Limits, Truth, classes_of
+
+Memories = list[tuple[SharedMemory, str]]
+"""Shared memory and what it holds: argb, i420 or bgr."""
+
+
+class Teller:
+    """Says true boxes as OpenDLV's detections, under a sender stamp of its own."""
+
+    def __init__(self, truth: Truth, classes: Iterable[str], camera: Pinhole, messages: MessageSet, stamp: int) -> None:
+        self._truth, self._camera, self._stamp = truth, camera, stamp
+        self._types = {name: number for number, name in enumerate(dict.fromkeys(classes), start=1)}
+        names = ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
+        self._kinds = [messages.type(f"opendlv.logic.perception.{name}") for name in names]
+
+    def tell(self, pose: Pose) -> Iterator[Output]:
+        """Three messages a box, the same detectionId for the same model in every picture."""
+        for box in self._truth.boxes(pose):
+            for message in self._messages(box):
+                yield Output(message, self._stamp)
+
+    def _messages(self, box: Box) -> tuple[Message, ...]:
+        kind, name, place = self._kinds
+        wide, high = self._camera.width, self._camera.height
+        fractions = {"x": box.left / wide, "y": box.top / high, "width": box.width / wide, "height": box.height / high}
+        return (
+            kind(detectionId=box.number, type=self._types[box.name]),
+            name(detectionId=box.number, property=box.name),
+            place(detectionId=box.number, **fractions),
+        )
+
+
+class CameraService(Service):
+    """Draws at its rate from the frames of one sender."""
+
+    def __init__(self, camera: VirtualCamera, freq: float, frame_id: int, teller: Teller | None) -> None:
+        self.period = period_of(freq)
+        self.inputs = {("opendlv.sim.Frame", frame_id): camera.take_frame}
+        self._camera, self._teller = camera, teller
+
+    def update(self, now: int) -> Iterable[Output]:
+        pose = self._camera.update(now)
+        return self._teller.tell(pose) if self._teller and pose else ()
+
+
+def publisher(memories: Memories) -> Publish:
+    """Writes all pictures as OpenDLV's readers expect: copied and stamped under the lock, then told."""
+
+    def publish(argb: Image, i420: Image, sample_time: int) -> None:
+        pictures = {"argb": argb, "i420": i420}
+        if any(kind == "bgr" for _, kind in memories):
+            pictures["bgr"] = np.asarray(cv2.cvtColor(argb, cv2.COLOR_BGRA2BGR), np.uint8)
+        for memory, kind in memories:
+            with memory.lock():
+                memory.buffer[: pictures[kind].nbytes] = pictures[kind].data.cast("B")
+                memory.stamp(sample_time)
+            memory.notify_all()
+
+    return publish
+
+
+def _scene(flags: Flags) -> Scene:
+    light = Light.asked(flags["light.azimuth"], flags["light.elevation"], flags["light.ambient"])
+    lines = tuple(flags["lines"])
+    return load_scene(
+        Path(flags["map-path"]), Wishes(light, lines, flags["line-width"], flags["clutter"], flags["seed"])
+    )
+
+
+def _optics(flags: Flags, scene: Scene) -> Optics:
+    camera = Pinhole(flags["width"], flags["height"], math.radians(flags["fovy"]))
+    distortion = Distortion(*(flags[f"distortion.{name}"] for name in ("k1", "k2", "p1", "p2")))
+    sensor = Sensor(flags["exposure"], flags["gain"], flags["noise"], flags["seed"])
+    overlays = list(load_overlays(scene.overlays, camera.width, camera.height))
+    return Optics(camera, distortion, sensor, overlays, flags["shutter"])
+
+
+def _start(flags: Flags) -> Pose | None:
+    written = [flags[f"start-{name}"] for name in ("x", "y", "yaw")]
+    if written == [None] * 3:
+        return None
+    x, y, yaw = (value or 0.0 for value in written)
+    return Pose.at(x, y, 0.0, yaw=math.radians(yaw))
+
+
+def _teller(context: Context, renderer: Renderer, optics: Optics) -> Teller | None:
+    flags = context.flags
+    if flags["truth-sender"] is None:
+        return None
+    classes = classes_of(flags["truth-classes"], renderer.bodies.names)
+    truth = Truth(renderer, classes, Limits(flags["truth-min-visible"], flags["truth-min-height"]), optics.lens)
+    return Teller(truth, classes.values(), optics.camera, context.messages, flags["truth-sender"])
+
+
+def _memories(context: Context, pixels: int) -> Memories:
+    sizes = {"argb": pixels * 4, "i420": pixels * 3 // 2, "bgr": pixels * 3}
+    names = {kind: context.flags[f"name.{kind}"] for kind in sizes}
+    return [(context.memory(name, sizes[kind]), kind) for kind, name in names.items() if name is not None]
+
+
+def build(context: Context) -> Service:
+    """The service from its flags; raises MapError, ValueError and SharedMemoryError."""
+    flags = context.flags
+    cv2.setNumThreads(1)
+    scene = _scene(flags)
+    optics = _optics(flags, scene)
+    renderer = Renderer(scene, optics.wide.width, optics.wide.height, optics.wide.fovy)
+    mounted = mount(*(flags[name] for name in ("x", "y", "z", "roll", "pitch", "yaw")))
+    publish = publisher(_memories(context, flags["width"] * flags["height"]))
+    camera = VirtualCamera(renderer, mounted, publish, optics, _start(flags))
+    return CameraService(camera, flags["freq"], flags["frame-id"], _teller(context, renderer, optics))

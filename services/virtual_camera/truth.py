@@ -1,0 +1,113 @@
+"""True bounding boxes of the models that a picture shows."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from services.virtual_camera.camera import NEAR, Array, Pinhole, Pose, View, clip
+from services.virtual_camera.lens import Lens
+from services.virtual_camera.raster import Image, fill_fixed
+from services.virtual_camera.render import Labels, Renderer
+from services.virtual_camera.shading import Piece
+
+_ONE = 256
+"""Fixed point numbers of a pixel."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """What is seen of one model: ``left``, ``top``, ``width``, ``height`` in pixels from the upper left corner.
+
+    ``number`` counts the map's models, all copies of the first before those of the second; ``visible`` is the share of
+    the model's pixels that nothing hides and the picture holds.
+    """
+
+    number: int
+    name: str
+    left: float
+    top: float
+    width: float
+    height: float
+    visible: float
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is too little to be asked for: the smallest share to be seen, and the smallest height in pixels."""
+
+    visible: float = 0.25
+    height: float = 4.0
+
+
+def classes_of(written: Iterable[str], models: Iterable[str]) -> dict[str, str]:
+    """Classes by model, of words such as ``cone_yellow=yellow``; each model's own name where nothing is written.
+
+    ValueError names a model that the map does not have.
+    """
+    known = list(dict.fromkeys(name for name in models if name))
+    pairs = [word.partition("=") for word in written]
+    for name, _, _ in pairs:
+        if name not in known:
+            raise ValueError(f"there is no model '{name}' in the map, which has {', '.join(known) or 'none'}")
+    return {name: kind or name for name, _, kind in pairs} or {name: name for name in known}
+
+
+class Truth:
+    """Finds the boxes of named models in pictures of a renderer, as a lens in front of it shows them."""
+
+    def __init__(
+        self, renderer: Renderer, classes: Mapping[str, str], limits: Limits, lens: Lens | None = None
+    ) -> None:
+        self._renderer, self._classes, self._limits, self._lens = renderer, classes, limits, lens
+
+    def boxes(self, pose: Pose) -> list[Box]:
+        """All boxes that keep within the limits, by number; ``pose`` is the camera's in the world."""
+        labels, drawn = self._renderer.labels(pose)
+        seen = np.bincount(labels.ravel() + 1, minlength=len(self._renderer.bodies.names) + 1)
+        view = self._renderer.camera.view(pose)
+        found = [self._box(view, body, pieces, int(seen[body + 1]), labels) for body, pieces in drawn.items()]
+        return sorted((box for box in found if box is not None), key=lambda box: box.number)
+
+    def _box(self, view: View, body: int, pieces: list[Piece], seen: int, labels: Labels) -> Box | None:
+        name = self._classes.get(self._renderer.bodies.names[body])
+        if name is None or seen == 0:
+            return None
+        corners, inside = _cut(self._corners(view, body), view.camera)
+        if self._lens:
+            corners, share = _cut(self._lens.shown(corners - 0.5) + 0.5, self._lens.camera)
+            inside *= share
+        visible = min(seen / max(_alone(pieces, labels), 1) * inside, 1.0)
+        (left, top), (wide, high) = corners.min(axis=0).tolist(), np.ptp(corners, axis=0).tolist()
+        if visible < self._limits.visible or high < self._limits.height or wide <= 0.0:
+            return None
+        return Box(body, name, left, top, wide, high, visible)
+
+    def _corners(self, view: View, body: int) -> Array:
+        """Where (n, 2) the renderer's picture has what of a body lies before the camera, in pixels from its corner."""
+        vertices, faces = self._renderer.bodies.outline(body)
+        points = view.to_camera(vertices)
+        if float(points[:, 2].min()) <= NEAR:
+            parts = [clip(points[face], np.array([0.0, 0.0, 1.0]), -NEAR) for face in faces]
+            points = np.concatenate(parts)
+        return self._renderer.camera.project(points) + 0.5
+
+
+def _cut(points: Array, camera: Pinhole) -> tuple[Array, float]:
+    """Points (n, 2) in pixels moved into a camera's picture, and the share of the rectangle around them inside it."""
+    whole = float(np.prod(np.ptp(points, axis=0)))
+    kept = np.clip(points, 0.0, [camera.width, camera.height])
+    return kept, float(np.prod(np.ptp(kept, axis=0))) / whole if whole > 0.0 else 0.0
+
+
+def _alone(pieces: list[Piece], labels: Labels) -> int:
+    """How many pixels the pieces of a body cover when nothing is before them."""
+    points = np.concatenate([points.reshape(-1, 2) for points, _ in pieces])
+    size = np.array([labels.shape[1], labels.shape[0]])
+    first = np.clip(points.min(axis=0) // _ONE - 1, 0, size)
+    wide, high = (np.clip(points.max(axis=0) // _ONE + 2, 0, size) - first).tolist()
+    mask: Image = np.zeros((max(high, 1), max(wide, 1)), np.uint8)
+    for corners, _ in pieces:
+        fill_fixed(mask, corners - (first * _ONE).astype(np.int32), (1,))
+    return int(cv2.countNonZero(mask))

@@ -1,0 +1,247 @@
+"""Each flag of the service, from its command line to what lies in memory and what is sent."""
+
+import math
+import os
+from contextlib import ExitStack
+from itertools import count
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import pytest
+
+from dodo_dsl import data
+from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base import Context, Output
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.virtual_camera.camera import Pose
+from services.virtual_camera.render import Renderer
+from services.virtual_camera.scene import load_scene
+from services.virtual_camera.service import build
+from tests.services.process import hear, running
+
+MANIFEST = load_manifest(data.services() / "virtual_camera")
+STRAIGHT = data.registry() / "maps" / "straight"
+MESSAGES = MessageSet.standard()
+LOGIC = "opendlv.logic.perception.Detection"
+PLACE = ["--z=0.095", "--yaw=90"]
+START, STEP = 1_700_000_000_000_000, 50_000
+NUMBERS = count()
+
+# what is written with and without the flag, both times beside PLACE
+PICTURED = {
+    "fovy": ([], "60"),
+    "x": ([], "0.05"),
+    "y": ([], "0.05"),
+    "z": ([], "0.12"),
+    "roll": ([], "5"),
+    "pitch": ([], "5"),
+    "yaw": ([], "100"),
+    "start-x": (["--start-y=0.3"], "0.05"),
+    "start-y": (["--start-x=0.05"], "0.3"),
+    "start-yaw": (["--start-x=0"], "10"),
+    "light.azimuth": (["--light.ambient=0.3"], "20"),
+    "light.elevation": (["--light.ambient=0.3"], "20"),
+    "light.ambient": ([], "0.2"),
+    "lines": ([], "left,finish"),
+    "line-width": (["--lines=left"], "0.05"),
+    "clutter": ([], "60"),
+    "exposure": ([], "0.4"),
+    "gain": ([], "2"),
+    "noise": ([], "0.02"),
+    "shutter": ([], "0.05"),
+    "distortion.k1": ([], "-0.2"),
+    "distortion.k2": ([], "0.1"),
+    "distortion.p1": ([], "0.02"),
+    "distortion.p2": ([], "0.02"),
+    "seed": (["--noise=0.02"], "3"),
+}
+OTHERS = {"map-path", "width", "height", "freq", "frame-id", "name.argb", "name.i420", "name.bgr"}
+TRUTH = {"truth-sender", "truth-classes", "truth-min-visible", "truth-min-height"}
+
+
+class Shot(NamedTuple):
+    """One picture in all its forms, and what was sent with it."""
+
+    argb: Any
+    i420: Any
+    bgr: Any
+    sample_time: int
+    outputs: list[Output]
+
+
+class Camera:
+    """The service on memories of its own; frames are (x, y, yaw) 50 ms apart."""
+
+    def __init__(self, *flags: str, size: tuple[int, int] = (160, 120)) -> None:
+        written = {word.partition("=")[0]: word for word in (*PLACE, *flags)}
+        names = {kind: f"dodo-test-{os.getpid()}-{next(NUMBERS)}.{kind}" for kind in ("argb", "i420", "bgr")}
+        own = [f"--cid=111 --map-path={STRAIGHT} --width={size[0]} --height={size[1]}".split()]
+        own.append([f"--name.{kind}={name}" for kind, name in names.items()])
+        self.resources = ExitStack()
+        self._size = size
+        parsed = parse(MANIFEST, [*own[0], *own[1], *written.values()])
+        self.service = build(Context("virtual-camera", parsed, MESSAGES, self.resources))
+        self._memories = [self.resources.enter_context(SharedMemory.attach(name)) for name in names.values()]
+
+    def shoot(self, *frames: tuple[float, float, float], now: int = START, frame_id: int = 0) -> Shot:
+        take = self.service.inputs["opendlv.sim.Frame", frame_id]
+        for number, (x, y, yaw) in enumerate(frames, 1 - len(frames)):
+            fields = {"x": x, "y": y, "qz": math.sin(yaw / 2), "qw": math.cos(yaw / 2)}
+            take(MESSAGES.type("opendlv.sim.Frame")(**fields), now + number * STEP)
+        outputs = list(self.service.update(now))
+        (wide, high), shot = self._size, []
+        for memory, shape in zip(
+            self._memories, [(high, wide, 4), (high * 3 // 2, wide), (high, wide, 3)], strict=True
+        ):
+            with memory.lock():
+                raw = bytes(memory.buffer[: math.prod(shape)])
+                shot.append(np.frombuffer(raw, np.uint8).reshape(shape))
+                sample_time = memory.sample_time()
+        return Shot(*shot, sample_time, outputs)
+
+
+@pytest.fixture
+def camera():
+    with ExitStack() as stack:
+
+        def make(*flags: str, **more: Any) -> Camera:
+            made = Camera(*flags, **more)
+            stack.enter_context(made.resources)
+            return made
+
+        yield make
+
+
+def test_each_parameter_is_tested_here():
+    assert {*PICTURED, *OTHERS, *TRUTH} == set(MANIFEST["parameters"])
+
+
+@pytest.mark.parametrize("name", PICTURED)
+def test_each_parameter_changes_the_picture(camera, name):
+    beside, value = PICTURED[name]
+    frames = () if name.startswith("start-") else ((0.0, 0.0, 0.0), (0.0, 0.02, 0.05))
+    without, given = (camera(*beside, *more).shoot(*frames) for more in ([], [f"--{name}={value}"]))
+    assert (without.argb != given.argb).any(axis=-1).sum() > 20
+    assert (given.argb[..., 3] == 255).all()
+
+
+def test_without_flags_the_picture_is_the_plain_one(camera):
+    shot = camera().shoot((0.0, 0.1, 0.0), (0.0, 0.12, 0.05))
+    plain = Renderer(load_scene(STRAIGHT), 160, 120, math.radians(48.8))
+    assert np.array_equal(shot.argb, plain.render(Pose.at(0, 0.12, 0.095, yaw=math.pi / 2 + 0.05)))
+    assert shot.outputs == []
+
+
+def test_all_memories_hold_the_same_picture_and_time(camera):
+    shot = camera(size=(64, 50)).shoot((0.0, 0.2, 0.0), now=START + 7)
+    assert shot.argb.std() > 10
+    assert np.array_equal(shot.bgr, shot.argb[..., :3])
+    assert np.array_equal(shot.i420, cv2.cvtColor(shot.argb, cv2.COLOR_BGRA2YUV_I420))
+    assert shot.sample_time == START + 7
+
+
+def test_frames_of_its_vehicle_count_and_the_rate_is_the_period(camera):
+    made = camera("--frame-id=4", "--freq=12.5")
+    assert set(made.service.inputs) == {("opendlv.sim.Frame", 4)}
+    assert made.service.period == 80_000
+    there, elsewhere = (made.shoot((0.0, y, 0.0), frame_id=4).argb for y in (0.0, 0.3))
+    assert not np.array_equal(there, elsewhere)
+
+
+EVERYTHING = [
+    *("--noise=0.03", "--clutter=40", "--seed=8", "--shutter=0.03", "--distortion.k1=-0.2"),
+    *("--exposure=0.6", "--gain=1.5", "--lines=left", "--light.elevation=30", "--truth-sender=9"),
+]
+
+
+def test_seed_and_time_alone_decide_what_is_drawn_by_lot(camera):
+    frames = [(0.0, 0.1, 0.0), (0.0, 0.13, 0.05)]
+    first = camera(*EVERYTHING).shoot(*frames)
+    later = camera(*EVERYTHING)
+    later.shoot((0.0, 0.9, 0.3), (0.1, 0.95, 0.4), now=START - 10 * STEP)
+    second = later.shoot(*frames)
+    for one, other in zip(first[:3], second[:3], strict=True):
+        assert np.array_equal(one, other)
+    assert first.outputs == second.outputs
+    assert not np.array_equal(first.argb, later.shoot(frames[-1], frames[-1], now=START + STEP).argb)
+
+
+def told(outputs: list[Output]) -> dict[int, dict[str, Any]]:
+    """What was said of each detection, by the message's name."""
+    found: dict[int, dict[str, Any]] = {}
+    for message, _ in outputs:
+        found.setdefault(message.detectionId, {})[message.DESCRIPTOR.name] = message
+    return found
+
+
+def test_true_boxes_follow_as_three_messages_each(camera):
+    classes = "--truth-classes=cone_blue=blue,cone_yellow=yellow"
+    shot = camera("--truth-sender=9", classes, size=(640, 480)).shoot((0.0, 0.0, 0.0))
+    assert {output.sender_stamp for output in shot.outputs} == {9}
+    found = told(shot.outputs)
+    assert len(shot.outputs) == 3 * len(found)
+    sides = {"blue": [], "yellow": []}
+    for said in found.values():
+        box, name = said["DetectionBoundingBox"], said["DetectionProperty"].property
+        assert said["DetectionType"].type == {"blue": 1, "yellow": 2}[name]
+        assert 0 <= box.x <= box.x + box.width <= 1 + 1e-6
+        assert 0 <= box.y <= box.y + box.height <= 1 + 1e-6
+        sides[name].append(box.x + box.width / 2)
+        seen = shot.bgr[round(480 * (box.y + box.height / 2)), round(640 * (box.x + box.width / 2))]
+        assert int(np.argmax(seen)) == {"blue": 0, "yellow": 2}[name] or box.height * 480 < 10
+    assert max(sides["yellow"]) < 0.5 < min(sides["blue"])
+    assert min(map(len, sides.values())) > 3
+
+
+def test_limits_leave_out_what_is_too_little(camera):
+    frame = (0.0, 0.0, 0.0)
+
+    def count_of(*flags: str) -> int:
+        made = camera("--truth-sender=9", *flags, size=(640, 480))
+        return len(told(made.shoot(frame).outputs))
+
+    everything = count_of("--truth-min-visible=0", "--truth-min-height=0")
+    assert count_of("--truth-min-visible=1", "--truth-min-height=0") < everything
+    assert 0 < count_of("--truth-min-visible=0", "--truth-min-height=20") < everything
+    assert count_of("--truth-classes=cone_red", "--truth-min-visible=0", "--truth-min-height=0") == 2
+
+
+def test_a_model_keeps_its_number_from_picture_to_picture(camera):
+    made = camera("--truth-sender=9", size=(640, 480))
+    one, two = (told(made.shoot((0.0, y, 0.0)).outputs) for y in (0.0, 0.02))
+    assert len(one.keys() & two.keys()) > 8
+    for number in one.keys() & two.keys():
+        first, second = (said[number]["DetectionBoundingBox"] for said in (one, two))
+        assert (first.x + first.width / 2, first.y) == pytest.approx((second.x + second.width / 2, second.y), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("flag", "message"),
+    [
+        ("--truth-classes=cone_green", "no model 'cone_green' in the map, which has cone_yellow, cone_blue, cone_red"),
+        ("--lines=middle", "no obstacle 'middle' with lines; the map has finish, left, right"),
+        ("--distortion.k1=-1.5", "the lens distortion is too strong"),
+    ],
+)
+def test_what_cannot_be_is_told(camera, flag, message):
+    with pytest.raises(ValueError, match=message):
+        camera("--truth-sender=9", flag)
+
+
+def test_boxes_on_the_bus_bear_the_time_of_the_picture_in_memory(tmp_path, cid):
+    names = [f"--name.{kind}=dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420")]
+    flags = [f"--cid={cid}", f"--map-path={STRAIGHT}", *PLACE, *names, "--start-y=0", "--truth-sender=9", "--freq=20"]
+    with Session(cid, MESSAGES) as session, running("virtual_camera", tmp_path, *flags):
+        with SharedMemory.attach(names[0].partition("=")[2]) as memory:
+            assert memory.wait(10)
+            with memory.lock():
+                pictured = memory.sample_time()
+        sampled = [hear(session, f"{LOGIC}BoundingBox", 9)[0].sample_time]
+        while sampled[-1] <= pictured + 50_000:
+            sampled.append(hear(session, f"{LOGIC}BoundingBox", 9)[0].sample_time)
+    assert pictured in sampled
+    assert not (np.diff(sampled) % 50_000).any()
