@@ -13,7 +13,7 @@ from dodo_dsl.plan.application import ApplicationSource, plan_application
 from dodo_dsl.plan.files import Copy, FilesError, copies
 from dodo_dsl.plan.lockstep import clock, lockstep
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
-from dodo_dsl.plan.recorder import MANIFEST, recorder
+from dodo_dsl.plan.recorder import MANIFEST, RECORDER, recorder
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
