@@ -14,6 +14,8 @@ from services.base.parts import STEP, STEP_DONE, Pieces, Said, frames
 
 Reply = list[Message]
 SLICE_MS = 100
+_MEANWHILE = 0.003
+"""For so many seconds after a message one who looks at the bus lets others come, and is woken once for them all."""
 
 
 class Step(NamedTuple):
@@ -50,20 +52,30 @@ class Ear:
         came = self._channel.receive()
         if came is not None:
             if observes:
-                while (envelope := self._session.receive(0.0)) is not None:
-                    self._overheard(envelope, overhear)
+                self._drain(overhear)
             return self._taken(*came)
-        if observes or self._clock is None:
+        if self._clock is None:
             envelope = self._session.receive(0.0)
             if envelope is not None:
                 if envelope.data_type == self._step_id:
                     return self._taken(envelope, self._session.source)
                 self._overheard(envelope, overhear)
                 return None
-        else:
+        elif observes and self._drain(overhear):
+            select.select([self._channel], [], [], _MEANWHILE)
+            return None
+        elif not observes:
             self._leave_the_bus()
         self._poll.poll(SLICE_MS)
         return None
+
+    def _drain(self, overhear: Callable[[Envelope], None]) -> int:
+        """Take all that is on the bus; says how much that was."""
+        taken = 0
+        while (envelope := self._session.receive(0.0)) is not None:
+            self._overheard(envelope, overhear)
+            taken += 1
+        return taken
 
     def answer(self, reply: Reply, on_the_bus: bool = False) -> None:
         """Send the answer to the step, and keep it to be repeated."""

@@ -2,7 +2,8 @@
 
 import select
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.codec import MessageError
@@ -36,60 +37,85 @@ class Done(NamedTuple):
     next: int = 0
 
 
-class Exchange:
-    """Talks with the services; everything of others goes to ``hear``. ``over`` says that the test is to end."""
+@dataclass
+class _Asked:
+    """Steps on their way to a service."""
 
-    def __init__(
-        self, session: Session, channel: Channel, hear: Callable[[Envelope], None], over: Callable[[], bool]
-    ) -> None:
-        self._session, self._channel, self._hear, self._over = session, channel, hear, over
+    number: int
+    messages: list[Any]
+    repeat: float = 0.0
+
+
+class Exchange:
+    """Talks with the services; everything of others goes to ``hear``."""
+
+    def __init__(self, session: Session, channel: Channel, hear: Callable[[Envelope], None]) -> None:
+        self._session, self._channel, self._hear = session, channel, hear
         self._step = session.messages.type(STEP)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._number = 0
-        self._waiting: dict[str, int] = {}
+        self._asked: dict[str, _Asked] = {}
         self._done: dict[str, Done] = {}
         self._pieces: dict[str, Pieces] = {}
         self._addresses: dict[str, Address] = {}
         self._own: set[Address] = set()
-        self._poll = select.poll()
-        self._poll.register(channel, select.POLLIN)
+        self._channel_poll, self._poll = select.poll(), select.poll()
+        for poll in (self._channel_poll, self._poll):
+            poll.register(channel, select.POLLIN)
         self._poll.register(session, select.POLLIN)
 
-    def run(self, orders: Sequence[Order], deadline: float) -> list[Done]:
-        """The answers in the order of the orders; those that did not come until ``deadline`` (monotonic) lack."""
-        messages = {order.service: self._messages(order) for order in orders}
-        self._done, self._waiting = {}, {name: m[0].number for name, m in messages.items()}
-        repeat = 0.0
-        while self._waiting and not self._over():
-            now = time.monotonic()
-            if now >= deadline:
-                break
-            if now >= repeat:
-                for name in self._waiting:
-                    for message in messages[name]:
-                        self._channel.send(message, self._addresses.get(name))
-                repeat = now + REPEAT_S
-            self.pump(min(repeat, deadline) - now)
-        self._waiting = {}
-        return [self._done[order.service] for order in orders if order.service in self._done]
+    def ask(self, orders: Iterable[Order]) -> None:
+        """Send the orders; they are sent again by ``pump``."""
+        for order in orders:
+            self._number += 1
+            self._asked[order.service] = _Asked(self._number, self._messages(order))
+        self._repeat()
 
-    def pump(self, timeout: float) -> None:
-        """Take what has come, or comes within ``timeout`` seconds; of the bus only one message, so that the order
-        in which answers and the application's messages came counts."""
+    def answer(self, service: str) -> Done | None:
+        """What a service that was asked has answered, once."""
+        return self._done.pop(service, None)
+
+    def forget(self) -> None:
+        """Nobody is asked any more."""
+        self._asked.clear()
+
+    def pump(self, timeout: float, bus: bool = True) -> None:
+        """Take what has come, or comes within ``timeout`` seconds, on the channel and maybe on the bus.
+
+        Of the bus it is one message only, as the order of answers and the application's messages counts.
+        """
         came = self._channel.receive()
         if came is not None:
             self._take(*came)
-            return
+        elif not (bus and self._listen()):
+            poll = self._poll if bus else self._channel_poll
+            if not poll.poll(max(0.0, min(timeout, _SLICE)) * 1000):
+                self._repeat()
+
+    def drain(self) -> None:
+        """Take everything that is on the bus already."""
+        while self._listen():
+            pass
+
+    def _listen(self) -> bool:
         envelope = self._session.receive(0.0)
         if envelope is None:
-            self._poll.poll(max(0.0, min(timeout, _SLICE)) * 1000)
-        elif envelope.data_type == self._done_id:
+            return False
+        if envelope.data_type == self._done_id:
             self._take(envelope, None)
         elif envelope.data_type != self._step_id and self._session.source not in self._own:
             self._hear(envelope)
+        return True
+
+    def _repeat(self) -> None:
+        now = time.monotonic()
+        for name, asked in self._asked.items():
+            if now >= asked.repeat:
+                asked.repeat = now + REPEAT_S
+                for message in asked.messages:
+                    self._channel.send(message, self._addresses.get(name))
 
     def _messages(self, order: Order) -> list[Any]:
-        self._number += 1
         pieces = cut(said.frame for said in order.heard)
         facts = {"number": self._number, "service": order.service, "time": order.time, "show": order.show}
         return [self._step(part=part, parts=len(pieces), frames=data, **facts) for part, data in enumerate(pieces)]
@@ -102,7 +128,8 @@ class Exchange:
             done: Any = self._session.messages.decode(envelope.data_type, envelope.payload)
             if done.ended and address is not None:
                 self._channel.send(self._step(number=done.number, service=done.service), address)
-            if self._waiting.get(done.service) != done.number:
+            asked = self._asked.get(done.service)
+            if asked is None or asked.number != done.number:
                 return
             if address is not None:
                 self._addresses[done.service] = address
@@ -111,6 +138,6 @@ class Exchange:
             if data is not None:
                 facts = (done.memories, done.pictures, done.sampled, done.ended, done.next)
                 self._done[done.service] = Done(done.service, tuple(frames(data)), *facts)
-                del self._waiting[done.service]
+                del self._asked[done.service]
         except (FrameError, MessageError):
             return  # not from one of ours

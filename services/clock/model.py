@@ -1,6 +1,7 @@
 """The order of a step: the action layer advances, the environment senses, the application answers, evaluators look."""
 
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -11,6 +12,7 @@ from services.base.parts import Said, say
 from services.clock.answers import Answers
 from services.clock.exchange import Done, Order
 
+_SLICE = 0.05
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""
 
@@ -28,10 +30,13 @@ class TimedOut(Exception):
 
 
 class Talk(Protocol):
-    """How orders get to the services: an Exchange, or a test's own."""
+    """How orders get to the services, as Exchange has it."""
 
-    def run(self, orders: Sequence[Order], deadline: float) -> list[Done]: ...
-    def pump(self, timeout: float) -> None: ...
+    def ask(self, orders: Iterable[Order]) -> None: ...
+    def answer(self, service: str) -> Done | None: ...
+    def forget(self) -> None: ...
+    def pump(self, timeout: float, bus: bool = True) -> None: ...
+    def drain(self) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -73,68 +78,82 @@ class Stepper:
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
     _memories: int = 0
+    spent: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    """Wall time in s by whom it was waited for."""
 
     def __post_init__(self) -> None:
         self._backlog = {name: [] for name in self.roles.all}
 
     def meet(self) -> None:
         """Find all services, before time begins; raises Stuck."""
-        dones = self._go([(name, EPOCH - 1) for name in self.roles.all])
-        self._memories = sum(done.memories for done in dones)
+        self._memories = sum(done.memories for done in self._go(self.roles.all, EPOCH - 1))
 
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises Unanswered, Stuck and TimedOut."""
         self._spread([say(begin)], "")
-        before = self.now - 1
         while not self.stopped():
-            shown: list[Done] = []
-            for together in self._order(before):
-                dones = self._go(together)
-                if set(self.roles.judge) <= self._ended or self.stopped():
-                    return
-                shown += [done for done in dones if done.pictures]
-            if self.now - EPOCH > self.timeout:
+            shown = [
+                done
+                for name in (*self.roles.advance, *self.roles.sense)
+                for done in self._go((name,), self.now)
+                if done.pictures
+            ]
+            self.talk.drain()
+            self._see(shown) if shown or not self._memories else self._look()
+            if self._is_judged:
+                return
+            if self.now - EPOCH >= self.timeout:
                 raise TimedOut
-            if shown or not self._memories:
-                self._see(shown)
             self._spread([say(envelope) for envelope in self.answers.collect()], "")
-            before, self.now = self.now, self._following()
+            self.now = self._following()
 
-    def _order(self, before: int) -> Iterator[list[tuple[str, int]]]:
-        """Who goes on together, and to when: services that hear one another go one after the other.
+    @property
+    def _is_judged(self) -> bool:
+        return set(self.roles.judge) <= self._ended
 
-        Those that look at the step before do so beside the others: watchers first, as the last judge ends the test.
-        """
-        hops = [[(name, self.now)] for name in (*self.roles.advance, *self.roles.sense)]
-        watchers, judges = ([(name, before) for name in names] for names in (self.roles.watch, self.roles.judge))
-        if len(hops) < 2:
-            hops.insert(0, [])
-        hops[0] += watchers
-        hops[1:1] = [] if len(hops) > 1 else [[]]
-        hops[1] += judges
-        yield from hops
-
-    def _go(self, wanted: Iterable[tuple[str, int]]) -> list[Done]:
-        orders = [Order(name, until, self._heard(name, until)) for name, until in wanted if name not in self._ended]
-        if not orders:
-            return []
-        dones = self.talk.run(orders, time.monotonic() + SERVICE_PATIENCE)
-        if len(dones) < len(orders) and not self.stopped():
-            late = min({order.service for order in orders} - {done.service for done in dones})
-            raise Stuck(f"service '{late}' did not answer the clock within {SERVICE_PATIENCE:g} s")
-        for done in dones:
-            self._spread(done.sent, done.service)
-            self._next[done.service] = done.next
-            if done.ended:
-                self._ended.add(done.service)
+    def _go(self, names: Sequence[str], until: int) -> list[Done]:
+        """All of them go on to a time."""
+        dones: list[Done] = []
+        for _ in self._going(names, until, dones):
+            self.talk.pump(_SLICE, bus=False)
         return dones
+
+    def _going(self, names: Sequence[str], until: int, dones: list[Done]) -> Iterator[None]:
+        """As ``_go``, with something else to do in between; raises Stuck."""
+        wanted = [name for name in names if name not in self._ended]
+        began = time.monotonic()
+        self.talk.ask([Order(name, until, self._heard(name, until)) for name in wanted])
+        for name in wanted:
+            while (done := self.talk.answer(name)) is None:
+                if self.stopped():
+                    return
+                if time.monotonic() - began > SERVICE_PATIENCE:
+                    raise Stuck(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
+                yield
+            self._take(done)
+            dones.append(done)
+        self.spent[" and ".join(wanted)] += time.monotonic() - began
+
+    def _take(self, done: Done) -> None:
+        self._spread(done.sent, done.service)
+        self._next[done.service] = done.next
+        if done.ended:
+            self._ended.add(done.service)
+
+    def _looking(self) -> Iterator[None]:
+        """The watchers look, and then the judges, as the last of these ends the test."""
+        yield from self._going(self.roles.watch, self.now, [])
+        yield from self._going(self.roles.judge, self.now, [])
+
+    def _look(self) -> None:
+        for _ in self._looking():
+            self.talk.pump(_SLICE)
 
     def _heard(self, name: str, until: int) -> tuple[Said, ...]:
         """What a service has not heard yet, up to the time that it goes on to."""
         backlog = self._backlog[name]
-        later = [said for said in backlog if until < said.envelope.sample_time <= self.now]
-        self._backlog[name] = later
-        return tuple(said for said in backlog if said not in later) if later else tuple(backlog)
+        self._backlog[name] = [said for said in backlog if until < said.envelope.sample_time <= self.now]
+        return tuple(said for said in backlog if not until < said.envelope.sample_time <= self.now)
 
     def _spread(self, said: Sequence[Said], sender: str) -> None:
         """What one said, all others will hear with their next step."""
@@ -143,30 +162,45 @@ class Stepper:
                 backlog.extend(said)
 
     def _see(self, shown: Sequence[Done]) -> None:
-        """The application sees the new pictures, and answers."""
+        """The application sees the new pictures, and answers, while watchers and judges look at the same step."""
         self.frames += 1
+        began = time.monotonic()
         patience = self.patience.first if self.frames == 1 else self.patience.others
-        deadline = time.monotonic() + patience
+        self._show(shown, began, patience)
+        if any(done.ended for done in shown):  # the judges hear of its end when the last answer has come
+            self._await_answer(iter(()), began, patience)
+            self._spread([say(envelope) for envelope in self.answers.collect()], "")
+            self._look()
+        else:
+            self._await_answer(self._looking(), began, patience)
+
+    def _show(self, shown: Sequence[Done], began: float, patience: float) -> None:
+        """Readers are told of pictures as soon as they wait for them."""
         if not shown:
             self.answers.open(self.now)
         for camera in shown:
-            self._show(camera, deadline, patience)
-        if not self.answers.asked:
-            for camera in shown:
-                self._show(camera, deadline, patience)  # the readers wait again: they have done what they do
-        while not self.answers.complete and not self.stopped():
-            left = deadline - time.monotonic()
-            if left <= 0:
+            self.talk.ask([Order(camera.service, self.now, (), show=True)])
+            while self.talk.answer(camera.service) is None:
+                if self.stopped():
+                    return
+                if time.monotonic() - began > patience:
+                    self.talk.forget()
+                    raise Unanswered(self._sentence(patience, f"nobody waited for a picture of '{camera.service}'"))
+                self.talk.pump(_SLICE)
+            self.answers.open(camera.sampled)
+
+    def _await_answer(self, looking: Iterator[None], began: float, patience: float) -> None:
+        is_looking = True
+        while not self.stopped():
+            is_looking = is_looking and next(looking, self) is None
+            if self._is_judged or (self.answers.complete and not is_looking):
+                break
+            left = began + patience - time.monotonic()
+            if left <= 0 and not self.answers.complete:
                 missing = " and ".join(name.rpartition(".")[2] for name in self.answers.missing)
                 raise Unanswered(self._sentence(patience, f"{missing} missing"))
-            self.talk.pump(left)
-
-    def _show(self, camera: Done, deadline: float, patience: float) -> None:
-        """Its readers are told of the picture as soon as they wait for it."""
-        dones = self.talk.run([Order(camera.service, self.now, (), show=True)], deadline)
-        if not dones and not self.stopped():
-            raise Unanswered(self._sentence(patience, f"nobody waited for a picture of '{camera.service}'"))
-        self.answers.open(camera.sampled)
+            self.talk.pump(max(left, 0.0))
+        self.spent["the first answer" if self.frames == 1 else "the application"] += time.monotonic() - began
 
     def _sentence(self, patience: float, what: str) -> str:
         return f"the application did not answer frame {self.frames} within {patience:g} s ({what})"

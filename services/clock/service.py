@@ -1,6 +1,7 @@
 """The clock on the bus: it waits for the test's begin, steps it to its end, and tells the runner how far it got."""
 
 import json
+import logging
 import time
 from collections.abc import Callable
 
@@ -15,6 +16,7 @@ from services.clock.model import Patience, Roles, Stepper, Stuck, TimedOut, Unan
 
 _TELL_S = 1.0
 _SLICE = 0.05
+_log = logging.getLogger(__name__)
 
 
 class ClockService(Service):
@@ -32,7 +34,7 @@ class ClockService(Service):
     ) -> None:
         self._session, self._answers = session, answers
         self._begin_id = session.messages.id("dodo.TestBegin")
-        exchange = Exchange(session, channel, answers.take, self._over)
+        exchange = Exchange(session, channel, answers.take)
         self._stepper = Stepper(roles, period, timeout, patience, answers, exchange, self._over)
         self._told = 0.0
         self._stopped: Callable[[], bool] = lambda: False
@@ -50,6 +52,8 @@ class ClockService(Service):
             self._stepper.run(begin._replace(sample_time=EPOCH))
         except (Unanswered, Stuck, TimedOut) as problem:
             kind, reason = type(problem).__name__.lower(), str(problem)
+        spent = sorted(self._stepper.spent.items(), key=lambda item: -item[1])
+        _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
         self._tell_time(last=True)
         if kind:
             self._say(kind, reason=reason)
