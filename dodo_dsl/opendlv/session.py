@@ -20,6 +20,7 @@ RECEIVE_BUFFER_BYTES = 26_214_400
 CIDS = range(1, 255)
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
+_ID_PLACE, _ID_TAG = 5, 0x08  # behind the frame's header, the envelope's first field
 _IP_MULTICAST_ALL = 49  # Linux: linux/in.h
 _SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
 _SO_RXQ_OVFL = 40
@@ -50,6 +51,8 @@ class Session:
         self.garbage = 0
         self.lost = 0
         self.is_member = True
+        self.only: frozenset[int] | None = None
+        """Ids of messages; datagrams of others are left undecoded where they are as libcluon writes them."""
         self.source: Address = ("", 0)
         """Host and port from which the last datagram came."""
         group = (f"225.0.0.{cid}", PORT)
@@ -143,6 +146,8 @@ class Session:
             self.lost = _lost(ancillary)
         if address == self._own_address:
             return None
+        if self.only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self.only:
+            return None
         self.source = address
         try:
             return decode_frame(bytes(self._view[:size]), _received(ancillary))
@@ -155,6 +160,17 @@ class Session:
             return bool(self._poll.poll())
         left = deadline - time.monotonic()
         return left > 0 and bool(self._poll.poll(left * 1000))
+
+
+def _id(frame: bytearray) -> int:
+    """The id of the message in a frame that begins with it: a zigzag varint."""
+    value = shift = 0
+    for byte in frame[_ID_PLACE + 1 : _ID_PLACE + 6]:
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            break
+    return (value >> 1) ^ -(value & 1)
 
 
 def _received(ancillary: list[tuple[int, int, bytes]]) -> int:

@@ -9,7 +9,7 @@ from services.base.clock import MICROSECONDS
 from services.base.service import period_of
 from services.clock.answers import Answers, kinds
 from services.clock.model import Patience, Roles
-from services.clock.service import ClockService
+from services.clock.service import HEARD, ClockService
 
 
 def build(context: Context) -> Service:
@@ -19,6 +19,7 @@ def build(context: Context) -> Service:
     answers = Answers(kinds(flags["answers"], ids), kinds(flags["hears"], ids), done[0] if done else None)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"
+    context.session.only = frozenset(kind.data_type for kind in answers.kinds) | {ids[name] for name in HEARD}
     channel = Channel(context.session.cid, context.messages)
     context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)

@@ -64,6 +64,11 @@ class Answers:
             self._others.append(known)
 
     @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """Everything that counts in one way or the other."""
+        return (*self.wanted, *self.heard, *([self.done] if self.done else []))
+
+    @property
     def asked(self) -> bool:
         """Whether anything is known that answers a frame."""
         return bool(self.wanted) or self.done is not None

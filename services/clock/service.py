@@ -16,6 +16,9 @@ from services.clock.model import Patience, Roles, Stepper, Stuck, TimedOut, Unan
 
 _TELL_S = 1.0
 _SLICE = 0.05
+HEARD = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone")
+"""What the clock hears beside the application's answers."""
+
 _log = logging.getLogger(__name__)
 
 
