@@ -15,7 +15,7 @@ help:
 demo:
 	@scripts/setup
 	$(DODO) compile
-	$(DODO) run 'sil-closed-*'
+	$(DODO) run --level sil --level dil
 
 lint:
 	@scripts/setup dev

@@ -22,11 +22,12 @@ from services.virtual_camera.truth import Limits, Truth, classes_of
 
 MAP = data.registry() / "maps" / "left-curve"
 SIZE, FOVY, COLUMNS = (288, 216), math.radians(48.8), 4
+LABEL = 24
 PLACE = Pose.at(0.0, 0.2, 0.095, yaw=math.pi / 2)
 MOTION = Motion(PLACE, np.array([0.0, 0.6, 0.0]), np.array([0.0, 0.0, 0.5]))
 SHEET: dict[str, tuple[Wishes, dict[str, object]]] = {
     "normal": (Wishes(), {}),
-    "clutter=40": (Wishes(clutter=40, seed=1), {}),
+    "clutter=60": (Wishes(clutter=60, seed=1), {}),
     "exposure=3": (Wishes(), {"sensor": Sensor(exposure=3.0)}),
     "exposure=0.15": (Wishes(), {"sensor": Sensor(exposure=0.15)}),
     "noise=0.06": (Wishes(), {"sensor": Sensor(noise=0.06)}),
@@ -51,7 +52,8 @@ def tiles() -> Iterator[Image]:
         optics.expose(renderer, MOTION, Pose.at(0, 0, 0), 1_000_000, picture)
         if "boxes" in name:
             draw_boxes(picture, renderer)
-        cv2.putText(picture, name, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0, 255), 1, cv2.LINE_AA)
+        picture[:LABEL] = 255
+        cv2.putText(picture, name, (8, LABEL - 7), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0, 255), 1, cv2.LINE_AA)
         yield picture
 
 

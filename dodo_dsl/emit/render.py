@@ -18,6 +18,7 @@ from dodo_dsl.source import resolve
 
 _SERVICE_DEPTH = 2
 _MOST_BLOCKS = 10_000
+_OLD_BREAKS = "\x85\u2028\u2029"
 _BLOCKS: dict[str, str] = {}
 
 
@@ -40,8 +41,9 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _text(dumper: _Dumper, value: str) -> yaml.ScalarNode:
-    """A text, in quotes where YAML 1.2 would take it for something else."""
-    return dumper.represent_scalar("tag:yaml.org,2002:str", value, None if isinstance(resolve(value), str) else "'")
+    """A text, in quotes where YAML 1.2 would take it for something else, escaped where YAML 1.1 would break a line."""
+    style = '"' if any(break_ in value for break_ in _OLD_BREAKS) else None if isinstance(resolve(value), str) else "'"
+    return dumper.represent_scalar("tag:yaml.org,2002:str", value, style)
 
 
 _Dumper.add_representer(str, _text)

@@ -65,9 +65,9 @@ class Truth:
     def boxes(self, pose: Pose) -> list[Box]:
         """All boxes that keep within the limits, by number; ``pose`` is the camera's in the world."""
         labels, drawn = self._renderer.labels(pose)
-        seen = np.bincount(labels.ravel() + 1, minlength=len(self._renderer.bodies.names) + 1)
+        seen = np.bincount(labels[labels >= 0], minlength=len(self._renderer.bodies.names))
         view = self._renderer.camera.view(pose)
-        found = [self._box(view, body, pieces, int(seen[body + 1]), labels) for body, pieces in drawn.items()]
+        found = [self._box(view, body, pieces, int(seen[body]), labels) for body, pieces in drawn.items()]
         return sorted((box for box in found if box is not None), key=lambda box: box.number)
 
     def _box(self, view: View, body: int, pieces: list[Piece], seen: int, labels: Labels) -> Box | None:

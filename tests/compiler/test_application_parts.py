@@ -192,6 +192,8 @@ SERVICES = st.fixed_dictionaries({"b": SERVICE}, optional={"a": SERVICE})
     isolation="network",
     hil=False,
 )
+@example(services={"b": {"image": "\x85"}}, isolation="network", hil=False)
+@example(services={"b": {"image": "a\u2028b", "command": "x \x85\u2029 y"}}, isolation="network", hil=False)
 def test_what_is_read_can_be_rewritten(services: dict[str, Any], isolation: str, hil: bool, tmp_path: Path) -> None:
     """Whatever mapping the reader takes, its copy is YAML that says what the Plan says."""
     file = tmp_path / "docker-compose.yml"

@@ -2,8 +2,6 @@
 
 import json
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -11,9 +9,7 @@ import pytest
 import yaml
 
 from dodo_dsl.run.lanes import namespaces_refusal
-
-ROOT = Path(__file__).parents[2]
-KIWI = ROOT / "examples" / "kiwi"
+from tests.drive.applications import ROOT, dodo, kiwi, results
 
 
 @pytest.fixture(params=["network", "host"])
@@ -25,37 +21,13 @@ def isolation(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, t
     return str(request.param)
 
 
-def dodo(*words: str, code: int) -> str:
-    """The output of a command that must end with an exit code."""
-    command = [sys.executable, "-m", "dodo_dsl", *words]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=120)
-    assert result.returncode == code, result.stdout + result.stderr
-    assert "Traceback" not in result.stdout + result.stderr
-    return result.stdout
-
-
-def results(report: Path) -> dict[str, dict[str, object]]:
-    return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}
-
-
-def kiwi(folder: Path, **commands: str) -> Path:
-    """A copy of the example application with words appended to the commands of its services."""
-    shutil.copytree(KIWI, folder)
-    path = folder / "docker-compose.yml"
-    compose = yaml.safe_load(path.read_text())
-    for service, words in commands.items():
-        compose["services"][service]["command"] += f" {words}"
-    path.write_text(yaml.safe_dump(compose))
-    return path
-
-
 def test_they_pass_at_once(isolation: str, tmp_path: Path) -> None:
     report = tmp_path / "report"
     names = ["sil-closed-*"] if isolation == "network" else ["sil-closed-straight", "sil-closed-left-curve"]
     dodo("run", *names, "--isolation", isolation, "-j", "2", "--report", str(report), code=0)
     for slug, test in results(report).items():
         assert test["outcome"] == "passed", test
-        checks = {c["name"]: c for c in test["checks"]}  # type: ignore[attr-defined]
+        checks = {c["name"]: c for c in test["checks"]}
         assert 3.0 < checks["time-to-goal"]["value"] < 40.0
         assert checks["wall-margin"]["value"] > 0.03
         assert (report / slug / "trajectory.png").read_bytes().startswith(b"\x89PNG")

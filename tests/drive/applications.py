@@ -1,0 +1,51 @@
+"""The example application, and copies of it that are wrong in one way."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+ROOT = Path(__file__).parents[2]
+KIWI = ROOT / "examples" / "kiwi"
+
+BLIND = ("perception.py", "for x, y, w, h in _boxes(", "for x, y, w, h in _boxes(0 * ")
+SWAPPED = ("perception.py", "Cone(colour, x /", 'Cone("blue" if colour == "yellow" else "yellow", x /')
+STOPS = (
+    "steering.py",
+    "        self.blind = 0\n        self.steering",
+    "        self.seen = getattr(self, 'seen', 0) + 1\n"
+    "        if self.seen > 30:\n            return 0.0, 0.0\n        self.steering",
+)
+
+
+def dodo(*words: str, code: int) -> str:
+    """The output of a command that must end with an exit code."""
+    command = [sys.executable, "-m", "dodo_dsl", *words]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=180)
+    assert result.returncode == code, result.stdout + result.stderr
+    assert "Traceback" not in result.stdout + result.stderr
+    return result.stdout
+
+
+def results(report: Path) -> dict[str, dict[str, Any]]:
+    return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}
+
+
+def kiwi(folder: Path, wrong: tuple[str, str, str] | None = None, **commands: str) -> Path:
+    """A copy of the example application, wrong in one place, with words appended to its services' commands."""
+    shutil.copytree(KIWI, folder)
+    if wrong:
+        name, right, changed = wrong
+        text = (folder / name).read_text()
+        assert text.count(right) == 1
+        (folder / name).write_text(text.replace(right, changed))
+    path = folder / "docker-compose.yml"
+    compose = yaml.safe_load(path.read_text())
+    for service, words in commands.items():
+        compose["services"][service]["command"] += f" {words}"
+    path.write_text(yaml.safe_dump(compose))
+    return path
