@@ -57,6 +57,10 @@ class Clock(Protocol):
         """The service has sent this."""
         ...
 
+    def expect(self, time: int) -> None:
+        """The service will show something at this time (us) and nothing before it; 0 when it does not know."""
+        ...
+
     def memory(self, name: str, size: int) -> SharedMemory:
         """New shared memory for pictures that are sampled by this clock; raises SharedMemoryError."""
         ...
@@ -93,6 +97,9 @@ class RealTimeClock:
 
     def sent(self, frame: bytes) -> None:
         """Time goes on by itself."""
+
+    def expect(self, time: int) -> None:
+        """Time goes on evenly, whatever comes."""
 
     def memory(self, name: str, size: int) -> SharedMemory:
         return SharedMemory.create(name, size)

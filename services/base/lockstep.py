@@ -49,8 +49,7 @@ class LockstepClock:
         self._sent: list[bytes] = []
         self._screen = Screen(readers)
         self._overheard: list[Envelope] = []
-        self.next = 0
-        """When the service has something to say next, in us of test time; 0 when that is not known."""
+        self._next = 0
 
     def now(self) -> int:
         return self._now
@@ -79,6 +78,10 @@ class LockstepClock:
     def sent(self, frame: bytes) -> None:
         """The service has sent this."""
         self._sent.append(frame)
+
+    def expect(self, time: int) -> None:
+        """The test then goes on to this time in one step."""
+        self._next = time
 
     def memory(self, name: str, size: int) -> SharedMemory:
         """New shared memory whose pictures are announced once, when their readers wait for them."""
@@ -137,7 +140,7 @@ class LockstepClock:
             "pictures": len(self._screen.new),
             "sampled": self._screen.sampled,
             "ended": ended,
-            "next": self.next,
+            "next": self._next,
             "port": self._session.port,
         }
         return [self._done(part=part, frames=data, **facts) for part, data in enumerate(pieces)]

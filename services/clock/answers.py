@@ -31,7 +31,7 @@ class Answers:
     heard: tuple[Kind, ...] = ()
     done: Kind | None = None
     surplus: int = 0
-    _time: int = 0
+    _time: int | None = None
     _times: set[int] = field(default_factory=set)
     _chosen: dict[Kind, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
@@ -49,18 +49,20 @@ class Answers:
         An answer counts by the frame's sample time, or as the first after it where the application does not copy
         sample times, so that its own are those of no frame; it then gets the frame's.
         """
+        if self._time is None:
+            return
         stale = envelope.sample_time != self._time and envelope.sample_time in self._times
         known = envelope if envelope.sample_time in self._times else envelope._replace(sample_time=self._time)
         if self.done is not None and self.done.is_of(envelope) and not stale:
             self._is_done = True
         for kind in self.wanted:
             if kind.is_of(envelope):
-                if stale or kind in self._chosen or not self._time:
+                if stale or kind in self._chosen:
                     self.surplus += 1
                 else:
                     self._chosen[kind] = known
                 return
-        if self._time and any(kind.is_of(envelope) for kind in self.heard):
+        if any(kind.is_of(envelope) for kind in self.heard):
             self._others.append(known)
 
     @property
