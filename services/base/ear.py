@@ -38,6 +38,8 @@ class Ear:
         self._channel = Channel(session.cid, session.messages)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._clock: Address | None = None
+        self._is_met = False
+        """Whether the clock knows the channel, so that there is no need of the bus."""
         self._number = -1
         self._pieces = Pieces()
         self._last: Reply = []
@@ -51,10 +53,11 @@ class Ear:
         """The next new step, or None when a while has passed; everything that was on the bus before it is overheard."""
         came = self._channel.receive()
         if came is not None:
+            self._is_met = True
             if observes:
                 self._drain(overhear)
             return self._taken(*came)
-        if self._clock is None:
+        if not self._is_met:
             envelope = self._session.receive(0.0)
             if envelope is not None:
                 if envelope.data_type == self._step_id:

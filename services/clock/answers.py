@@ -36,12 +36,13 @@ class Answers:
     _chosen: dict[Kind, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
     _is_done: bool = False
+    _is_collected: bool = False
 
     def open(self, time: int) -> None:
         """The frame of this sample time (us) is about to be seen: answers before this were not to it."""
         self._time = time
         self._times.add(time)
-        self._chosen, self._is_done = {}, False
+        self._chosen, self._is_done, self._is_collected = {}, False, False
 
     def take(self, envelope: Envelope) -> None:
         """Something came on the bus.
@@ -57,7 +58,7 @@ class Answers:
             self._is_done = True
         for kind in self.wanted:
             if kind.is_of(envelope):
-                if stale or kind in self._chosen:
+                if stale or kind in self._chosen or self._is_collected:
                     self.surplus += 1
                 else:
                     self._chosen[kind] = known
@@ -93,8 +94,9 @@ class Answers:
         """The answer, in an order that does not depend on which sender was faster."""
         others, self._others = self._others, []
         others.sort(key=lambda e: (e.sample_time, e.data_type, e.sender_stamp))
-        chosen, self._chosen = self._chosen, {}
-        return [*others, *(chosen[kind] for kind in self.wanted if kind in chosen)]
+        given, self._is_collected = self._is_collected, True
+        chosen = [] if given else [self._chosen[kind] for kind in self.wanted if kind in self._chosen]
+        return [*others, *chosen]
 
 
 def kinds(names: Iterable[str], ids: Mapping[str, int]) -> tuple[Kind, ...]:
