@@ -92,6 +92,11 @@ class Exchange:
             if not poll.poll(max(0.0, min(timeout, _SLICE)) * 1000):
                 self._repeat()
 
+    def tell(self, said: Iterable[Said]) -> None:
+        """Say again, on the bus, what others have said."""
+        for each in said:
+            self._session.send_envelope(each.envelope)
+
     def drain(self) -> None:
         """Take everything that is on the bus already."""
         while self._listen():

@@ -13,6 +13,7 @@ from services.clock.answers import Answers
 from services.clock.exchange import Done, Order
 
 _SLICE = 0.05
+_AGAIN = 0.5
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""
 
@@ -36,6 +37,7 @@ class Talk(Protocol):
     def answer(self, service: str) -> Done | None: ...
     def forget(self) -> None: ...
     def pump(self, timeout: float, bus: bool = True) -> None: ...
+    def tell(self, said: Iterable[Said]) -> None: ...
     def drain(self) -> None: ...
 
 
@@ -78,6 +80,7 @@ class Stepper:
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
     _memories: int = 0
+    _first: list[Said] = field(default_factory=list)
     spent: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     """Wall time in s by whom it was waited for."""
 
@@ -135,6 +138,8 @@ class Stepper:
         self.spent[" and ".join(wanted)] += time.monotonic() - began
 
     def _take(self, done: Done) -> None:
+        if not self.frames:
+            self._first.extend(done.sent)
         self._spread(done.sent, done.service)
         self._next[done.service] = done.next
         if done.ended:
@@ -176,6 +181,7 @@ class Stepper:
 
     def _show(self, shown: Sequence[Done], began: float, patience: float) -> None:
         """Readers are told of pictures as soon as they wait for them."""
+        again = began + _AGAIN
         if not shown:
             self.answers.open(self.now)
         for camera in shown:
@@ -187,7 +193,15 @@ class Stepper:
                     self.talk.forget()
                     raise Unanswered(self._sentence(patience, f"nobody waited for a picture of '{camera.service}'"))
                 self.talk.pump(_SLICE)
+                again = self._say_again(again)
             self.answers.open(camera.sampled)
+
+    def _say_again(self, again: float) -> float:
+        """An application that starts late hears what was said before its first picture, as it would in real time."""
+        if self.frames > 1 or time.monotonic() < again:
+            return again
+        self.talk.tell(self._first)
+        return time.monotonic() + _AGAIN
 
     def _await_answer(self, looking: Iterator[None], began: float, patience: float) -> None:
         is_looking = True
