@@ -1,6 +1,7 @@
 """One test from set-up to outcome, whatever backend it runs on."""
 
 import asyncio
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended
 ORDER = ("environment", "action", "evaluation", "application")
 READY_PATIENCE_S = 60.0
 LAST_TIME_PATIENCE_S = 2.0
+BEGIN_PATIENCE_S = 2.0
 
 
 class _Ended(Exception):
@@ -48,6 +50,7 @@ class Engine:
     finished: float | None = None
     setup_s: float | None = None
     time: Time | None = None
+    _told_to_begin: float = 0.0
 
     def __post_init__(self) -> None:
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
@@ -115,13 +118,17 @@ class Engine:
     async def _execute(self) -> None:
         self.began = time.monotonic()
         await self.backend.begin()
+        self._told_to_begin = time.monotonic()
         self.say("running")
         lockstep = self.plan.lockstep
         deadline = self.began + (lockstep.wall_timeout_s if lockstep else self.plan.timeout_s)
         while not self._all_judged():
-            event = await self._next(deadline)
+            event = await self._next(min(deadline, self._begin_again()))
             if event is not None:
                 self._take(event)
+            elif time.monotonic() < deadline:
+                await self.backend.begin()
+                self._told_to_begin = time.monotonic()
             elif lockstep:
                 self._give_up(lockstep.wall_timeout_s)
             else:
@@ -129,6 +136,11 @@ class Engine:
         self.finished = time.monotonic()
         if lockstep:
             await self._last_time()
+
+    def _begin_again(self) -> float:
+        """When to say again that the test begins: the clock of a lockstep test says so once it has heard that."""
+        waits = self.plan.lockstep is not None and self.time is None
+        return self._told_to_begin + BEGIN_PATIENCE_S if waits else math.inf
 
     async def _last_time(self) -> None:
         """How far the clock got, which it says when the last evaluator has ended."""

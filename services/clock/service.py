@@ -48,7 +48,7 @@ class ClockService(Service):
         begin = self._await_begin()
         if begin is None:
             return
-        self._told = time.monotonic()
+        self._tell_time()
         kind, reason = "", ""
         try:
             self._stepper.meet()
