@@ -174,3 +174,11 @@ def test_the_other_clock_for_one_run(tmp_path: Path) -> None:
     test, _ = run(tmp_path, "copies", 1, "--clock", "realtime")
     assert (test["clock"], test["sim_s"]) == ("realtime", None)
     assert test["execution_s"] > 1.0
+
+
+def test_repeated_under_load_it_is_the_same(tmp_path: Path) -> None:
+    """Verdict, way and pictures of three runs beside processes that take all of the processor."""
+    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), CURVE, "3", "5"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=240)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert f"{CURVE}: 3 of 3 runs gave " in result.stdout
