@@ -27,3 +27,4 @@ class Outcome:
     services: tuple[dict[str, Any], ...] = ()
     checks: tuple[dict[str, Any], ...] = ()
     last_lines: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()

@@ -66,7 +66,7 @@ def _action(
         metavar="SET",
         action="append",
         default=[],
-        help="message set 0.9 or 1.0 (default: what the content fits), or an .odvd file with own messages; repeatable",
+        help="message set 0.9 or 1.0 (default: what fits the content), or an .odvd file beside dodo.yml's; repeatable",
     )
     return action
 

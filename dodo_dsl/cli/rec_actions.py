@@ -10,7 +10,7 @@ import numpy as np
 
 from dodo_dsl.cli.bar import bar
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.opendlv import message_sets
+from dodo_dsl.cli.rec_messages import messages_for
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.varints import Numbers
@@ -30,7 +30,7 @@ class _Job:
     stderr: TextIO
 
     def tell(self, text: str) -> None:
-        self.stderr.write(f"dodo rec: {text}\n")
+        _tell(self.stderr, text)
 
     def rows(self) -> Numbers:
         """What the command line selects; what was skipped is told first."""
@@ -46,13 +46,17 @@ class _Job:
         return folder
 
 
+def _tell(stderr: TextIO, text: str) -> None:
+    stderr.write(f"dodo rec: {text}\n")
+
+
 def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     """Carry out one action; raises what `dodo rec` turns into a sentence."""
     path: Path = options.file
     with bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
         recording = Recording(path, progress)
     with recording:
-        version, messages = _messages(options.messages, recording)
+        version, messages = messages_for(recording, options.messages, lambda text: _tell(stderr, text))
         job = _Job(options, recording, messages, stdout, stderr)
         if options.action == "info":
             _info(job, version)
@@ -63,13 +67,6 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         else:
             _coco(job)
     return Exit.OK
-
-
-def _messages(wanted: list[str], recording: Recording) -> tuple[str, MessageSet]:
-    versions = [word for word in wanted if word in (message_sets.OLD, message_sets.NEW)]
-    own = [Path(word) for word in wanted if word not in versions]
-    version = versions[-1] if versions else message_sets.version_of(recording)
-    return version, message_sets.load(version, *own)
 
 
 def _info(job: _Job, version: str) -> None:

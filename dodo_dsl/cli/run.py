@@ -223,6 +223,7 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> l
     width = max(len(o.name) for o in outcomes)
     for outcome in outcomes:
         stdout.write(progress.summary_line(outcome, width) + "\n")
+        stdout.writelines(f"        note: {printable(note)}\n" for note in outcome.notes)
         if outcome.outcome != "passed":
             stdout.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}

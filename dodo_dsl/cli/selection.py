@@ -62,11 +62,17 @@ def select(words: Sequence[str], levels: Sequence[str], application: Sequence[Pa
 
 def _named(word: str, specs: Sequence[Spec]) -> list[Spec]:
     found = [s for s in specs if word in (s.location.stem, s.title, s.slug)]
-    found = found or [s for s in specs if any(fnmatch.fnmatchcase(n, word) for n in (s.location.stem, s.slug))]
+    found = found or [s for s in specs if _matches(s, word)]
     if not found:
-        hint = did_you_mean(word, [s.location.stem for s in specs])
+        hint = did_you_mean(word, list(dict.fromkeys(s.location.stem for s in specs)))
         raise NoSuchTest(f"there is no test '{word}'" + (f"; {hint}" if hint else ""))
     return found
+
+
+def _matches(spec: Spec, pattern: str) -> bool:
+    """Whether a pattern fits a name; in an instance's, such as ``name[light=dark]``, the brackets mean themselves."""
+    plain = any(fnmatch.fnmatchcase(name, pattern) for name in (spec.location.stem, spec.slug))
+    return plain or fnmatch.fnmatchcase(spec.title, pattern.replace("[", "[[]"))
 
 
 def _narrowed(checked: Checked, specs: Sequence[Spec]) -> Checked:

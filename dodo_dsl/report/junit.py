@@ -34,7 +34,7 @@ def _case(outcome: Outcome, attachment: str | None) -> Any:
         result = kind(_xml_text(outcome.reason), outcome.outcome)
         result.text = _xml_text("\n".join([outcome.reason, *outcome.last_lines]))
         case.result = [result]
-    lines = [check_line(check) for check in outcome.checks]
+    lines = [check_line(check) for check in outcome.checks] + [f"note: {note}" for note in outcome.notes]
     if attachment:
         lines.append(f"[[ATTACHMENT|{attachment}]]")
     if lines:

@@ -17,13 +17,14 @@ from dodo_dsl.run.events import (
     Exited,
     Lost,
     Malformed,
+    Overrun,
     Ready,
     Stopped,
     Time,
     Unstartable,
     Verdict,
 )
-from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended
+from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended, lost_messages
 
 ORDER = ("environment", "action", "evaluation", "application")
 READY_PATIENCE_S = 60.0
@@ -46,6 +47,7 @@ class Engine:
     layer_of: dict[str, str] = field(default_factory=dict)
     exits: dict[str, int] = field(default_factory=dict)
     ready: set[str] = field(default_factory=set)
+    lost: dict[str, int] = field(default_factory=dict)
     began: float | None = None
     finished: float | None = None
     setup_s: float | None = None
@@ -73,6 +75,7 @@ class Engine:
             self.finished = self.finished or time.monotonic()
             self.say("taking down")
             kept = await self._closed(keep)
+            await self._hear_losses()
         return self._outcome(), kept
 
     async def _closed(self, keep: bool) -> list[str]:
@@ -86,6 +89,12 @@ class Engine:
                     raise
                 asyncio.current_task().uncancel()  # type: ignore[union-attr]
         return closing.result()
+
+    async def _hear_losses(self) -> None:
+        """What services said of losses while they ended; what else they said then no longer counts."""
+        while (event := await self._next(0.0)) is not None:
+            if isinstance(event, Overrun):
+                self._take(event)
 
     async def _set_up(self, start: float) -> None:
         self.say("setting up")
@@ -176,6 +185,8 @@ class Engine:
                 self.facts.verdicts.setdefault(service, []).append(event)
             case Malformed(service, problem):
                 self._end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
+            case Overrun(service, messages):
+                self.lost[service] = messages
             case Unstartable(service, why):
                 self._end("error", f"service '{service}' could not be started: {why}", service)
             case Lost(why):
@@ -247,6 +258,7 @@ class Engine:
             services=tuple(self._service_rows()),
             checks=tuple(checks),
             last_lines=tuple(self.backend.tail(finding.service)) if finding.result != "passed" else (),
+            notes=tuple(lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost),
         )
 
     def _service_rows(self) -> list[dict[str, Any]]:

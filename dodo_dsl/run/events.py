@@ -37,6 +37,14 @@ class Exited:
 
 
 @dataclass(frozen=True)
+class Overrun:
+    """A service has lost messages of the bus, so many up to now, as its receive buffer was full."""
+
+    service: str
+    messages: int
+
+
+@dataclass(frozen=True)
 class Unstartable:
     service: str
     why: str
@@ -65,7 +73,7 @@ class Stopped:
     reason: str
 
 
-Event = Ready | Verdict | Malformed | Exited | Unstartable | Lost | Time | Stopped
+Event = Ready | Verdict | Malformed | Overrun | Exited | Unstartable | Lost | Time | Stopped
 
 
 class Backend(Protocol):

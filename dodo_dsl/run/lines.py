@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from dodo_dsl.plan.lockstep import CLOCK
-from dodo_dsl.run.events import Event, Malformed, Ready, Stopped, Time, Verdict
+from dodo_dsl.run.events import Event, Malformed, Overrun, Ready, Stopped, Time, Verdict
 
 _OUTCOMES = ("passed", "failed")
 _STOPS = ("unanswered", "stuck", "timedout")
@@ -27,6 +27,8 @@ def read_line(service: str, judge: bool, line: bytes) -> Event | None:
     kind = message.get("dodo")
     if kind == "ready":
         return Ready(service)
+    if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
+        return Overrun(service, message["messages"])
     if kind == "verdict" and judge:
         problem = _problem(message)
         if problem:

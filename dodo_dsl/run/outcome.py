@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from dodo_dsl.outcome import Result
+from dodo_dsl.plan.model import Service
 from dodo_dsl.run.events import Verdict
 
 _RANK: dict[Result, int] = {"passed": 0, "failed": 1, "error": 2}
@@ -52,6 +53,17 @@ def _judged(judge: str, verdicts: Sequence[Verdict]) -> list[Finding]:
     if len(verdicts) > 1:
         return [Finding("error", f"evaluator '{judge}' gave {len(verdicts)} verdicts, expected one", judge)]
     return [Finding("passed" if v.passed else "failed", v.reason, judge) for v in verdicts]
+
+
+def lost_messages(service: Service, messages: int) -> str:
+    """A sentence on a service whose receive buffer was full, and on what that means."""
+    meaning = "it worked without them"
+    if any(flag.kind == "report" for flag in service.flags):
+        meaning = "the recording is not complete"
+    elif service.judge:
+        meaning = "its verdict is about the others"
+    count = f"{messages} message{'s' * (messages != 1)}"
+    return f"service '{service.name}' lost {count}, as its receive buffer was full: {meaning}"
 
 
 def how_it_ended(code: int) -> str:

@@ -44,17 +44,21 @@ class Output:
         return self._reader, self._log.fileno()
 
     def close(self) -> None:
+        """Takes what is there already, and stops reading."""
+        while not self.done.is_set() and self._read():
+            pass
         if not self.done.is_set():
             self._finish()
 
-    def _read(self) -> None:
+    def _read(self) -> bool:
+        """Whether there was something to read."""
         try:
             data = os.read(self._reader, 1 << 16)
         except BlockingIOError:
-            return
+            return False
         if not data:
             self._finish()
-            return
+            return False
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
             self._take(line)
@@ -63,6 +67,7 @@ class Output:
                 self._tail.append(self._rest[:_TAIL_WIDTH])
             self._skipping, self._rest = True, b""
         self._write(data)
+        return True
 
     def _write(self, data: bytes) -> None:
         """Into the log, while that has room; what a service says to the runner counts either way."""

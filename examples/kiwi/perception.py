@@ -26,9 +26,12 @@ from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
 from dodo_dsl.opendlv.session import Session
 
 TYPES = {"yellow": 1, "blue": 2}
-HSV_RANGES = {"yellow": ((20, 110, 40), (35, 255, 255)), "blue": ((105, 110, 25), (130, 255, 255))}
+HSV_RANGES = {"yellow": ((22, 150, 45), (36, 255, 255)), "blue": ((102, 124, 20), (130, 255, 255))}
+WHITE = 0.85  # how far the colour of the floor is taken for that of the light
 HORIZON = 0.45  # no cone stands higher in the image
-SMALLEST = 12  # pixels; less than this is noise
+SMALLEST = 1 / 14_000  # of the image; less than this is noise: 22 pixels of 640 x 480
+SLENDER = (0.8, 3.5)  # height of a cone's box to its width
+FILLED = 0.35  # share of its box that a cone covers
 ASKS, LISTENS = 1, 2  # sender stamps of perception's question to steering and of the answer
 PATIENCE = 0.1  # seconds between questions and between looks for the camera
 
@@ -47,21 +50,36 @@ def find_cones(image: MatLike) -> list[Cone]:
     """The cones in an image of blue, green, red (and alpha), the nearest of each colour first."""
     height, width = image.shape[:2]
     top = int(HORIZON * height)
-    hsv = cv2.cvtColor(np.ascontiguousarray(image[top:, :, :3]), cv2.COLOR_BGR2HSV)
+    hsv = cv2.cvtColor(white_balanced(np.ascontiguousarray(image[top:, :, :3])), cv2.COLOR_BGR2HSV)
     return [
         Cone(colour, x / width, (top + y) / height, w / width, h / height)
         for colour, (low, high) in HSV_RANGES.items()
-        for x, y, w, h in _boxes(cv2.inRange(hsv, low, high))
+        for x, y, w, h in _boxes(cv2.inRange(hsv, low, high), SMALLEST * width * height)
     ]
 
 
-def _boxes(mask: MatLike) -> list[Rect]:
-    """Boxes (x, y, width, height in pixels) of the patches in a mask, the lowest in the image first."""
+def white_balanced(ground: MatLike) -> MatLike:
+    """The ground as in white light: most of it is floor, and floors are nearly grey."""
+    median = np.median(ground[::8, ::8].reshape(-1, 3), axis=0)
+    gains = np.clip(median.mean() / np.maximum(median, 1), 0.5, 2) ** WHITE
+    return cv2.LUT(ground, np.clip(np.arange(256)[:, None] * gains, 0, 255).astype(np.uint8)[None])
+
+
+def _boxes(mask: MatLike, smallest: float) -> list[Rect]:
+    """Boxes (x, y, width, height in pixels) of the patches in a mask that may be cones, the lowest first."""
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    boxes = [cv2.boundingRect(contour) for contour in contours]
-    boxes = [box for box in boxes if box[2] * box[3] >= SMALLEST]
-    return sorted(boxes, key=lambda box: -(box[1] + box[3]))
+    _, _, patches, _ = cv2.connectedComponentsWithStats(mask)
+    boxes = [((x, y, width, height), area) for x, y, width, height, area in patches[1:].tolist()]
+    cones = [box for box, area in boxes if box[2] * box[3] >= smallest and _may_be_cone(box, area, mask.shape)]
+    return sorted(cones, key=lambda box: -(box[1] + box[3]))
+
+
+def _may_be_cone(box: Rect, area: int, size: tuple[int, ...]) -> bool:
+    """Whether a patch is neither as wide nor as high as furniture; one cut off by the image may have any shape."""
+    x, y, width, height = box
+    cut = x == 0 or x + width == size[1] or y + height == size[0]
+    shaped = SLENDER[0] <= height / width <= SLENDER[1] and area >= FILLED * width * height
+    return y > 0 and (cut or shaped)
 
 
 def announce(session: Session, cones: list[Cone], frame: int, sample_time: int, source: argparse.Namespace) -> None:

@@ -1,5 +1,6 @@
 """The one loop of all services: deliver, update, send, until there is a verdict, an end or a signal."""
 
+import json
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from services.base.clock import Clock
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
+TELL_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
 
@@ -21,7 +23,8 @@ _log = logging.getLogger(__name__)
 class Loop:
     """Runs a service on a session by a clock; ``sender_stamp`` is that of outputs without one.
 
-    ``name`` stands in the EndOfInput of a source. Raises what the model raises, and SessionError.
+    ``name`` stands in the EndOfInput of a source. A line ``{"dodo": "lost", "messages": N}`` on stdout says how many
+    messages were lost so far, once a second at most. Raises what the model raises, and SessionError.
     """
 
     name: str
@@ -30,6 +33,8 @@ class Loop:
     clock: Clock
     sender_stamp: int
     _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
+    _told: int = 0
+    _tell_after: int = 0
 
     def __post_init__(self) -> None:
         ids = self.session.messages.id
@@ -48,11 +53,14 @@ class Loop:
             if service.period is not None:
                 for output in service.update(now):
                     self._send(output, now)
+            if now >= self._tell_after:
+                self._tell_losses(now)
             if service.finished:
                 break
         if service.finished and service.verdict is None:
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close()
+        self._tell_losses(self.clock.now())
         if self.session.lost:
             _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
         if self.session.garbage:
@@ -88,6 +96,11 @@ class Loop:
                     _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
                     return
                 handler(message, envelope.sample_time)
+
+    def _tell_losses(self, now: int) -> None:
+        if self.session.lost > self._told:
+            self._told, self._tell_after = self.session.lost, now + TELL_PERIOD
+            print(json.dumps({"dodo": "lost", "messages": self._told}), flush=True)
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         if isinstance(output, Envelope):

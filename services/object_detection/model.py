@@ -20,8 +20,8 @@ class UnjudgeableError(Exception):
 class Judge:
     """Hears detections, and the truth where `truth` is None, in test time (microseconds) until `verdict` is there.
 
-    Time 0 is the first of `begin` and `update`; what came before `begin` is forgotten. A frame is forgotten as soon as
-    it is judged, but for its sample time.
+    Time 0 is the first of `begin` and `update`; what came before that, and before `begin`, is forgotten. A frame is
+    forgotten as soon as it is judged, but for its sample time.
     """
 
     def __init__(self, truth: Truth | None, rules: Rules, limits: Limits) -> None:
@@ -69,6 +69,7 @@ class Judge:
     def update(self, now: int) -> None:
         """Judge the frames whose time is over, and give the verdict when the test's is; may raise UnjudgeableError."""
         self._now = now
+        self._seconds(now)
         if self.verdict is not None:
             return
         self._settle(lambda frame: now - frame.since >= self._rules.max_delay * MICROSECONDS)
@@ -103,7 +104,7 @@ class Judge:
         frame = self._frames.get(mark.time)
         if frame is not None or mark.time in self._judged or mark.time in self._passed_over:
             return frame
-        if self._zero is not None and self._seconds(self._now) < self._rules.start:
+        if self._zero is None or self._seconds(self._now) < self._rules.start:
             self._pass_over(mark)
             return None
         return self._frames.setdefault(mark.time, Frame(mark, self._now))

@@ -25,6 +25,7 @@ WRONG = [
     ("swapped", SWAPPED, {}, {
         "sil-closed-left-curve": "hit wall right",
         "dil-static-rig": "precision",
+        "sil-perception--light-1--clutter-60": "precision is 0 ",
     }),
     ("stops", STOPS, {}, {"sil-closed-straight": "did not reach finish"}),
 ]  # fmt: skip
@@ -32,7 +33,7 @@ WRONG = [
 
 def test_the_example_passes_open_loop_and_recordings(tmp_path: Path) -> None:
     report = tmp_path / "report"
-    dodo("run", "sil-open-*", "dil-*", "--report", str(report), code=0)
+    dodo("run", "sil-open-*", "sil-perception*clutter-60", "dil-*", "--report", str(report), code=0)
     tests = results(report)
     assert set(tests) >= {"sil-open-straight", "sil-open-left-curve", "dil-static-rig", "dil-kiwi-track"}
     for slug, test in tests.items():
@@ -48,7 +49,7 @@ def test_wrong_applications_fail_for_the_right_reason(
 ) -> None:
     application = kiwi(tmp_path / "app", edit, **words)
     report = tmp_path / "report"
-    dodo("run", *reasons, "--application", str(application), "--report", str(report), code=1)
+    dodo("run", *reasons, "-j", "4", "--application", str(application), "--report", str(report), code=1)
     for slug, test in results(report).items():
         assert test["outcome"] == "failed", (wrong, test)
         assert reasons[slug] in test["reason"], (wrong, test)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv import session as sessions
 from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.session import MAX_DATAGRAM_BYTES, PORT, Session, SessionError
@@ -102,6 +103,21 @@ def test_garbage_is_counted(cid: int) -> None:
         envelope = session.receive(5.0)
         assert envelope is not None and envelope.data_type == 1
         assert session.garbage == 3
+
+
+def test_messages_without_room_in_the_buffer_are_counted(cid: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    with Session(cid) as sender:
+        monkeypatch.setattr(sessions, "RECEIVE_BUFFER_BYTES", 8192)
+        with Session(cid) as session:
+            for stamp in range(200):
+                sender.send(STEERING(), sender_stamp=stamp)
+            heard = []
+            while (envelope := session.receive(0.0)) is not None:
+                heard.append(envelope.sender_stamp)
+            assert heard == list(range(len(heard))) and session.lost == 0
+            sender.send(STEERING(), sender_stamp=200)
+            assert session.receive(5.0) is not None
+            assert session.lost == 200 - len(heard) > 0
 
 
 def test_the_largest_datagram_passes_and_a_larger_one_is_refused(cid: int) -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.run.events import Malformed, Ready, Verdict
+from dodo_dsl.run.events import Malformed, Overrun, Ready, Verdict
 from dodo_dsl.run.lines import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
@@ -20,6 +20,12 @@ def test_a_whole_verdict_is_taken() -> None:
     assert read_line("judge", True, line()) == Verdict("judge", True, "done", (CHECK,))
     assert read_line("judge", False, line()) is None
     assert read_line("camera", False, b'{"dodo": "ready"}\n') == Ready("camera")
+
+
+def test_losses_are_taken_from_every_service() -> None:
+    assert read_line("recorder", False, b'{"dodo": "lost", "messages": 12}\n') == Overrun("recorder", 12)
+    for count in (b"0", b"-1", b"true", b"1.5", b'"12"', b"null", b"1" * 30):
+        assert read_line("judge", True, b'{"dodo": "lost", "messages": ' + count + b"}") is None
 
 
 MALFORMED = {

@@ -317,3 +317,18 @@ def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
     it.detect(Mark(SECOND, 1), 7, BLUE.box)
     it.detect(Mark(SECOND, 1), 7, BLUE.label)
     assert decided(it).outcome == "passed"
+
+
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_frame_from_before_the_judge_knows_the_time_does_not_begin_the_test(begun: bool) -> None:
+    it = Judge(None, Rules(0.5, [], 1.0, 60.0), Limits(recall=0.9))
+    reveal(it, 1, YELLOW)
+    if begun:
+        it.begin(BEGIN)
+    at(it, 0)
+    at(it, 2)
+    assert it.verdict is None
+    reveal(it, 2, YELLOW)
+    detect(it, 2, YELLOW)
+    verdict = decided(it)
+    assert values(verdict)["frames"] == 1

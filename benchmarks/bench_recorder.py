@@ -1,0 +1,144 @@
+"""What recording costs: rec-recorder's share of a processor with messages only, and with camera frames.
+
+Messages come 1000 a second, beside ``cluon-OD4toStdout`` into a file, in turns. Frames are those of the recorded drive
+on the Kiwi track, 640x480 at 10 Hz in I420; what an idle recorder takes is subtracted from the cost of one.
+"""
+
+import contextlib
+import os
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from bench_rec import drive
+from players import ROOT, Measured, peer, service, tool
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.video import VideoDecoder
+
+CID, ROUNDS, SECONDS = 125, 5, 4.0
+MESSAGE_HZ, FRAME_HZ = 1000, 10
+SIZE = "640x480"
+FRAMES = ROOT / "tests_registry" / "recordings" / "kiwi-track.rec"
+PEER = tool("cluon-OD4toStdout")
+
+
+def ticks(rate: float) -> Iterator[int]:
+    """Numbers at a rate, for SECONDS."""
+    begin = time.perf_counter()
+    for number in range(round(SECONDS * rate)):
+        time.sleep(max(0.0, begin + number / rate - time.perf_counter()))
+        yield number
+
+
+def idle(measured: Measured) -> float:
+    """Share of a processor while nothing happens."""
+    time.sleep(0.5)
+    before = measured.processor_time()
+    time.sleep(SECONDS / 2)
+    return (measured.processor_time() - before) / (SECONDS / 2)
+
+
+def with_messages(measured: Measured, envelopes: list[Envelope]) -> float:
+    """Share of a processor while messages come."""
+    with Session(CID) as session:
+        before = measured.processor_time()
+        for number in ticks(MESSAGE_HZ):
+            session.send_envelope(envelopes[number])
+        time.sleep(0.1)
+        return (measured.processor_time() - before) / SECONDS
+
+
+def with_frames(measured: Measured, memory: SharedMemory, pictures: list[bytes]) -> float:
+    before = measured.processor_time()
+    for number in ticks(FRAME_HZ):
+        show(memory, pictures[number % len(pictures)])
+    time.sleep(0.1)
+    return (measured.processor_time() - before) / SECONDS
+
+
+def show(memory: SharedMemory, picture: bytes) -> None:
+    with memory.lock():
+        memory.buffer[: len(picture)] = picture
+        memory.stamp(time.time_ns() // 1000)
+    memory.notify_all()
+
+
+def pictures() -> list[bytes]:
+    messages, decoder = MessageSet.standard(), VideoDecoder("h264")
+    images = (e for e in read_envelopes(FRAMES) if e.data_type == messages.id("opendlv.proxy.ImageReading"))
+    frames = (decoder.decode(messages.decode(e.data_type, e.payload).data) for e in images)
+    return [frame.pixels("i420").tobytes() for frame in frames if frame is not None]
+
+
+def ours(path: Path) -> AbstractContextManager[Measured]:
+    return service("rec_recorder", path.parent, f"--cid={CID}", f"--rec={path}")
+
+
+@contextlib.contextmanager
+def theirs(path: Path) -> Iterator[Measured]:
+    assert PEER is not None
+    with path.open("wb") as file, peer([PEER, f"--cid={CID}"], file) as measured:
+        time.sleep(0.3)
+        yield measured
+
+
+def messages_only(folder: Path) -> None:
+    envelopes = drive(round(SECONDS * MESSAGE_HZ))
+    recorders = {"rec-recorder": ours, **({"cluon-OD4toStdout": theirs} if PEER else {})}
+    found: dict[str, list[tuple[float, float, int]]] = {name: [] for name in recorders}
+    for number in range(ROUNDS):
+        for name, recorder in recorders.items():
+            path = folder / f"{name}-{number}.rec"
+            with recorder(path) as measured:
+                shares = idle(measured), with_messages(measured, envelopes)
+            found[name].append((*shares, len(list(read_envelopes(path)))))
+    print(f"messages only, {MESSAGE_HZ} a second:")
+    for name, rounds in found.items():
+        none, busy, count = (statistics.median(column) for column in zip(*rounds, strict=True))
+        cost = (busy - none) / MESSAGE_HZ * 1e6
+        recorded = f"{count} of {len(envelopes)} recorded"
+        print(f"  {name:18} {busy:6.2%} of a processor ({none:.2%} idle), {cost:3.0f} us a message; {recorded}")
+
+
+def frames_as_well(folder: Path, kind: str, *flags: str) -> None:
+    shown = pictures()
+    rounds = []
+    for number in range(ROUNDS):
+        name, path = f"bench-{os.getpid()}.i420", folder / f"{kind}-{number}.rec".replace(" ", "-")
+        options = (f"--cid={CID}", f"--rec={path}", f"--frames={FRAME_HZ}", f"--memories={name}:{SIZE}", *flags)
+        with SharedMemory.create(name, len(shown[0])) as memory, service("rec_recorder", folder, *options) as measured:
+            none, busy = idle(measured), with_frames(measured, memory, shown)
+        recorded = len(list(read_envelopes(path)))
+        rounds.append((none, busy, recorded, path.stat().st_size / max(recorded, 1)))
+    none, busy, count, size = (statistics.median(column) for column in zip(*rounds, strict=True))
+    cost = (busy - none) / FRAME_HZ * 1e3
+    print(
+        f"  {kind:18} {busy:6.2%} of a processor ({none:.2%} idle), {cost:.1f} ms and {size / 1e3:.1f} kB a frame; "
+        f"{count:.0f} of {SECONDS * FRAME_HZ:.0f} recorded"
+    )
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as name:
+        messages_only(Path(name))
+        print(f"frames of {SIZE} at {FRAME_HZ} Hz:")
+        frames_as_well(Path(name), "default quality")
+        frames_as_well(Path(name), "lossless", "--lossless")
+    if not PEER:
+        print("pycluon is not installed: no peer to measure against")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

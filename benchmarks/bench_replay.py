@@ -1,0 +1,136 @@
+"""rec-replay beside ``cluon-replay``: messages a second, how evenly they come in real time, and the processor's share.
+
+The times are those at which the kernel took the datagrams, so that what listens here does not count. As fast as
+possible is a recording whose messages are all of one time. In real time a message's deviation is how much earlier or
+later it came than its sample time says; a player that is evenly too slow or too fast shows in the duration instead.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from bench_rec import drive
+from players import Measured, peer, service, tool
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from dodo_dsl.opendlv.session import Session
+
+FAST, EVEN, ROUNDS = 50_000, 3_000, 5  # messages; those in real time are 2 ms apart, 6 s
+CID = 126
+STATUS, END = 10, 2901
+QUIET = 3.0
+PEER = tool("cluon-replay")
+
+
+class Heard(NamedTuple):
+    """What came: when (us), when it was sampled (us), how many were lost, and the player's share of a processor."""
+
+    received: "np.ndarray[tuple[int], np.dtype[np.int64]]"
+    sampled: "np.ndarray[tuple[int], np.dtype[np.int64]]"
+    lost: int
+    share: float
+
+    def rate(self) -> float:
+        """Messages a second, lost ones included: the player sent these."""
+        return (len(self.received) + self.lost) / (self.received[-1] - self.received[0]) * 1e6
+
+    def deviations(self) -> list[float]:
+        """Percentiles 50, 90, 99 and 100 in ms."""
+        times = (self.sampled - self.sampled[0]) / 1e6
+        late = (self.received - self.sampled - (self.received[0] - self.sampled[0])) / 1000.0
+        line = np.polyval(np.polyfit(times, late, 1), times)
+        found: list[float] = np.percentile(np.abs(late - line), (50, 90, 99, 100)).tolist()
+        return found
+
+
+def ours(path: Path) -> AbstractContextManager[Measured]:
+    flags = (f"--cid={CID}", f"--rec={path}", "--await-begin=true", "--max-gap=60")
+    return service("rec_replay", path.parent, *flags)
+
+
+def theirs(path: Path) -> AbstractContextManager[Measured]:
+    assert PEER is not None
+    return peer([PEER, f"--cid={CID}", path])
+
+
+def listen(path: Path, name: str, count: int) -> Heard:
+    """One play of the recording."""
+    received, sampled = [], []
+    with Session(CID) as session, (ours if name == "rec-replay" else theirs)(path) as player:
+        if name == "rec-replay":
+            session.send(session.messages.type("dodo.TestBegin")())
+        begin = (0.0, 0.0)
+        share = 0.0
+        while len(received) + session.lost < count and (envelope := session.receive(QUIET)) is not None:
+            if envelope.data_type in (STATUS, END):
+                continue
+            received.append(envelope.received)
+            sampled.append(envelope.sample_time)
+            if len(received) == 1:
+                begin = (time.perf_counter(), player.processor_time())
+            elif len(received) % (count // 10) == 0:
+                wall = time.perf_counter() - begin[0]
+                share = (player.processor_time() - begin[1]) / wall
+        return Heard(np.array(received), np.array(sampled), session.lost, share)
+
+
+def write(path: Path, envelopes: list[Envelope]) -> Path:
+    with RecordingWriter(path) as writer:
+        for envelope in envelopes:
+            writer.write(envelope)
+    return path
+
+
+def in_turns(path: Path, count: int) -> dict[str, list[Heard]]:
+    names = ["rec-replay", "cluon-replay"] if PEER else ["rec-replay"]
+    found: dict[str, list[Heard]] = {name: [] for name in names}
+    for number in range(ROUNDS):
+        for name in names if number % 2 else reversed(names):
+            found[name].append(listen(path, name, count))
+    return found
+
+
+def show_fast(found: dict[str, list[Heard]]) -> None:
+    print("as fast as possible:")
+    for name, rounds in found.items():
+        rate, lost = statistics.median(h.rate() for h in rounds), sum(h.lost for h in rounds)
+        print(f"  {name:13} {rate:9,.0f} messages/s ({lost} of {ROUNDS * FAST} overran the listener's buffer)")
+    if PEER:
+        pairs = zip(*found.values(), strict=True)
+        ratios = sorted(own.rate() / other.rate() for own, other in pairs)
+        print(f"  {statistics.median(ratios):.2f} times as many ({ratios[0]:.2f} to {ratios[-1]:.2f})")
+
+
+def show_even(found: dict[str, list[Heard]]) -> None:
+    print("in real time, 500 messages/s; deviation in ms of 50 %, 90 %, 99 % and all, and error of the duration:")
+    for name, rounds in found.items():
+        middle = [statistics.median(column) for column in zip(*(h.deviations() for h in rounds), strict=True)]
+        drift = statistics.median((np.ptp(h.received) - np.ptp(h.sampled)) / 1000.0 for h in rounds)
+        share = statistics.median(h.share for h in rounds)
+        numbers = "  ".join(f"{value:6.2f}" for value in middle)
+        print(f"  {name:13} {numbers}   {drift:+7.1f} ms   {share:.1%} of a processor")
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as name:
+        envelopes = drive(FAST)
+        at_once = [e._replace(sample_time=1_700_000_000_000_000) for e in envelopes]
+        even = [e._replace(sample_time=e.sent) for e in envelopes[:EVEN]]
+        show_fast(in_turns(write(Path(name) / "fast.rec", at_once), FAST))
+        show_even(in_turns(write(Path(name) / "even.rec", even), EVEN))
+    if not PEER:
+        print("pycluon is not installed: no peer to measure against")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+"""Processes under measurement: services of ours and cluon's tools, with the processor time that they take."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+ROOT = Path(__file__).resolve().parents[1]
+TICK = 1 / os.sysconf("SC_CLK_TCK")
+
+
+class Measured:
+    """A process, and what it took of a processor."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]") -> None:
+        self.process = process
+        self._last = 0.0
+
+    def processor_time(self) -> float:
+        """Seconds so far, of all threads; once it has ended, what was seen last."""
+        try:
+            fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(") ")[2].split()
+        except OSError:
+            return self._last
+        self._last = max(self._last, (int(fields[11]) + int(fields[12])) * TICK)
+        return self._last
+
+
+def tool(name: str) -> Path | None:
+    """A tool of libcluon that pycluon brings, if it is installed: the program itself, not the script that calls it."""
+    package = importlib.util.find_spec("pycluon")
+    path = Path(package.origin).parent / "bin" / name if package and package.origin else Path()
+    return path if path.is_file() else None
+
+
+@contextmanager
+def service(module: str, folder: Path, *flags: str) -> Iterator[Measured]:
+    """A service of ours, ready."""
+    environment = {**os.environ, "DODO_READY_FILE": str(folder / f"ready-{module}")}
+    command = [sys.executable, "-m", f"services.{module}", *flags]
+    with _ended(command, environment, subprocess.PIPE) as measured:
+        assert measured.process.stdout is not None
+        if not measured.process.stdout.readline():
+            raise RuntimeError(f"{module} did not start")
+        yield measured
+
+
+@contextmanager
+def peer(command: Sequence[str | Path], output: int | IO[bytes] = subprocess.DEVNULL) -> Iterator[Measured]:
+    """A tool of libcluon, started."""
+    with _ended(command, dict(os.environ), output) as measured:
+        yield measured
+
+
+@contextmanager
+def _ended(command: Sequence[str | Path], environment: dict[str, str], output: int | IO[bytes]) -> Iterator[Measured]:
+    process = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=output, stderr=subprocess.DEVNULL)
+    try:
+        yield Measured(process)
+    finally:
+        process.terminate()
+        process.wait()

@@ -1,0 +1,90 @@
+"""Messages that a service loses to a full receive buffer are told, to the last one."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl import data
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.plan.model import Flag, Plan, Service
+from dodo_dsl.report.write import write_report
+from dodo_dsl.run.lanes import namespaces_refusal
+from tests.run.helpers import READY, Bench
+
+CROWD, LAST = 400, 4711
+SLOW_RECORDER = f"""
+import pathlib, sys, time
+from dodo_dsl.opendlv import session
+session.RECEIVE_BUFFER_BYTES = 8192
+from services.base import run
+from services.rec_recorder import model, service
+write = model.Recording.write
+model.Recording.write = lambda self, envelope: (time.sleep(0.002), write(self, envelope))
+sys.exit(run(pathlib.Path({str(data.root())!r}, "services", "rec_recorder"), service.build))
+"""
+CROWDING_JUDGE = f"""
+import pathlib, sys, time
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
+with Session(int(sys.argv[1].partition("=")[2])) as bus:
+    {READY.strip()}
+    while bus.receive(1.0) is None:
+        pass
+    for _ in range({CROWD}):
+        bus.send_envelope(Envelope(1086, b"", 1, 1, 1, 0))
+    time.sleep(0.5)
+    bus.send_envelope(Envelope({LAST}, b"", 1, 1, 1, 0))
+    time.sleep(0.5)
+print('{{"dodo": "verdict", "outcome": "passed", "reason": "it crowded", "checks": []}}', flush=True)
+"""
+
+
+def crowded(bench: Bench) -> Plan:
+    """A judge that sends more than the recorder's small buffer holds."""
+    plan = bench.plan()
+    cid = Flag("cid", str(plan.cid))
+    recorder = Service("environment", "dodo-recorder", "rec-recorder", "x", bench.script("recorder", SLOW_RECORDER))
+    judge = Service("evaluation", "judge", "x", "x", bench.script("crowd", CROWDING_JUDGE), judge=True)
+    flags = (Flag("rec", "test.rec", "report"), cid)
+    return replace(plan, services=(replace(recorder, flags=flags), replace(judge, flags=(cid,))))
+
+
+def test_what_the_recorder_lost_reaches_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    bench = Bench(tmp_path, "host" if namespaces_refusal() else "network")
+    plan = crowded(bench)
+    (outcome,) = bench.run(plan)
+    assert (outcome.outcome, outcome.reason) == ("passed", "it crowded")
+    recorded = [e.data_type for e in read_envelopes(tmp_path / "report" / plan.slug / "test.rec")]
+    assert recorded[-1] == LAST
+    lost = CROWD - recorded.count(1086)
+    assert lost > 0
+    note = f"service 'dodo-recorder' lost {lost} messages, as its receive buffer was full"
+    assert outcome.notes == (f"{note}: the recording is not complete",)
+    assert f"{lost} messages were lost" in bench.log(plan, "environment.dodo-recorder")
+
+
+def say_lost(messages: int) -> str:
+    return f'print(\'{{"dodo": "lost", "messages": {messages}}}\', flush=True)\n'
+
+
+def test_losses_of_others_and_those_told_at_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    at_the_end = f"import signal\nsignal.signal(signal.SIGTERM, lambda *_: sys.exit({say_lost(30)[:-1]}))\n"
+    bench = Bench(tmp_path, "host")
+    judge = READY + say_lost(1) + "time.sleep(0.3)\n"
+    judge += 'print(\'{"dodo": "verdict", "outcome": "failed", "reason": "no", "checks": []}\', flush=True)\n'
+    environment = at_the_end + READY + say_lost(7) + "time.sleep(600)\n"
+    plan = bench.plan(judge=judge, environment=environment, application=say_lost(9) + "time.sleep(600)\n")
+    (outcome,) = bench.run(plan)
+    assert outcome.outcome == "failed"
+    assert outcome.notes == (
+        "service 'camera' lost 30 messages, as its receive buffer was full: it worked without them",
+        "service 'judge' lost 1 message, as its receive buffer was full: its verdict is about the others",
+    )
+    write_report(tmp_path / "out", [outcome], {})
+    for name in ("index.html", "junit.xml", "results.json"):
+        text = re.sub("&#39;", "'", (tmp_path / "out" / name).read_text())
+        assert all(note in text for note in outcome.notes)
