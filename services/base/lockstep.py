@@ -14,13 +14,10 @@ from dodo_dsl.opendlv.session import Session
 from services.base.announced import AnnouncedMemory, Screen
 from services.base.clock import Inbox
 from services.base.ear import Ear, Reply
+from services.base.observed import EPOCH, Observed
 from services.base.parts import STEP_DONE, cut
 
-EPOCH = 1_700_000_000_000_000
-"""The time at which every test in lockstep begins, in microseconds since the epoch."""
-
-LONGEST = 2 * 86_400_000_000
-"""No test lasts longer, in microseconds."""
+__all__ = ["EPOCH", "LockstepClock"]
 
 _GOODBYES = 10
 
@@ -48,8 +45,7 @@ class LockstepClock:
         self._open = False
         self._sent: list[bytes] = []
         self._screen = Screen(readers)
-        self._overheard: list[Envelope] = []
-        self._first: set[Envelope] = set()
+        self._observed = Observed()
         self._next = 0
 
     def now(self) -> int:
@@ -59,7 +55,8 @@ class LockstepClock:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
         due = EPOCH
         while (order := self._next_order(inbox, stopped)) is not None:
-            self._look(inbox, order.time)
+            if inbox.observes:
+                self._observed.look(inbox, order.time, order.heard)
             heard = deque(sorted(order.heard, key=lambda envelope: envelope.sample_time))
             while due <= order.time:
                 while heard and heard[0].sample_time <= due:
@@ -104,29 +101,11 @@ class LockstepClock:
     def _next_order(self, inbox: Inbox, stopped: Callable[[], bool]) -> Order | None:
         """The next step that is for this service; None when it is to stop."""
         while not stopped():
-            step = self._ear.listen(inbox.observes, self._overhear)
+            step = self._ear.listen(inbox.observes, self._observed.overhear)
             if step is not None:
                 self._number, self._open = step.number, True
                 return Order(step.number, step.time, step.show, [said.envelope for said in step.heard])
         return None
-
-    def _overhear(self, envelope: Envelope) -> None:
-        if envelope.sample_time == EPOCH:  # the clock says these again to applications that start late
-            key = envelope._replace(sent=0, received=0)
-            if key in self._first:
-                return
-            self._first.add(key)
-        self._overheard.append(envelope)
-
-    def _look(self, inbox: Inbox, until: int) -> None:
-        """Let the service look at what was on the bus; what belongs to a later step waits for that."""
-        later = []
-        for envelope in self._overheard:
-            if until < envelope.sample_time <= EPOCH + LONGEST:
-                later.append(envelope)
-            else:
-                inbox.overhear(envelope)
-        self._overheard = later
 
     def _answer(self, show: bool) -> None:
         """A picture is announced behind the answer, so that all that its readers say stands behind that, too."""

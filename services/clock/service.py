@@ -52,7 +52,7 @@ class ClockService(Service):
         kind, reason = "", ""
         try:
             self._stepper.meet()
-            self._stepper.run(begin._replace(sample_time=EPOCH))
+            self._stepper.run(begin._replace(sample_time=EPOCH, received=0))
         except (Unanswered, Stuck, TimedOut) as problem:
             kind, reason = type(problem).__name__.lower(), str(problem)
         spent = sorted(self._stepper.spent.items(), key=lambda item: -item[1])
