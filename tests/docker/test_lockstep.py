@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TESTS = ("dil-static-rig", "sil-closed-left-curve")
+TESTS = ("sil-closed-left-curve", "sil-open-straight")
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("images")]
 
