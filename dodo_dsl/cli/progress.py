@@ -42,6 +42,9 @@ class PlainProgress:
     def done(self, outcome: Outcome) -> None:
         self.phase(outcome.slug, outcome.outcome)
 
+    def rest(self, seconds: float, tests: int) -> None:
+        self.note(f"[{time.monotonic() - self.start:6.1f} s] {count(tests)} to go, {about(seconds)}")
+
 
 class LiveProgress:
     """A line a test that moves while it runs."""
@@ -52,6 +55,7 @@ class LiveProgress:
 
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[state]}"))
         self._progress: Any = Progress(*columns, TimeElapsedColumn(), console=Console(file=stream))
+        self._rest: Any = None
         self._tasks = {s: self._progress.add_task(s, total=None, start=False, state="waiting") for s in slugs}
 
     def __enter__(self) -> Self:
@@ -71,6 +75,20 @@ class LiveProgress:
     def done(self, outcome: Outcome) -> None:
         style = _STYLES[outcome.outcome]
         self._progress.update(self._tasks[outcome.slug], state=f"[{style}]{outcome.outcome}[/]", total=1, completed=1)
+
+    def rest(self, seconds: float, tests: int) -> None:
+        if self._rest is None:
+            self._rest = self._progress.add_task("", total=None)
+        self._progress.update(self._rest, state=f"{count(tests)} to go, {about(seconds)}")
+
+
+def count(tests: int) -> str:
+    return f"{tests} test{'s' * (tests != 1)}"
+
+
+def about(seconds: float) -> str:
+    """A forecast in words."""
+    return f"about {seconds / 60:.0f} min" if seconds > 180 else f"about {seconds:.0f} s"
 
 
 def choose(stream: TextIO, slugs: Sequence[str]) -> PlainProgress | LiveProgress:

@@ -3,25 +3,28 @@
 import argparse
 import asyncio
 import contextlib
+import functools
 import os
 import resource
 import signal
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO, cast
 
-from dodo_dsl.cli import progress, selection
+from dodo_dsl.cli import progress, selection, summary
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.compiler import NoApplication, plan
-from dodo_dsl.diagnostics import format_text, has_errors, ordered, printable
+from dodo_dsl.compiler import NoApplication, plan, with_clock
+from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.write import PLAN_FILE, write
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan, PlanError, from_json
 from dodo_dsl.report.write import Drawable, forget, write_report
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
-from dodo_dsl.run.runner import Runner, default_backend, default_parallel, reap_folders, work_folder
+from dodo_dsl.run.history import History
+from dodo_dsl.run.runner import Policy, Runner, default_backend, reap_folders, work_folder
+from dodo_dsl.run.schedule import Schedule, schedule
 from dodo_dsl.spec.deployment import Deployment
 
 EXAMPLES = """examples:
@@ -29,10 +32,14 @@ EXAMPLES = """examples:
   dodo run sil-closed-straight                 one test
   dodo run 'sil-*' -j 4                        by pattern, four at a time
   dodo run --application ../app/docker-compose.yml --level sil
+  dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, up to the first that does not
   dodo run --compiled generated/sil-closed-straight --report dodo-report
 
 exit codes: 0 all passed, 1 some failed, 2 usage or spec, 3 some ended in error, 130 interrupted
 """
+
+
+_MOST_SECONDS = 864_000.0
 
 
 class _Usage(Exception):
@@ -43,12 +50,18 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
     parser.add_argument("--level", action="append", choices=("sil", "dil", "hil"), default=[], help="may be repeated")
     parser.add_argument("--backend", choices=("process", "docker"), help="default: process when the application can")
-    parser.add_argument("-j", "--jobs", type=_positive, metavar="N", help="tests at once (default: one a core)")
+    parser.add_argument(
+        "-j", "--jobs", type=_positive, metavar="N", help="tests at once (default: as many as the cores carry)"
+    )
     parser.add_argument("--clock", choices=("realtime", "lockstep"), help="instead of the specs'")
+    parser.add_argument("--wall-timeout", type=_seconds, metavar="S", help="most wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="instead of the specs'")
     parser.add_argument("--report", type=Path, default=Path("dodo-report"), metavar="DIR", help="default: dodo-report")
     parser.add_argument("--seed", type=_seed, metavar="N", help="instead of the specs'")
     parser.add_argument("--repeat", type=_positive, default=1, metavar="N", help="run every test N times")
+    parser.add_argument("--fail-fast", action="store_true", help="begin no further test when one did not pass")
+    parser.add_argument("--retry-errors", type=_positive, nargs="?", const=1, default=0, metavar="N",
+                        help="run a test that ended in error again, up to N times (1 when not written)")  # fmt: skip
     parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="a test that dodo compile wrote")
     parser.add_argument("--keep", action="store_true", help="leave everything up and say how to look inside")
     selection.add_application(parser)
@@ -59,6 +72,16 @@ def _seed(text: str) -> int:
     if not 0 <= number < 1 << 32:
         raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 to 4294967295")
     return number
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text.removesuffix("s"))
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds <= _MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"'{text}' is no time in seconds, above 0 and at most {_MOST_SECONDS:g}")
+    return seconds
 
 
 def _positive(text: str) -> int:
@@ -100,20 +123,27 @@ def _prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
     if options.compiled:
         if options.test or options.level or options.application:
             raise _Usage("--compiled runs a test as it was compiled: no TEST, --level or --application beside it")
-        plans, deployment, folders = (
-            [_load_plan(options.compiled)],
-            Deployment(Path.cwd()),
-            [options.compiled.resolve()],
-        )
+        plans, deployment = [_load_plan(options.compiled)], Deployment(Path.cwd())
+        folders = [options.compiled.resolve()]
+        if options.clock not in (None, plans[0].clock):
+            raise _Usage(f"this test is compiled for clock {plans[0].clock}; compile it again for another")
     else:
         plans, deployment = _compile(options, folder, stdout)
         folders = [folder / p.slug for p in plans]
     if options.seed is not None:
         plans = [replace(p, seed=options.seed) for p in plans]
+    if options.wall_timeout is not None:
+        plans = [_with_wall_timeout(p, options.wall_timeout) for p in plans]
     report = _usable(options.report, [p.slug for p in plans])
     return [
-        Job(p, f, report / p.slug) for n in range(options.repeat) for p, f in _repetition(plans, folders, n)
+        Job(p, f, report / p.slug, original.slug)
+        for n in range(options.repeat)
+        for original, (p, f) in zip(plans, _repetition(plans, folders, n), strict=True)
     ], deployment
+
+
+def _with_wall_timeout(plan: Plan, seconds: float) -> Plan:
+    return replace(plan, lockstep=replace(plan.lockstep, wall_timeout_s=seconds)) if plan.lockstep else plan
 
 
 def _usable(report: Path, slugs: Sequence[str]) -> Path:
@@ -151,6 +181,8 @@ def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
     checked = selection.select(options.test, options.level, options.application)
     if not checked.specs:
         raise _Usage("there is no test to run")
+    if options.clock:
+        checked = with_clock(checked, options.clock)
     if options.isolation:
         checked = replace(checked, specs=tuple(replace(s, isolation=options.isolation) for s in checked.specs))
     problems = checked.diagnostics
@@ -172,12 +204,41 @@ def _runner(
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or default_backend(plans)
-    if "lockstep" in {options.clock, *(p.clock for p in plans)} and options.clock != "realtime":
-        stdout.write("note: lockstep is not part of this version; these tests run in real time\n")
-    parallel = min(options.jobs or default_parallel(), len(jobs))
-    stdout.write(f"{len(jobs)} test{'s' * (len(jobs) != 1)}, {parallel} at a time, {backend} backend\n")
+    order = schedule(options.jobs, _expectation(backend))
+    stdout.write(f"{progress.count(len(jobs))}, {_at_once(order, jobs)}, {backend} backend; ")
+    stdout.write(f"{_forecast(order, jobs, backend)}\n")
     shown = progress.choose(stdout, [p.slug for p in plans])
-    return Runner(shown, _backends(options, backend, plans, deployment, descriptor), parallel, options.keep)
+    backends = _backends(options, backend, plans, deployment, descriptor)
+    return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
+
+
+def _at_once(order: Schedule, jobs: Sequence[Job]) -> str:
+    """How many tests run at a time, in words."""
+    most = min(int(order.capacity / max(min(order.need(job) for job in jobs), 0.01)), len(jobs))
+    return f"{'up to ' * (len(jobs) > 1)}{max(most, 1)} at a time"
+
+
+def _forecast(order: Schedule, jobs: Sequence[Job], backend: str) -> str:
+    """How long the run will take, in words; a test that never ran here may take its whole time."""
+    history = History()
+    known = all(history.seconds(j.plan.spec, j.test, backend, j.plan.clock) is not None for j in jobs)
+    seconds = order.forecast(order.ordered(jobs))
+    return progress.about(seconds) if known else progress.about(seconds).replace("about", "at most")
+
+
+def _expectation(backend: str) -> Callable[[Job], float]:
+    """How long a job takes as the history has it; an unknown one may take its whole time."""
+    history = History()
+
+    @functools.cache
+    def known(spec: str, test: str, clock: str) -> float | None:
+        return history.seconds(spec, test, backend, clock)
+
+    def expected(job: Job) -> float:
+        seconds = known(job.plan.spec, job.test, job.plan.clock)
+        return job.plan.timeout_s if seconds is None else seconds
+
+    return expected
 
 
 def _backends(
@@ -197,18 +258,15 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> l
     forget(report.resolve(), [job.plan.slug for job in jobs])
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
+    tests = {job.plan.slug: job.test for job in jobs}
     with _undisturbed():
-        problems = write_report(report, outcomes, {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs})
+        history = History()
+        history.add((tests[outcome.slug], outcome) for outcome in outcomes)
+        times = history.times({(job.plan.spec, job.test) for job in jobs}, runner.backends.name)
+        drawables = {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs}
+        problems = write_report(report, outcomes, drawables, times)
     stdout.writelines(f"{problem}\n" for problem in problems)
-    stdout.write("\n")
-    width = max(len(o.name) for o in outcomes)
-    for outcome in outcomes:
-        stdout.write(progress.summary_line(outcome, width) + "\n")
-        stdout.writelines(f"        note: {printable(note)}\n" for note in outcome.notes)
-        if outcome.outcome != "passed":
-            stdout.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
-    counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
-    stdout.write(f"\n{counts['passed']} passed, {counts['failed']} failed, {counts['error']} in error\n")
+    summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
     stdout.write(f"report: {report / 'index.html'}\n")
     return outcomes
 

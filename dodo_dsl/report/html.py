@@ -9,8 +9,10 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.junit import check_line
 
 
-def render(outcomes: Sequence[Outcome], pictures: Mapping[str, str], logs: Mapping[str, Sequence[str]]) -> str:
-    """The page; ``pictures`` and ``logs`` are paths relative to it, by slug."""
+def render(
+    outcomes: Sequence[Outcome], pictures: Mapping[str, str], logs: Mapping[str, Sequence[str]], times: str = ""
+) -> str:
+    """The page; ``pictures`` and ``logs`` are paths relative to it, by slug, ``times`` that of a picture or empty."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
     )
@@ -19,6 +21,7 @@ def render(outcomes: Sequence[Outcome], pictures: Mapping[str, str], logs: Mappi
         outcomes=outcomes,
         pictures=pictures,
         logs=logs,
+        times=times,
         counts=counts,
         version=__version__,
         check_line=check_line,

@@ -1,6 +1,7 @@
 """A run's report folder."""
 
 import contextlib
+import platform
 import re
 import shutil
 from collections.abc import Mapping, Sequence
@@ -12,10 +13,13 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import html, junit, metrics, results
 from dodo_dsl.report.drive import read_drive
+from dodo_dsl.report.times import Times
+from dodo_dsl.report.times import draw as draw_times
 
 RECORDING = "test.rec"
 TRAJECTORY = "trajectory.png"
-LOGS = "logs"
+TIMES = "times.png"
+LOGS, ATTEMPTS = "logs", "attempts"
 SANDBOX_LOG = "sandbox.log"
 SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 
@@ -40,15 +44,24 @@ def forget(folder: Path, slugs: Sequence[str]) -> None:
 
 
 def _forget_test(place: Path) -> None:
-    shutil.rmtree(place / LOGS, ignore_errors=True)
+    for name in (LOGS, ATTEMPTS):
+        shutil.rmtree(place / name, ignore_errors=True)
     for name in (RECORDING, TRAJECTORY, SANDBOX_LOG):
         (place / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # there is none, or it holds what others put there
         place.rmdir()
 
 
-def write_report(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Drawable]) -> list[str]:
-    """Writes the results first, draws each drive, and returns sentences on what could not be drawn."""
+def write_report(
+    folder: Path,
+    outcomes: Sequence[Outcome],
+    tests: Mapping[str, Drawable],
+    times: Mapping[str, Sequence[Times]] | None = None,
+) -> list[str]:
+    """Writes the results first, draws each drive, and returns sentences on what could not be drawn.
+
+    ``times`` are those of all runs of these tests on this machine; they are drawn as well.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     problems = []
@@ -58,6 +71,9 @@ def write_report(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, 
                 _draw(folder / outcome.slug, outcome, tests[outcome.slug])
             except Exception as error:  # noqa: BLE001  (what is drawn comes from services; no picture costs a verdict)
                 problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
+    (folder / TIMES).unlink(missing_ok=True)
+    if times:
+        replace_file(folder / TIMES, lambda path: draw_times(times, platform.node() or "this machine", path))
     write_summaries(folder, outcomes)
     return problems
 
@@ -66,10 +82,11 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
     """The four files that stand for the whole run."""
     pictures = {o.slug: f"{o.slug}/{TRAJECTORY}" for o in outcomes if (folder / o.slug / TRAJECTORY).is_file()}
     attachments = {slug: f"{_shown(folder)}/{picture}" for slug, picture in pictures.items()}
+    times = TIMES if (folder / TIMES).is_file() else ""
     write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     replace_file(folder / "junit.xml", lambda path: junit.write(path, outcomes, attachments))
     write_text(folder / "metrics.txt", metrics.to_text(outcomes))
-    write_text(folder / "index.html", html.render(outcomes, pictures, _logs(folder, outcomes)))
+    write_text(folder / "index.html", html.render(outcomes, pictures, _logs(folder, outcomes), times))
 
 
 def _shown(folder: Path) -> str:

@@ -22,11 +22,18 @@ _CONNECTIONS = 200
 
 @dataclass(frozen=True)
 class Job:
-    """A Plan, the folder that it was compiled into, and the one that takes its logs and pictures."""
+    """A Plan, the folder that it was compiled into, and the one that takes its logs and pictures.
+
+    ``test`` is the slug that all repetitions of a test share.
+    """
 
     plan: Plan
     folder: Path
     report: Path
+    test: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "test", self.test or self.plan.slug)
 
 
 class Backends(Protocol):

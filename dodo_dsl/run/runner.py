@@ -1,13 +1,13 @@
 """Several tests at once, each on a backend of its own, and a clean machine whatever happens."""
 
 import asyncio
-import os
 import secrets
 import shutil
 import signal
 import tempfile
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Protocol, Self
 
@@ -17,6 +17,7 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.events import BackendError
+from dodo_dsl.run.schedule import Places, Schedule
 
 BackendName = Literal["process", "docker"]
 FOLDER_PREFIX = "dodo-run-"
@@ -35,6 +36,8 @@ class Progress(Protocol):
     def phase(self, slug: str, text: str) -> None: ...
 
     def done(self, outcome: Outcome) -> None: ...
+
+    def rest(self, seconds: float, tests: int) -> None: ...
 
 
 def default_backend(plans: Sequence[Plan]) -> BackendName:
@@ -81,54 +84,105 @@ def reap_folders() -> None:
         lease.release()
 
 
-class Runner:
-    """Runs jobs, ``parallel`` at a time, in order."""
+@dataclass(frozen=True)
+class Policy:
+    """What to do when a test does not pass: begin no further ones, run it again when it ended in error."""
 
-    def __init__(self, progress: Progress, backends: Backends, parallel: int, keep: bool = False) -> None:
+    fail_fast: bool = False
+    retries: int = 0
+
+
+class Runner:
+    """Runs jobs, as many at once as ``schedule`` allows, in its order."""
+
+    def __init__(
+        self, progress: Progress, backends: Backends, schedule: Schedule, policy: Policy, keep: bool = False
+    ) -> None:
         self.progress = progress
         self.backends = backends
+        self.schedule = schedule
+        self.policy = policy
         self.keep = keep
         self.kept: list[str] = []
         self.interrupted = False
-        self._places = asyncio.Semaphore(parallel)
+        self.skipped: list[Job] = []
+        self._places = Places(schedule.capacity)
+        self._waiting: list[Job] = []
+        self._began: dict[str, tuple[Job, float]] = {}
+        self._stop = False
 
     async def run(self, jobs: Sequence[Job]) -> list[Outcome]:
         """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown."""
         await self.backends.prepare([job.plan for job in jobs], self.progress.note)
-        tasks = [asyncio.ensure_future(self._one(job)) for job in jobs]
+        self._waiting = self.schedule.ordered(jobs)
+        tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}
         loop = asyncio.get_running_loop()
         for number in _SIGNALS:
-            loop.add_signal_handler(number, self._interrupt, tasks)
+            loop.add_signal_handler(number, self._interrupt, list(tasks.values()))
         try:
-            return list(await asyncio.gather(*tasks))
+            outcomes = await asyncio.gather(*(tasks[job.plan.slug] for job in jobs))
         finally:
             for number in _SIGNALS:
                 loop.remove_signal_handler(number)
+        return [outcome for outcome in outcomes if outcome is not None]
 
-    def _interrupt(self, tasks: Sequence["asyncio.Task[Outcome]"]) -> None:
+    def _interrupt(self, tasks: Sequence["asyncio.Task[Outcome | None]"]) -> None:
         if not self.interrupted:
             self.interrupted = True
             self.progress.note("interrupted: taking down")
             for task in tasks:
                 task.cancel()
 
-    async def _one(self, job: Job) -> Outcome:
+    async def _one(self, job: Job) -> Outcome | None:
+        """A test's outcome, or None when it was not to begin any more."""
+        try:
+            async with self._places.take(self.schedule.need(job)):
+                self._waiting.remove(job)
+                if self._stop:
+                    self.skipped.append(job)
+                    return None
+                self._began[job.plan.slug] = (job, time.monotonic())
+                outcome = await self._tried(job)
+        except asyncio.CancelledError:
+            outcome = self._without_answer(job.plan, "the run was interrupted before this test began")
+        self._began.pop(job.plan.slug, None)
+        self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
+        self.progress.done(outcome)
+        self._tell_rest()
+        return outcome
+
+    def _tell_rest(self) -> None:
+        now = time.monotonic()
+        running = [(job, now - began) for job, began in self._began.values()]
+        if running or self._waiting:
+            self.progress.rest(self.schedule.forecast(self._waiting, running), len(running) + len(self._waiting))
+
+    async def _tried(self, job: Job) -> Outcome:
+        """The outcome of the last attempt; what an earlier one left lies in the report, too."""
+        notes: tuple[str, ...] = ()
+        for attempt in range(1, self.policy.retries + 2):
+            outcome = await self._attempt(job)
+            if outcome.outcome != "error" or self.interrupted or attempt > self.policy.retries:
+                break
+            notes = (*notes, f"attempt {attempt} ended in error: {outcome.reason}")
+            self.progress.phase(job.plan.slug, f"error, once more: {outcome.reason}")
+            set_aside(job.report, attempt)
+        return replace(outcome, notes=(*notes, *outcome.notes))
+
+    async def _attempt(self, job: Job) -> Outcome:
         slug = job.plan.slug
 
         def say(text: str) -> None:
             self.progress.phase(slug, text)
 
         try:
-            async with self._places, self.backends.open(job, say, self.keep) as backend:
+            async with self.backends.open(job, say, self.keep) as backend:
                 outcome, kept = await Engine(job.plan, backend, say).run(self.keep)
                 self.kept.extend(kept)
         except BackendError as error:
-            outcome = self._without_answer(job.plan, str(error))
+            return self._without_answer(job.plan, str(error))
         except OSError as error:
-            outcome = self._without_answer(job.plan, f"this machine cannot run the test: {error}")
-        except asyncio.CancelledError:
-            outcome = self._without_answer(job.plan, "the run was interrupted before this test began")
-        self.progress.done(outcome)
+            return self._without_answer(job.plan, f"this machine cannot run the test: {error}")
         return outcome
 
     def _without_answer(self, plan: Plan, reason: str) -> Outcome:
@@ -143,10 +197,17 @@ class Runner:
             reason=reason,
             cid=plan.cid,
             seed=plan.seed,
-            clock="realtime",
+            clock=plan.clock,
             backend=self.backends.name,
         )
 
 
-def default_parallel() -> int:
-    return len(os.sched_getaffinity(0))
+def set_aside(report: Path, attempt: int) -> None:
+    """Move what an attempt reported into ``attempts/<number>`` of the same folder."""
+    if not report.is_dir():
+        return
+    target = report / "attempts" / str(attempt)
+    target.mkdir(parents=True)
+    for entry in report.iterdir():
+        if entry.name != "attempts":
+            entry.rename(target / entry.name)

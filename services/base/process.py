@@ -75,11 +75,12 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
         with ExitStack() as resources:
             session = resources.enter_context(Session(flags["cid"], _messages()))
             resources.enter_context(published(session, flags["log-id"]))
-            service = build(Context(name, flags, session.messages, resources))
+            clock = clock or _clock(session, role)
+            service = build(Context(name, flags, session.messages, resources, clock, session))
             code = BROKEN
-            loop = Loop(role, service, session, clock or RealTimeClock(), flags["id"])
+            loop = Loop(role, service, session, clock, flags["id"])
             resources.enter_context(_readiness(ready))
-            loop.run(stop)
+            (service.drive or loop.run)(stop)
             if service.verdict is not None:
                 print(service.verdict.line(), flush=True)
     except Exception as error:
@@ -93,6 +94,15 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
 def _messages() -> MessageSet:
     """The standard messages and those of the test's own ODVD files."""
     return MessageSet.load(*(Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p))
+
+
+def _clock(session: Session, role: str) -> Clock:
+    """The test's clock, as ``DODO_CLOCK`` says."""
+    if os.environ.get("DODO_CLOCK") != "lockstep":
+        return RealTimeClock()
+    from services.base.lockstep import LockstepClock
+
+    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1))
 
 
 @contextmanager

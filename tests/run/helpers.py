@@ -8,7 +8,8 @@ from pathlib import Path
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, Service
 from dodo_dsl.run.backends import Job, Processes
-from dodo_dsl.run.runner import Runner
+from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.schedule import schedule
 
 READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
 PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'
@@ -23,6 +24,7 @@ class Recorded:
 
     notes: list[str] = field(default_factory=list)
     phases: list[tuple[str, str]] = field(default_factory=list)
+    rests: list[tuple[float, int]] = field(default_factory=list)
 
     def __enter__(self) -> "Recorded":
         return self
@@ -39,6 +41,9 @@ class Recorded:
     def done(self, outcome: Outcome) -> None:
         self.phases.append((outcome.slug, outcome.outcome))
 
+    def rest(self, seconds: float, tests: int) -> None:
+        self.rests.append((seconds, tests))
+
 
 @dataclass
 class Bench:
@@ -47,6 +52,7 @@ class Bench:
     folder: Path
     isolation: str | None = None
     progress: Recorded = field(default_factory=Recorded)
+    durations: dict[str, float] = field(default_factory=dict)
 
     def script(self, name: str, text: str) -> tuple[str, ...]:
         path = self.folder / f"{name}.py"
@@ -98,10 +104,13 @@ class Bench:
         (self.folder / "compiled").mkdir(exist_ok=True)
         return [Job(plan, self.folder / "compiled", self.folder / "report" / plan.slug) for plan in plans]
 
-    def run(self, *plans: Plan, parallel: int = 4) -> list[Outcome]:
-        jobs = self.jobs(*plans)
+    def run(self, *plans: Plan, parallel: int = 4, policy: Policy | None = None) -> list[Outcome]:
         backends = Processes(CIDS, self.isolation, ())
-        return asyncio.run(Runner(self.progress, backends, parallel).run(jobs))
+        self.runner = Runner(self.progress, backends, schedule(parallel, self.expected), policy or Policy())
+        return asyncio.run(self.runner.run(self.jobs(*plans)))
+
+    def expected(self, job: Job) -> float:
+        return self.durations.get(job.plan.slug, 1.0)
 
     def log(self, plan: Plan, name: str) -> str:
         return (self.folder / "report" / plan.slug / "logs" / f"{name}.log").read_text()

@@ -31,7 +31,7 @@ class Desk:
 
     def compiled(self, plan: Plan) -> Path:
         target = self.folder / "generated" / plan.slug
-        target.mkdir(parents=True)
+        target.mkdir(parents=True, exist_ok=True)
         (target / "test.json").write_text(to_json(plan))
         return target
 
@@ -118,6 +118,15 @@ def test_fails_with_exit_code_1_and_a_junit_failure(desk: Desk) -> None:
     assert failure.get("message") == "hit wall left"
     assert (desk.folder / "report" / "metrics.txt").read_text().endswith("# EOF\n")
     assert "hit wall left" in (desk.folder / "report" / "index.html").read_text()
+
+
+def test_losses_of_messages_are_noted_below_the_test(desk: Desk) -> None:
+    lost = 'print(\'{"dodo": "lost", "messages": 5}\', flush=True)\n'
+    process = desk.start(desk.bench.plan(judge=READY + lost + "time.sleep(0.3)\n" + PASS))
+    out, _ = process.communicate(timeout=30)
+    note = "service 'judge' lost 5 messages, as its receive buffer was full: its verdict is about the others"
+    assert (process.returncode, f"        note: {note}\n" in out) == (0, True), out
+    assert desk.results()[0]["notes"] == [note]
 
 
 def test_error_has_exit_code_3_and_is_a_junit_error(desk: Desk) -> None:
@@ -274,3 +283,15 @@ def test_usage_errors_are_sentences(desk: Desk) -> None:
         assert result.returncode == 2, result
         assert said in result.stderr
         assert "Traceback" not in result.stderr
+
+
+def test_times_of_all_runs_are_kept_and_drawn(desk: Desk) -> None:
+    """A second run forecasts what the first one took, and the report shows both."""
+    first = desk.start(desk.bench.plan())
+    said_first, _ = first.communicate()
+    assert "; at most " in said_first
+    second = desk.start(desk.bench.plan())
+    said, _ = second.communicate()
+    assert "; about " in said
+    assert (desk.folder / "report" / "times.png").read_bytes().startswith(b"\x89PNG")
+    assert 'src="times.png"' in (desk.folder / "report" / "index.html").read_text()

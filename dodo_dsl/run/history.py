@@ -1,0 +1,95 @@
+"""How long tests took on this machine, kept over runs: for forecasts, and for the picture of set-up and execution."""
+
+import contextlib
+import json
+import os
+import statistics
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from dodo_dsl.outcome import Outcome
+
+_MOST_BYTES = 4_000_000
+_RECENT = 5
+
+
+@dataclass(frozen=True)
+class Run:
+    """A test that ran to its end; ``when`` in s since the epoch, times in s."""
+
+    when: int
+    spec: str
+    test: str
+    level: str
+    backend: str
+    clock: str
+    outcome: str
+    setup_s: float
+    execution_s: float
+
+
+def default_path() -> Path:
+    """``DODO_HISTORY``, else a file of this user's state (XDG base directories)."""
+    state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
+    return Path(os.environ.get("DODO_HISTORY") or Path(state).expanduser() / "dodo" / "history.jsonl")
+
+
+class History:
+    """A file with a line of JSON a run. One that cannot be read or written is as good as none."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path or default_path()
+        self.runs = list(_read(self.path))
+
+    def seconds(self, spec: str, test: str, backend: str, clock: str) -> float | None:
+        """What the test took lately, from the begin of its set-up to its end; None when it never ran."""
+        key = (spec, test, backend, clock)
+        took = [r.setup_s + r.execution_s for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key]
+        return statistics.median(took[-_RECENT:]) if took else None
+
+    def times(self, tests: Iterable[tuple[str, str]], backend: str) -> dict[str, list[tuple[float, float]]]:
+        """Seconds of set-up and execution of all runs of tests, each given as spec and name."""
+        found: dict[str, list[tuple[float, float]]] = {}
+        wanted = set(tests)
+        for r in self.runs:
+            if (r.spec, r.test) in wanted and r.backend == backend:
+                name = r.test if r.clock == "realtime" else f"{r.test} ({r.clock})"
+                found.setdefault(name, []).append((r.setup_s, r.execution_s))
+        return found
+
+    def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
+        """Keep outcomes beside the name of their test; those that ended in error tell nothing about its time."""
+        new = [
+            Run(int(time.time()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s)
+            for test, o in outcomes
+            if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
+        ]
+        self.runs += new
+        text = "".join(json.dumps(asdict(run)) + "\n" for run in new)
+        with contextlib.suppress(OSError):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            if self.path.is_file() and self.path.stat().st_size > _MOST_BYTES:
+                self._shorten()
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(text)
+
+    def _shorten(self) -> None:
+        lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
+        part = self.path.with_suffix(f".{os.getpid()}.part")
+        part.write_text("".join(lines[len(lines) // 2 :]), encoding="utf-8")
+        part.replace(self.path)
+
+
+def _read(path: Path) -> Iterator[Run]:
+    """What can be read; a line that a killed run left unfinished is left out."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return
+    for line in text.splitlines():
+        with contextlib.suppress(ValueError, TypeError):
+            run = Run(**json.loads(line))
+            if run.setup_s >= 0 and run.execution_s >= 0:
+                yield run

@@ -1,0 +1,109 @@
+"""Which test comes when: as many at once as the machine carries, those that take longest first."""
+
+import asyncio
+import contextlib
+import heapq
+import os
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
+
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.backends import Job
+
+_EPSILON = 1e-9
+_BASE, _PIXELS_PER_CORE = 0.25, 7_500_000.0
+_RIG = 2.0
+"""Cores for all of a test's programs, and pixels a second that a core draws, shares and searches for things."""
+
+
+def cores_needed(plan: Plan) -> float:
+    """The share of a core that keeps a test in real time, by its pictures; in lockstep one, as nothing waits there.
+
+    A rig gets room: an emulated one that is late spoils its test.
+    """
+    if plan.rig:
+        return _RIG
+    if plan.clock == "lockstep":
+        return 1.0
+    return round(_BASE + sum(_pixels_a_second(plan)) / _PIXELS_PER_CORE, 2)
+
+
+def _pixels_a_second(plan: Plan) -> list[float]:
+    rates = []
+    for service in plan.services:
+        flags = {flag.name: flag.value for flag in service.flags}
+        with contextlib.suppress(KeyError, ValueError):
+            rates.append(float(flags["width"]) * float(flags["height"]) * float(flags["freq"]))
+    return rates
+
+
+def schedule(jobs: int | None, expected: Callable[[Job], float]) -> "Schedule":
+    """So many jobs at once, or as many as this process's cores carry."""
+    if jobs is not None:
+        return Schedule(jobs, lambda job: 1.0, expected)
+    return Schedule(len(os.sched_getaffinity(0)), lambda job: cores_needed(job.plan), expected)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How many cores there are to give, what each job takes of them, and how long in s."""
+
+    capacity: float
+    need: Callable[[Job], float]
+    expected: Callable[[Job], float]
+
+    def ordered(self, jobs: Sequence[Job]) -> list[Job]:
+        """Those that take longest first, so that none of them is left over at the end."""
+        return sorted(jobs, key=self.expected, reverse=True)
+
+    def forecast(self, jobs: Sequence[Job], running: Sequence[tuple[Job, float]] = ()) -> float:
+        """Seconds until the last of ``jobs`` has ended; ``running`` have so many seconds behind them."""
+        now, free = 0.0, self.capacity
+        ends: list[tuple[float, int, float]] = []
+        begun = [(job, max(self.expected(job) - gone, 0.0)) for job, gone in running]
+        for number, (job, left) in enumerate([*begun, *((job, self.expected(job)) for job in jobs)]):
+            need = min(self.need(job), self.capacity)
+            while ends and free < need - _EPSILON and number >= len(begun):
+                now, _, given = heapq.heappop(ends)
+                free += given
+            free -= need
+            heapq.heappush(ends, (now + left, number, need))
+        return max((end for end, _, _ in ends), default=0.0)
+
+
+class Places:
+    """Cores that tests take and give back, first come, first served."""
+
+    def __init__(self, capacity: float) -> None:
+        self._capacity = self._free = capacity
+        self._waiting: deque[tuple[float, asyncio.Future[None]]] = deque()
+
+    @contextlib.asynccontextmanager
+    async def take(self, need: float) -> AsyncIterator[None]:
+        """Wait until there is room; what needs more than there is takes all."""
+        need = min(need, self._capacity)
+        turn = asyncio.get_running_loop().create_future()
+        self._waiting.append((need, turn))
+        self._serve()
+        try:
+            await turn
+        except asyncio.CancelledError:
+            if turn.done() and not turn.cancelled():
+                self._give(need)
+            raise
+        try:
+            yield
+        finally:
+            self._give(need)
+
+    def _give(self, need: float) -> None:
+        self._free += need
+        self._serve()
+
+    def _serve(self) -> None:
+        while self._waiting and (self._waiting[0][1].done() or self._waiting[0][0] <= self._free + _EPSILON):
+            need, turn = self._waiting.popleft()
+            if not turn.done():
+                self._free -= need
+                turn.set_result(None)
