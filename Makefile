@@ -1,12 +1,13 @@
 # The developer's front door. `make demo` and `make test` set up what they need.
 DODO := .venv/bin/dodo
 
-.PHONY: help demo test lint bench format goldens schema clean
+.PHONY: help demo test lint bench firmware format goldens schema clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
 	@echo "make test     set up, then every check: format, lint, types, imports, tests"
 	@echo "make bench    measure, beside a peer in the same run"
+	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
 	@echo "make schema   put what manifests say into the schema that editors read"
@@ -15,7 +16,7 @@ help:
 demo:
 	@scripts/setup
 	$(DODO) compile
-	$(DODO) run --level sil --level dil
+	$(DODO) run --level sil --level dil --level hil $(shell scripts/have-rig || echo "'sil-*' 'dil-*' hil-camera")
 
 lint:
 	@scripts/setup dev
@@ -28,11 +29,16 @@ test: lint
 	@scripts/install-compose
 	@scripts/install-gitlab-ci-local
 	@scripts/start-engine
+	@scripts/install-firmware-tools
 	.venv/bin/pytest
 
 bench:
 	@scripts/setup dev
 	@for script in benchmarks/bench_*.py; do .venv/bin/python $$script || exit 1; done
+
+firmware:
+	@scripts/install-firmware-tools
+	@$(MAKE) -s -C firmware
 
 format:
 	@scripts/setup dev

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl.check import check
-from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, ordered
 from dodo_dsl.emit.pipeline import pipeline_problems
 from dodo_dsl.emit.render import render_pipeline
 from dodo_dsl.emit.write import pipeline_folder
@@ -55,6 +55,20 @@ def load(paths: Sequence[Path], application: Sequence[Path] = (), start: Path | 
         found.extend(problems)
     found.extend(check(specs, manifests, deployment, source.declared if source else None))
     return Checked(deployment, manifests, specs, tuple(ordered(found)), source, tuple(empty))
+
+
+def with_clock(checked: Checked, clock: str) -> Checked:
+    """The same by another clock, with what is wrong then; hardware keeps the one that it has."""
+    specs = tuple(spec if spec.level == "hil" else replace(spec, clock=clock) for spec in checked.specs)
+    declared = checked.application.declared if checked.application else None
+    known = {_key(d) for d in checked.diagnostics}
+    more = [d for d in check(specs, checked.manifests, checked.deployment, declared) if _key(d) not in known]
+    return replace(checked, specs=specs, diagnostics=tuple(ordered([*checked.diagnostics, *more])))
+
+
+def _key(diagnostic: Diagnostic) -> tuple[Span, str]:
+    """What makes a diagnostic the same one, whichever instances have it."""
+    return diagnostic.span, diagnostic.rule
 
 
 def _registries_above(paths: Sequence[Path]) -> list[Path]:

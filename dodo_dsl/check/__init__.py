@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.check.context import Context, Declared, Rule
-from dodo_dsl.check.rules import layers, levels, messages, names, parameters, references, rigs, services, wiring
+from dodo_dsl.check.rules import clocks, layers, levels, messages, names, parameters, references, rigs, services, wiring
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
@@ -14,6 +14,7 @@ from dodo_dsl.spec.model import Spec
 RULES: tuple[Rule, ...] = (
     names.check,
     levels.check,
+    clocks.check,
     rigs.check,
     services.check,
     layers.check,

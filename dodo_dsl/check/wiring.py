@@ -66,6 +66,7 @@ class Wiring:
     undeclared: tuple[str, ...] = ()
     has_application: bool = False
     answers: tuple[End, ...] = ()
+    done: str = ""
 
     def producers(self, port: Port) -> list[End]:
         """Services of the test that say what a port hears."""
@@ -126,8 +127,10 @@ def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | 
         for ends, names in ((says, own.outputs), (hears, own.inputs), (answers, own.answers)) if own else ():
             stamp = 0 if ends is says else None
             ends += [End(service, "application", message(name, stamp), span) for name, span in names]
+    ending = [own.done[0] for own in declared.values() if own and own.done]
     return replace(
         wiring,
+        done=ending[0] if ending else "",
         application_says=tuple(says),
         application_hears=tuple(hears),
         answers=tuple(answers),

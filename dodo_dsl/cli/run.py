@@ -14,7 +14,7 @@ from typing import Any, TextIO, cast
 
 from dodo_dsl.cli import progress, selection, summary
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.compiler import NoApplication, plan
+from dodo_dsl.compiler import NoApplication, plan, with_clock
 from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.write import PLAN_FILE, write
 from dodo_dsl.outcome import Outcome
@@ -39,6 +39,9 @@ exit codes: 0 all passed, 1 some failed, 2 usage or spec, 3 some ended in error,
 """
 
 
+_MOST_SECONDS = 864_000.0
+
+
 class _Usage(Exception):
     """A sentence for the user; the exit code is 2."""
 
@@ -51,6 +54,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "-j", "--jobs", type=_positive, metavar="N", help="tests at once (default: as many as the cores carry)"
     )
     parser.add_argument("--clock", choices=("realtime", "lockstep"), help="instead of the specs'")
+    parser.add_argument("--wall-timeout", type=_seconds, metavar="S", help="most wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="instead of the specs'")
     parser.add_argument("--report", type=Path, default=Path("dodo-report"), metavar="DIR", help="default: dodo-report")
     parser.add_argument("--seed", type=_seed, metavar="N", help="instead of the specs'")
@@ -68,6 +72,16 @@ def _seed(text: str) -> int:
     if not 0 <= number < 1 << 32:
         raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 to 4294967295")
     return number
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text.removesuffix("s"))
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds <= _MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"'{text}' is no time in seconds, above 0 and at most {_MOST_SECONDS:g}")
+    return seconds
 
 
 def _positive(text: str) -> int:
@@ -109,22 +123,27 @@ def _prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
     if options.compiled:
         if options.test or options.level or options.application:
             raise _Usage("--compiled runs a test as it was compiled: no TEST, --level or --application beside it")
-        plans, deployment, folders = (
-            [_load_plan(options.compiled)],
-            Deployment(Path.cwd()),
-            [options.compiled.resolve()],
-        )
+        plans, deployment = [_load_plan(options.compiled)], Deployment(Path.cwd())
+        folders = [options.compiled.resolve()]
+        if options.clock not in (None, plans[0].clock):
+            raise _Usage(f"this test is compiled for clock {plans[0].clock}; compile it again for another")
     else:
         plans, deployment = _compile(options, folder, stdout)
         folders = [folder / p.slug for p in plans]
     if options.seed is not None:
         plans = [replace(p, seed=options.seed) for p in plans]
+    if options.wall_timeout is not None:
+        plans = [_with_wall_timeout(p, options.wall_timeout) for p in plans]
     report = _usable(options.report, [p.slug for p in plans])
     return [
         Job(p, f, report / p.slug, original.slug)
         for n in range(options.repeat)
         for original, (p, f) in zip(plans, _repetition(plans, folders, n), strict=True)
     ], deployment
+
+
+def _with_wall_timeout(plan: Plan, seconds: float) -> Plan:
+    return replace(plan, lockstep=replace(plan.lockstep, wall_timeout_s=seconds)) if plan.lockstep else plan
 
 
 def _usable(report: Path, slugs: Sequence[str]) -> Path:
@@ -162,6 +181,8 @@ def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
     checked = selection.select(options.test, options.level, options.application)
     if not checked.specs:
         raise _Usage("there is no test to run")
+    if options.clock:
+        checked = with_clock(checked, options.clock)
     if options.isolation:
         checked = replace(checked, specs=tuple(replace(s, isolation=options.isolation) for s in checked.specs))
     problems = checked.diagnostics
@@ -183,8 +204,6 @@ def _runner(
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or default_backend(plans)
-    if "lockstep" in {options.clock, *(p.clock for p in plans)} and options.clock != "realtime":
-        stdout.write("note: lockstep is not part of this version; these tests run in real time\n")
     order = schedule(options.jobs, _expectation(backend))
     stdout.write(f"{progress.count(len(jobs))}, {_at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{_forecast(order, jobs, backend)}\n")

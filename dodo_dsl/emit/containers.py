@@ -51,7 +51,8 @@ def _word(flag: Flag) -> str:
 
 def _environment(plan: Plan, service: Service) -> tuple[tuple[str, str], ...]:
     messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
-    return (("DODO_SERVICE", service.name), *((("DODO_ODVD", messages),) if messages else ()))
+    own = {"DODO_SERVICE": service.name, "DODO_ODVD": messages, **plan.clock_variables}
+    return tuple((name, value) for name, value in own.items() if value)
 
 
 def _volumes(plan: Plan, service: Service) -> tuple[str, ...]:

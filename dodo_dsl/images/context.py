@@ -13,6 +13,8 @@ DEFINITION = "docker-bake.json"
 CONSTRAINTS = "constraints.txt"
 REQUIREMENTS = "services/requirements"
 _DOCKERFILE = "services/Dockerfile"
+_FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf")
+"""The emulated rig, where ``make firmware`` has built it: the gantry's image takes it along."""
 
 
 def assemble(folder: Path, wheels: Path | None) -> None:
@@ -26,6 +28,10 @@ def assemble(folder: Path, wheels: Path | None) -> None:
     shutil.copytree(root / "services", folder / "services", ignore=no_bytecode)
     shutil.copytree(package / "opendlv", folder / "dodo_dsl" / "opendlv", ignore=no_bytecode)
     shutil.copy2(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")
+    if all((root / _FIRMWARE / name).is_file() for name in _RIG):
+        (folder / "rig").mkdir()
+        for name in _RIG:
+            shutil.copy2(root / _FIRMWARE / name, folder / "rig" / name)
     if wheels is not None:
         shutil.copytree(wheels, folder / "wheels", copy_function=_link)
 

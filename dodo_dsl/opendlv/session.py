@@ -20,11 +20,15 @@ RECEIVE_BUFFER_BYTES = 26_214_400
 CIDS = range(1, 255)
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
+_ID_PLACE, _ID_TAG = 5, 0x08  # behind the frame's header, the envelope's first field
+_IP_MULTICAST_ALL = 49  # Linux: linux/in.h
 _SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
 _SO_RXQ_OVFL = 40
 _TIMESPEC = struct.Struct("@qq")
 _COUNT = struct.Struct("@I")
 _ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
+
+Address = tuple[str, int]
 
 
 class SessionError(OSError):
@@ -46,6 +50,11 @@ class Session:
         self.messages = messages or MessageSet.standard()
         self.garbage = 0
         self.lost = 0
+        self.is_member = True
+        self.only: frozenset[int] | None = None
+        """Ids of messages; datagrams of others are left undecoded where they are as libcluon writes them."""
+        self.source: Address = ("", 0)
+        """Host and port from which the last datagram came."""
         group = (f"225.0.0.{cid}", PORT)
         try:
             self._receiver = _receiver(group)
@@ -59,25 +68,18 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._receiver, select.POLLIN)
 
-    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> None:
-        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now).
+    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> bytes:
+        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now); returns the frame.
 
         Raises MessageError, FrameError or SessionError.
         """
         now = time.time_ns() // 1000
-        self.send_envelope(
-            Envelope(
-                self.messages.id(message),
-                self.messages.encode(message),
-                now,
-                0,
-                now if sample_time is None else sample_time,
-                sender_stamp,
-            )
-        )
+        sampled = now if sample_time is None else sample_time
+        id_, payload = self.messages.id(message), self.messages.encode(message)
+        return self.send_envelope(Envelope(id_, payload, now, 0, sampled, sender_stamp))
 
-    def send_envelope(self, envelope: Envelope) -> None:
-        """Send an envelope as it is; raises FrameError, and SessionError above 65,507 bytes."""
+    def send_envelope(self, envelope: Envelope) -> bytes:
+        """Send an envelope as it is, and return its frame; raises FrameError, and SessionError above 65,507 bytes."""
         frame = encode_frame(envelope)
         if len(frame) > MAX_DATAGRAM_BYTES:
             raise SessionError(
@@ -87,6 +89,7 @@ class Session:
             self._sender.send(frame)
         except OSError as error:
             raise SessionError(f"the bus does not take a message: {error.strerror}") from None
+        return frame
 
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
         """The next envelope of another member, with `received` set; None when `timeout` seconds are over.
@@ -111,6 +114,19 @@ class Session:
         """The file descriptor to select on for reading."""
         return self._receiver.fileno()
 
+    def deafen(self) -> None:
+        """Hear nothing from now on, so that this process is not woken for it; sending goes on."""
+        if self.is_member:
+            membership = _membership(f"225.0.0.{self.cid}")
+            self._receiver.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
+            self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
+            self.is_member = False
+
+    @property
+    def port(self) -> int:
+        """From which this session's datagrams come."""
+        return int(self._own_address[1])
+
     def close(self) -> None:
         """Leave the bus."""
         self._receiver.close()
@@ -130,6 +146,9 @@ class Session:
             self.lost = _lost(ancillary)
         if address == self._own_address:
             return None
+        if self.only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self.only:
+            return None
+        self.source = address
         try:
             return decode_frame(bytes(self._view[:size]), _received(ancillary))
         except FrameError:
@@ -141,6 +160,17 @@ class Session:
             return bool(self._poll.poll())
         left = deadline - time.monotonic()
         return left > 0 and bool(self._poll.poll(left * 1000))
+
+
+def _id(frame: bytearray) -> int:
+    """The id of the message in a frame that begins with it: a zigzag varint."""
+    value = shift = 0
+    for byte in frame[_ID_PLACE + 1 : _ID_PLACE + 6]:
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            break
+    return (value >> 1) ^ -(value & 1)
 
 
 def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
@@ -179,10 +209,13 @@ def _receiver(group: tuple[str, int]) -> socket.socket:
         receiver.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         receiver.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
         receiver.bind(group)
-        membership = socket.inet_aton(group[0]) + socket.inet_aton("0.0.0.0")  # noqa: S104
-        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(group[0]))
         receiver.setblocking(False)
     except OSError:
         receiver.close()
         raise
     return receiver
+
+
+def _membership(group: str) -> bytes:
+    return socket.inet_aton(group) + socket.inet_aton("0.0.0.0")  # noqa: S104

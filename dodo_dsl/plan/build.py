@@ -2,16 +2,19 @@
 
 import functools
 import itertools
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
 from dodo_dsl.plan.application import ApplicationSource, plan_application
+from dodo_dsl.plan.emulation import DRAWN, hardware
 from dodo_dsl.plan.files import Copy, FilesError, copies
+from dodo_dsl.plan.lockstep import clock, lockstep
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
-from dodo_dsl.plan.recorder import MANIFEST, recorder
+from dodo_dsl.plan.recorder import MANIFEST, RECORDER, recorder
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
@@ -54,7 +57,7 @@ def build(
         _Builder(spec, manifests, deployment, out, cid, index, tree, planned)
         for index, (spec, cid) in enumerate(zip(ordered, cids, strict=True))
     ]
-    plans = tuple(builder.plan(application.spans) for builder in builders)
+    plans = tuple(builder.plan(application) for builder in builders)
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
     return Compiled(Suite(plans, deployment.gates), files), problems
@@ -100,12 +103,12 @@ class _Builder:
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
 
-    def plan(self, application: Container[str]) -> Plan:
-        """The instance's Plan; ``application`` holds the names of the application's services."""
+    def plan(self, application: ApplicationSource) -> Plan:
+        """The instance's Plan with this application."""
         spec, rig = self.spec, self.rig
-        image = self._image(self.manifests[MANIFEST].image)
-        services = (recorder(spec, self.manifests, rig, image, self.cid), *(self._service(use) for use in spec.uses))
-        self._names_apart(services, application)
+        uses = (self._service(use) for use in spec.uses)
+        services = (*self._automatic(application), *uses)
+        self._names_apart(services, application.spans)
         judges = tuple(s.name for s in services if s.judge)
         for key in ("name", "level", "kind", "timeout", "clock", "rig", "matrix", "seed", "isolation", "record"):
             if key in spec.spans:
@@ -131,6 +134,7 @@ class _Builder:
             sandbox_image=self._image("sandbox"),
             services=services,
             application=self.application(self.cid, isolated, judges, hardware, privileged),
+            lockstep=lockstep(spec, application.declared),
             rig=rig.name if rig else "",
             messages=messages,
             source_map=self.places,
@@ -159,6 +163,15 @@ class _Builder:
         bare = "/" not in image and ":" not in image
         return f"{self.deployment.image_prefix}/{image}:{self.deployment.image_tag}" if bare else image
 
+    def _automatic(self, application: ApplicationSource) -> Iterator[Service]:
+        """The services that DoDo adds: the recorder, and in lockstep the clock."""
+        spec, manifests = self.spec, self.manifests
+        image = self._image(manifests[MANIFEST].image)
+        yield recorder(spec, manifests, self.rig, image, self.cid)
+        if spec.clock == "lockstep":
+            context = Context(spec, manifests, {}, self.deployment, application.declared)
+            yield clock(context, self._image(manifests["clock"].image), (RECORDER,), self.cid)
+
     def _names_apart(self, services: Sequence[Service], application: Container[str]) -> None:
         for service in services:
             if service.name in application:
@@ -176,7 +189,7 @@ class _Builder:
             if (flag := self._flag(use, parameter, f"{key}.{parameter.name}")) is not None
         ]
         flags.append(Flag("cid", str(self.cid)))
-        return Service(
+        service = Service(
             use.layer,
             use.name,
             manifest.name,
@@ -186,6 +199,7 @@ class _Builder:
             judge=use.layer == "evaluation",
             devices=self._devices(use, manifest),
         )
+        return hardware(service, self.manifests, self._image(self.manifests[DRAWN].image))
 
     def _devices(self, use: Use, manifest: Manifest) -> tuple[str, ...]:
         """The device files among what the manifest names; a rig's camera may be none (rpicam, a recording)."""

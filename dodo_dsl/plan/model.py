@@ -80,10 +80,19 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Lockstep:
+    """How a test in lockstep goes: how many processes read each picture, and its limit of wall time in seconds."""
+
+    readers: int
+    wall_timeout_s: float
+
+
+@dataclass(frozen=True)
 class Plan:
     """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation.
 
-    ``rig`` is empty below level hil; ``messages`` are ODVD files of the deployment, relative to ``files/``.
+    ``lockstep`` is None in real time, ``rig`` empty below level hil; ``messages`` are ODVD files of the deployment,
+    relative to ``files/``.
     """
 
     name: str
@@ -102,9 +111,15 @@ class Plan:
     sandbox_image: str
     services: tuple[Service, ...]
     application: Application
+    lockstep: Lockstep | None = None
     rig: str = ""
     messages: tuple[str, ...] = ()
     source_map: dict[str, Place] = field(default_factory=dict)
+
+    @property
+    def clock_variables(self) -> dict[str, str]:
+        """Environment variables by which the test's services know their clock."""
+        return {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
 
     def layer(self, name: str) -> tuple[Service, ...]:
         return tuple(s for s in self.services if s.layer == name)
@@ -139,6 +154,7 @@ def from_json(text: str) -> Plan:
         application["services"] = tuple(_application_service(s) for s in application["services"])
         application["changes"] = tuple(application["changes"])
         raw["application"] = Application(**application)
+        raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
         raw["messages"] = tuple(raw["messages"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
         plan = Plan(**raw)
@@ -162,6 +178,7 @@ def _problem(plan: Plan) -> str:
         "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
         "cid": isinstance(plan.cid, int) and 1 <= plan.cid <= 254,
         "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
+        "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
         "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "a service's layer": all(s.layer in LAYERS for s in plan.services),
@@ -174,6 +191,11 @@ def _problem(plan: Plan) -> str:
         "a file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
+
+
+def _is_lockstep(lockstep: Lockstep) -> bool:
+    numbers = isinstance(lockstep.readers, int) and isinstance(lockstep.wall_timeout_s, int | float)
+    return numbers and 1 <= lockstep.readers <= 1000 and 0 < lockstep.wall_timeout_s <= 10 * 86_400 + 60
 
 
 def _is_flag(flag: Flag) -> bool:

@@ -1,12 +1,14 @@
 """One test from set-up to outcome, whatever backend it runs on."""
 
 import asyncio
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.lockstep import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.events import (
     Backend,
@@ -17,6 +19,8 @@ from dodo_dsl.run.events import (
     Malformed,
     Overrun,
     Ready,
+    Stopped,
+    Time,
     Unstartable,
     Verdict,
 )
@@ -24,6 +28,8 @@ from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended, lost_mess
 
 ORDER = ("environment", "action", "evaluation", "application")
 READY_PATIENCE_S = 60.0
+LAST_TIME_PATIENCE_S = 2.0
+BEGIN_PATIENCE_S = 2.0
 
 
 class _Ended(Exception):
@@ -45,6 +51,8 @@ class Engine:
     began: float | None = None
     finished: float | None = None
     setup_s: float | None = None
+    time: Time | None = None
+    _told_to_begin: float = 0.0
 
     def __post_init__(self) -> None:
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
@@ -64,7 +72,7 @@ class Engine:
             self._find("error", "the run was interrupted")
             asyncio.current_task().uncancel()  # type: ignore[union-attr]
         finally:
-            self.finished = time.monotonic()
+            self.finished = self.finished or time.monotonic()
             self.say("taking down")
             kept = await self._closed(keep)
             await self._hear_losses()
@@ -119,14 +127,42 @@ class Engine:
     async def _execute(self) -> None:
         self.began = time.monotonic()
         await self.backend.begin()
+        self._told_to_begin = time.monotonic()
         self.say("running")
-        deadline = self.began + self.plan.timeout_s
+        lockstep = self.plan.lockstep
+        deadline = self.began + (lockstep.wall_timeout_s if lockstep else self.plan.timeout_s)
         while not self._all_judged():
+            event = await self._next(min(deadline, self._begin_again()))
+            if event is not None:
+                self._take(event)
+            elif time.monotonic() < deadline:
+                await self.backend.begin()
+                self._told_to_begin = time.monotonic()
+            elif lockstep:
+                self._give_up(lockstep.wall_timeout_s)
+            else:
+                self._time_out()
+        self.finished = time.monotonic()
+        if lockstep:
+            await self._last_time()
+
+    def _begin_again(self) -> float:
+        """When to say again that the test begins: the clock of a lockstep test says so once it has heard that."""
+        waits = self.plan.lockstep is not None and self.time is None
+        return self._told_to_begin + BEGIN_PATIENCE_S if waits else math.inf
+
+    async def _last_time(self) -> None:
+        """How far the clock got, which it says when the last evaluator has ended."""
+        deadline = time.monotonic() + LAST_TIME_PATIENCE_S
+        while not (self.time and self.time.last) and CLOCK not in self.exits:
             event = await self._next(deadline)
             if event is None:
-                self._time_out()
-            else:
-                self._take(event)
+                return
+            self._take(event)
+
+    def _give_up(self, wall_timeout_s: float) -> None:
+        got = f" and got to {self.time.seconds:.1f} s of its own" if self.time else ""
+        self._end("error", f"the test took more than {wall_timeout_s:g} s of wall time{got}", CLOCK)
 
     def _all_judged(self) -> bool:
         return all(judge in self.exits for judge in self.facts.judges)
@@ -155,6 +191,14 @@ class Engine:
                 self._end("error", f"service '{service}' could not be started: {why}", service)
             case Lost(why):
                 self._end("error", why)
+            case Time():
+                self.time = event
+            case Stopped("unanswered", reason):
+                self._end("failed", reason, self._who_answers())
+            case Stopped("timedout"):
+                self._time_out()
+            case Stopped(_, reason):
+                self._end("error", reason, CLOCK)
             case Exited(service, code, out_of_memory):
                 self.exits[service] = code
                 self._take_exit(service, code, out_of_memory)
@@ -180,6 +224,10 @@ class Engine:
             return "during set-up"
         return f"after {time.monotonic() - self.began:.1f} s"
 
+    def _who_answers(self) -> str:
+        """The application's service whose last lines may tell why there is no answer."""
+        return next((s.name for s in self.plan.application.services), "")
+
     def _find(self, result: Any, reason: str, service: str = "") -> None:
         self.facts.findings.append(Finding(result, reason, service))
 
@@ -202,10 +250,11 @@ class Engine:
             reason=finding.reason,
             cid=self.backend.cid,
             seed=plan.seed,
-            clock="realtime",
+            clock=plan.clock,
             backend=self.backend.name,
             setup_s=self.setup_s,
             execution_s=self.finished - self.began if self.finished and self.began else None,
+            sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
             checks=tuple(checks),
             last_lines=tuple(self.backend.tail(finding.service)) if finding.result != "passed" else (),

@@ -57,7 +57,23 @@ class Lost:
     why: str
 
 
-Event = Ready | Verdict | Malformed | Overrun | Exited | Unstartable | Lost
+@dataclass(frozen=True)
+class Time:
+    """How far the clock of a lockstep test is: test time in seconds; ``last`` when it goes no further."""
+
+    seconds: float
+    last: bool
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """The clock of a lockstep test gives up: ``kind`` is unanswered, stuck or timedout."""
+
+    kind: str
+    reason: str
+
+
+Event = Ready | Verdict | Malformed | Overrun | Exited | Unstartable | Lost | Time | Stopped
 
 
 class Backend(Protocol):

@@ -4,9 +4,11 @@ import json
 import math
 from typing import Any
 
-from dodo_dsl.run.events import Event, Malformed, Overrun, Ready, Verdict
+from dodo_dsl.plan.lockstep import CLOCK
+from dodo_dsl.run.events import Event, Malformed, Overrun, Ready, Stopped, Time, Verdict
 
 _OUTCOMES = ("passed", "failed")
+_STOPS = ("unanswered", "stuck", "timedout")
 _MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
 
@@ -32,6 +34,16 @@ def read_line(service: str, judge: bool, line: bytes) -> Event | None:
         if problem:
             return Malformed(service, problem)
         return Verdict(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
+    return _of_the_clock(kind, message) if service == CLOCK else None
+
+
+def _of_the_clock(kind: object, message: dict[str, Any]) -> Event | None:
+    """How far the clock is, or why it goes no further."""
+    seconds, reason = message.get("s"), message.get("reason")
+    if kind == "time" and _is_number(seconds):
+        return Time(float(seconds or 0.0), message.get("last") is True)
+    if kind in _STOPS and isinstance(reason, str) and _is_text(reason or "none"):
+        return Stopped(str(kind), reason)
     return None
 
 

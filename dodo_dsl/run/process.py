@@ -186,6 +186,7 @@ class ProcessBackend:
             "DODO_READY_FILE": ready_file(self.lane.name, service.name),
             "DODO_LANE": self.lane.name,
             "DODO_ODVD": os.pathsep.join(str(self.folder / "files" / path) for path in self.plan.messages),
+            **self.plan.clock_variables,
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         return Command(service.name, service.layer, words, environment, self.folder, service.judge)

@@ -197,7 +197,7 @@ class Runner:
             reason=reason,
             cid=plan.cid,
             seed=plan.seed,
-            clock="realtime",
+            clock=plan.clock,
             backend=self.backends.name,
         )
 

@@ -13,11 +13,17 @@ from dodo_dsl.run.backends import Job
 
 _EPSILON = 1e-9
 _BASE, _PIXELS_PER_CORE = 0.25, 7_500_000.0
+_RIG = 2.0
 """Cores for all of a test's programs, and pixels a second that a core draws, shares and searches for things."""
 
 
 def cores_needed(plan: Plan) -> float:
-    """The share of a core that keeps a test in real time, by its pictures; in lockstep one, as nothing waits there."""
+    """The share of a core that keeps a test in real time, by its pictures; in lockstep one, as nothing waits there.
+
+    A rig gets room: an emulated one that is late spoils its test.
+    """
+    if plan.rig:
+        return _RIG
     if plan.clock == "lockstep":
         return 1.0
     return round(_BASE + sum(_pixels_a_second(plan)) / _PIXELS_PER_CORE, 2)

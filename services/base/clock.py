@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.memory import SharedMemory
 
 MICROSECONDS = 1_000_000
 LATEST = MICROSECONDS
@@ -26,9 +27,20 @@ class Inbox(Protocol):
         """Let the service have it."""
         ...
 
+    @property
+    def observes(self) -> bool:
+        """Whether the service looks at all that is on the bus."""
+        ...
+
+    def overhear(self, envelope: Envelope) -> None:
+        """It is on the bus, but the service is not to act upon it."""
+        ...
+
 
 class Clock(Protocol):
-    """Test time, in microseconds since the epoch."""
+    """Test time, in microseconds since the epoch. ``relays`` says that it hands on what was on the bus before."""
+
+    relays: bool
 
     def now(self) -> int:
         """The time of the test."""
@@ -41,6 +53,22 @@ class Clock(Protocol):
         """
         ...
 
+    def sent(self, frame: bytes) -> None:
+        """The service has sent this."""
+        ...
+
+    def expect(self, time: int) -> None:
+        """The service will show something at this time (us) and nothing before it; 0 when it does not know."""
+        ...
+
+    def memory(self, name: str, size: int) -> SharedMemory:
+        """New shared memory for pictures that are sampled by this clock; raises SharedMemoryError."""
+        ...
+
+    def close(self) -> None:
+        """The service ends."""
+        ...
+
 
 class RealTimeClock:
     """Test time is the wall clock's at the start, and goes on evenly whatever that is set to afterwards.
@@ -48,6 +76,8 @@ class RealTimeClock:
     Steps are the scheduled instants, not the moments at which the processor got to them: a service that is late
     catches up with the same times that it would have had, and skips steps only when it is more than 1 s late.
     """
+
+    relays = False
 
     def __init__(self) -> None:
         self._offset = time.time_ns() // 1000 - time.monotonic_ns() // 1000
@@ -64,6 +94,18 @@ class RealTimeClock:
             yield due
             due += period
             due += self._skipped(due, period)
+
+    def sent(self, frame: bytes) -> None:
+        """Time goes on by itself."""
+
+    def expect(self, time: int) -> None:
+        """Time goes on evenly, whatever comes."""
+
+    def memory(self, name: str, size: int) -> SharedMemory:
+        return SharedMemory.create(name, size)
+
+    def close(self) -> None:
+        """Nobody waits."""
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
         """Deliver until the instant has come, and then what else is there already."""

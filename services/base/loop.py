@@ -59,6 +59,7 @@ class Loop:
                 break
         if service.finished and service.verdict is None:
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
+        self.clock.close()
         self._tell_losses(self.clock.now())
         if self.session.lost:
             _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
@@ -69,9 +70,19 @@ class Loop:
         """For the clock: the next envelope within ``timeout`` seconds."""
         return self.session.receive(timeout)
 
+    @property
+    def observes(self) -> bool:
+        """For the clock: whether the service looks at all that is on the bus."""
+        return self.service.observe is not None
+
+    def overhear(self, envelope: Envelope) -> None:
+        """For the clock: an envelope that the service may only look at."""
+        if self.service.observe is not None:
+            self.service.observe(envelope)
+
     def handle(self, envelope: Envelope) -> None:
         """For the clock: let the service have an envelope; what cannot be decoded is logged and left."""
-        if self.service.observe is not None:
+        if not self.clock.relays and self.service.observe is not None:
             self.service.observe(envelope)
         if envelope.data_type == self._begin:
             self.service.begin(envelope.sample_time)
@@ -93,7 +104,7 @@ class Loop:
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         if isinstance(output, Envelope):
-            self.session.send_envelope(output)
+            self.clock.sent(self.session.send_envelope(output))
             return
         message, stamp = output if isinstance(output, Output) else (output, self.sender_stamp)
-        self.session.send(message, now, stamp)
+        self.clock.sent(self.session.send(message, now, stamp))

@@ -15,6 +15,7 @@ from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, parse
 from services.base.loop import Loop
 from services.base.manifest import load_manifest
+from services.base.published import published
 from services.base.service import Build, Context
 from services.base.usage import help_text
 
@@ -73,11 +74,13 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
         ready.unlink(missing_ok=True)  # of one that was killed
         with ExitStack() as resources:
             session = resources.enter_context(Session(flags["cid"], _messages()))
-            service = build(Context(name, flags, session.messages, resources))
+            resources.enter_context(published(session, flags["log-id"]))
+            clock = clock or _clock(session, role)
+            service = build(Context(name, flags, session.messages, resources, clock, session))
             code = BROKEN
-            loop = Loop(role, service, session, clock or RealTimeClock(), flags["id"])
+            loop = Loop(role, service, session, clock, flags["id"])
             resources.enter_context(_readiness(ready))
-            loop.run(stop)
+            (service.drive or loop.run)(stop)
             if service.verdict is not None:
                 print(service.verdict.line(), flush=True)
     except Exception as error:
@@ -91,6 +94,15 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
 def _messages() -> MessageSet:
     """The standard messages and those of the test's own ODVD files."""
     return MessageSet.load(*(Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p))
+
+
+def _clock(session: Session, role: str) -> Clock:
+    """The test's clock, as ``DODO_CLOCK`` says."""
+    if os.environ.get("DODO_CLOCK") != "lockstep":
+        return RealTimeClock()
+    from services.base.lockstep import LockstepClock
+
+    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1))
 
 
 @contextmanager

@@ -11,7 +11,8 @@ from google.protobuf.message import Message
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.memory import SharedMemory
 from dodo_dsl.opendlv.messages import MessageSet
-from services.base.clock import MICROSECONDS
+from dodo_dsl.opendlv.session import Session
+from services.base.clock import MICROSECONDS, Clock, RealTimeClock
 from services.base.flags import Flags
 from services.base.verdict import Verdict
 
@@ -42,6 +43,8 @@ class Service:
     observe: Callable[[Envelope], None] | None = None
     verdict: Verdict | None = None
     finished: bool = False
+    drive: Callable[[Callable[[], bool]], None] | None = None
+    """Instead of the loop: for the clock, which has nobody to step it. Takes whether it was told to stop."""
 
     def begin(self, now: int) -> None:
         """All services are ready: the test begins."""
@@ -62,6 +65,9 @@ class Context:
     flags: Flags
     messages: MessageSet
     resources: ExitStack = field(default_factory=ExitStack)
+    clock: Clock = field(default_factory=RealTimeClock)
+    session: Session | None = None
+    """The bus itself; only for a service that drives itself."""
 
     @property
     def log(self) -> logging.Logger:
@@ -70,7 +76,7 @@ class Context:
 
     def memory(self, name: str, size: int) -> SharedMemory:
         """New shared memory of ``size`` bytes; raises SharedMemoryError."""
-        return self.resources.enter_context(SharedMemory.create(name, size))
+        return self.resources.enter_context(self.clock.memory(name, size))
 
 
 Build = Callable[[Context], Service]

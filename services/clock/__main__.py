@@ -1,8 +1,31 @@
+"""The clock of a test in lockstep as a program."""
+
 import sys
 from pathlib import Path
 
-from services.base import run
-from services.base.later import build
+from services.base import Context, Service, run
+from services.base.channel import Channel
+from services.base.clock import MICROSECONDS
+from services.base.service import period_of
+from services.clock.answers import Answers, kinds
+from services.clock.model import Patience, Roles
+from services.clock.service import HEARD, ClockService
+
+
+def build(context: Context) -> Service:
+    flags = context.flags
+    ids = {name: context.messages.id(name) for name in context.messages.names()}
+    done = kinds([flags["done"]] if flags["done"] else [], ids)
+    answers = Answers(kinds(flags["answers"], ids), kinds(flags["hears"], ids), done[0] if done else None)
+    roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
+    assert context.session is not None, "the program gives its session"
+    context.session.only = frozenset(kind.data_type for kind in answers.kinds) | {ids[name] for name in HEARD}
+    channel = Channel(context.session.cid, context.messages)
+    context.resources.callback(channel.close)
+    timeout = round(flags["timeout"] * MICROSECONDS)
+    patience = Patience(flags["first-patience"], flags["patience"])
+    return ClockService(context.session, channel, roles, answers, period_of(flags["freq"]), timeout, patience)
+
 
 if __name__ == "__main__":
     sys.exit(run(Path(__file__).parent, build))

@@ -8,10 +8,11 @@ import math
 from dataclasses import dataclass
 
 from services.gantry.protocol import Position
+from services.gantry.table import BOUNDS
 
-HOME = Position(-0.9, -0.7, math.radians(-150))
+HOME = Position(*(BOUNDS[axis][0] for axis in ("x", "y", "yaw")))
 """Where the limit switches are, rounded to the inside: step 0 of Table 4.2's conversions."""
-FARTHEST = Position(0.95, 0.7, math.radians(170))
+FARTHEST = Position(*(BOUNDS[axis][1] for axis in ("x", "y", "yaw")))
 """The other end of the workspace of 1.9 m by 1.4 m, and of the turn."""
 LATENCY = 0.1
 """s from a measurement to the motion decided upon it, beside four steps, with which braking that comes a step late does

@@ -72,8 +72,6 @@ def checked(target: str) -> str:
 
     Other kinds of pyserial's are refused, as some of them write files or listen.
     """
-    if target == "emulated":
-        raise PortError("the emulated rig gives its port when it runs; name that port, such as /dev/pts/3")
     if "://" in target:
         if _SOCKET.fullmatch(target):
             return target

@@ -6,9 +6,12 @@ Numbers are in SI units and radians. Answers do not say to what: three numbers a
 import math
 import re
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 
-BAUD = 115_200
+from services.gantry.table import BAUD, Status
+
+__all__ = ["BAUD", "SENTENCES", "Lines", "Position", "Status", "Word", "command"]
+
 LONGEST = 96
 """Bytes of the longest line that can be an answer."""
 FARTHEST = 10.0
@@ -27,20 +30,6 @@ class Word(StrEnum):
     CALIBRATE = "CALIBRATE"
     POSITION = "POSITION"
     STATUS = "STATUS"
-
-
-class Status(IntEnum):
-    """What the rig says of itself."""
-
-    IDLE = 0
-    MOVING = 1
-    HOMING = 2
-    LIMIT = 3
-    STALL = 4
-    HOT = 5
-    NOT_CALIBRATED = 6
-    WATCHDOG = 7
-    FAULT = 8
 
 
 SENTENCES = {

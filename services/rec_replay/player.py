@@ -59,6 +59,11 @@ class Player:
             self._elapsed += now - self._now
         self._now = now
 
+    def when(self, position: int) -> int:
+        """The test time at which an entry is due when nothing holds the player up."""
+        due: int = self._due[position]
+        return (self._now or 0) + due - self._elapsed
+
     def take(self) -> tuple[int, int] | None:
         """The next entry that is due, by number, and the test time at which it was; None when there is none."""
         if self.ended and self._rewinds and self.playing:

@@ -2,7 +2,7 @@
 
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,14 @@ class Replay(Service):
     period = period_of(LOOKS_HZ)
 
     def __init__(
-        self, player: Player, stream: Stream, screen: Screen | None, status: type[Any], shifts: bool, settle: int
+        self,
+        player: Player,
+        stream: Stream,
+        screen: Screen | None,
+        status: type[Any],
+        shifts: bool,
+        settle: int,
+        expect: Callable[[int], None],
     ) -> None:
         self.inputs = {(COMMAND, None): self._command}
         self._player, self._stream, self._screen = player, stream, screen
@@ -44,6 +51,8 @@ class Replay(Service):
         self._too_large = 0
         self._told = -STATUS_PERIOD
         self._end: int | None = None
+        self._pictures = np.flatnonzero(stream.shown)
+        self._expect = expect
 
     def begin(self, now: int) -> None:
         self._player.play()
@@ -63,10 +72,19 @@ class Replay(Service):
         elif self._end is None:
             self._end = now + self._settle
         self.finished = self._end is not None and now >= self._end and not player.jumped
+        self._expect(self._next_picture(now))
         if now - self._told >= STATUS_PERIOD:
             self._told = now
             status = self._status(state=_PLAYING, numberOfEntries=len(player), currentEntryForPlayback=player.position)
             yield Output(status, 0)
+
+    def _next_picture(self, now: int) -> int:
+        """The update that shows the next picture, 0 when there is none or nobody knows when that will be."""
+        number = int(np.searchsorted(self._pictures, self._player.position))
+        if not self._player.playing or number == len(self._pictures):
+            return 0
+        looks = -(-(self._player.when(int(self._pictures[number])) - now) // self.period)
+        return now + looks * self.period
 
     def close(self) -> None:
         """Say what was not played as it should."""
@@ -114,7 +132,7 @@ def build(context: Context) -> Service:
     settle = round(flags["settle"] * MICROSECONDS)
     status = context.messages.type(STATUS)
     screen = _screen(context, recording, part)
-    service = Replay(player, stream, screen, status, flags["sample-times"] == "test", settle)
+    service = Replay(player, stream, screen, status, flags["sample-times"] == "test", settle, context.clock.expect)
     context.resources.callback(service.close)
     return service
 

@@ -28,6 +28,8 @@ class Stream:
     def __init__(self, recording: Recording, part: Part) -> None:
         self.decoder = Decoder()
         self._recording, self._part = recording, part
+        self.shown = part.shown
+        """Which entries are pictures for the memory."""
         self._images = np.flatnonzero(part.shown)
         self._entries = self._from(0)
         self._ahead: Entry | None = None

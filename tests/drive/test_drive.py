@@ -77,8 +77,8 @@ def test_libcluon_sees_the_camera_and_steers_the_car(steering: str, reason: str,
     application.write_text(yaml.safe_dump({"services": {"cluon": service}}))
     report = tmp_path / "report"
     began = time.time()
-    words = ["run", "sil-closed-left-curve", "--application", str(application), "--report", str(report)]
-    dodo(*words, code=1)
+    words = ["run", "sil-closed-left-curve", "--clock", "realtime", "--application", str(application)]
+    dodo(*words, "--report", str(report), code=1)
     test = results(report)["sil-closed-left-curve"]
     assert str(test["reason"]).startswith(reason)
     log = (report / "sil-closed-left-curve" / "logs" / "application.cluon.log").read_text()

@@ -17,7 +17,7 @@ Word = tuple[str, Span]
 
 @dataclass(frozen=True)
 class Declared:
-    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp``, with its place."""
+    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp``, with its place. No ``readers`` is 0."""
 
     inputs: tuple[Word, ...]
     outputs: tuple[Word, ...]
@@ -89,7 +89,7 @@ def declared(service: source.Mapping) -> Declared | None:
     words = {key: tuple((s.text, s.span) for s in scalars(e.value)) for key, e in entry.value.entries.items()}
     inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))
     readers = entry.value.get("readers")
-    count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 1
+    count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 0
     return Declared(inputs, outputs, answers, done[0] if done else None, count, entry.key)
 
 

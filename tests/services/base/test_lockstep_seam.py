@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from dodo_dsl.opendlv.session import Session
-from services.base import Context, Inbox, Service, run
+from services.base import Context, Inbox, RealTimeClock, Service, run
 
 STEP = 2950
 MANIFEST = "{name: stepped, process: [stepped], description: Steps.}"
 
 
-class SteppedClock:
+class SteppedClock(RealTimeClock):
     """Test time is the sample time of the last step message; services see no message of this kind."""
 
     def __init__(self) -> None:

@@ -1,0 +1,31 @@
+"""What stands for a rig's hardware where the rig is emulated."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.spec.manifest import Manifest
+
+CAMERA, DRAWN = "camera", "virtual-camera"
+SOURCE = "emulated"
+
+_SAME = (
+    "map-path", "width", "height", "freq", "fovy", "x", "y", "z", "yaw", "pitch", "frame-id", "name.argb", "name.i420",
+    "cid",
+)  # fmt: skip
+_STILL = (Flag("start-x", "0"), Flag("start-y", "0"), Flag("start-yaw", "0"))
+
+
+def hardware(service: Service, manifests: Mapping[str, Manifest], image: str) -> Service:
+    """The virtual camera in place of an emulated rig's; any other service as it is.
+
+    It is the same camera to the application: the same memories, size, rate and place. The time that a picture is
+    exposed becomes the shutter's, and it stands at the map's origin until something moves it.
+    """
+    given = {flag.name: flag for flag in service.flags}
+    if service.uses != CAMERA or given.get("source") != Flag("source", SOURCE):
+        return service
+    flags = [given[name] for name in _SAME if name in given]
+    shutter = [Flag("shutter", given["exposure"].value)] if "exposure" in given else []
+    drawn = manifests[DRAWN]
+    return replace(service, uses=DRAWN, image=image, process=drawn.process, flags=(*flags, *shutter, *_STILL))

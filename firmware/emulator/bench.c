@@ -1,0 +1,90 @@
+/* The firmware's core on a host, against the models of drivers and mechanics, in a time that only orders advance.
+ *
+ * Lines on standard input: `send HEX` gives the core bytes, `run S` lets time pass, `restart` is a reset of the
+ * controller, `quit`, and those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "control.h"
+#include "gantry.h"
+#include "port.h"
+#include "say.h"
+
+static struct plant plant;
+
+static void pass(double seconds)
+{
+    for (long i = 0; i < (long)(seconds / PLANT_DT + 0.5); i++)
+        plant_step(&plant);
+}
+
+void port_exchange(uint8_t *bytes)
+{
+    chain_select(&plant.chain, true);
+    for (int m = MOTORS; m-- > 0;)
+        bytes[m] = chain_shift(&plant.chain, bytes[m]);
+    chain_select(&plant.chain, false);
+}
+
+void port_reset_drivers(void)
+{
+    for (int m = 0; m < MOTORS; m++)
+        l6470_wake(&plant.chain.chips[m], false);
+    pass(0.001);
+    for (int m = 0; m < MOTORS; m++)
+        l6470_wake(&plant.chain.chips[m], true);
+    pass(0.002);
+}
+
+uint32_t port_now(void)
+{
+    return (uint32_t)(plant.time * 1000 + 1e-6) + 4294967000U; /* wraps soon, on purpose */
+}
+
+void port_answer(const char *line)
+{
+    say("\"answer\": \"%s\"", line);
+}
+
+static void send(const char *hex)
+{
+    unsigned value;
+    for (; sscanf(hex, "%2x", &value) == 1; hex += 2)
+        gantry_take((uint8_t)value);
+}
+
+static void run(double seconds)
+{
+    for (long i = 0; i < (long)(seconds / PLANT_DT + 0.5); i++) {
+        plant_step(&plant);
+        gantry_tick();
+    }
+}
+
+static bool obey(char *line)
+{
+    line[strcspn(line, "\n")] = '\0';
+    if (strncmp(line, "send ", 5) == 0)
+        send(line + 5);
+    else if (strncmp(line, "run ", 4) == 0)
+        run(strtod(line + 4, NULL));
+    else if (strcmp(line, "restart") == 0)
+        gantry_begin();
+    else
+        return control(&plant, line);
+    return true;
+}
+
+int main(int argc, char **argv)
+{
+    static char line[1 << 20];
+    double place[AXES] = {0.1, -0.1, 0.2};
+    for (int a = 0; a < AXES && a + 1 < argc; a++)
+        place[a] = strtod(argv[a + 1], NULL);
+    plant_begin(&plant, place);
+    gantry_begin();
+    while (fgets(line, sizeof line, stdin) != NULL && strcmp(line, "quit\n") != 0)
+        say("\"done\": %s", obey(line) ? "true" : "false");
+    return 0;
+}

@@ -1,0 +1,23 @@
+#include "chain.h"
+
+void chain_select(struct chain *chain, bool selected)
+{
+    for (int i = 0; i < CHIPS; i++) {
+        if (selected && !chain->selected)
+            chain->shift[i] = l6470_next(&chain->chips[i]);
+        else if (!selected && chain->selected)
+            l6470_take(&chain->chips[i], chain->shift[i]);
+    }
+    chain->selected = selected;
+}
+
+uint8_t chain_shift(struct chain *chain, uint8_t byte)
+{
+    if (!chain->selected)
+        return 0;
+    uint8_t out = chain->shift[CHIPS - 1];
+    for (int i = CHIPS - 1; i > 0; i--)
+        chain->shift[i] = chain->shift[i - 1];
+    chain->shift[0] = byte;
+    return out;
+}

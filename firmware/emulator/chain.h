@@ -1,0 +1,20 @@
+/* Drivers behind one another: their shift registers are one, as long as chip select is low. */
+#ifndef CHAIN_H
+#define CHAIN_H
+
+#include "l6470.h"
+
+#define CHIPS 4
+
+struct chain {
+    struct l6470 chips[CHIPS]; /* the first is nearest to the controller's output */
+    uint8_t shift[CHIPS];
+    bool selected;
+};
+
+void chain_select(struct chain *chain, bool selected);
+
+/* A byte in at the first, one out at the last. */
+uint8_t chain_shift(struct chain *chain, uint8_t byte);
+
+#endif

@@ -1,0 +1,61 @@
+#include "control.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "say.h"
+
+static int which(const char *word, const char *const *words, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (strcmp(word, words[i]) == 0)
+            return i;
+    return -1;
+}
+
+static int motor_of(const char *word)
+{
+    static const char *const motors[MOTORS] = {"x", "y1", "y2", "alpha"};
+    return which(word, motors, MOTORS);
+}
+
+static bool on_motor(struct plant *plant, const char *order, int motor, const char *how)
+{
+    static const char *const stuck[] = {"works", "open", "closed"}, *const heats[] = {"cool", "warm", "hot"};
+    struct l6470 *chip = &plant->chain.chips[motor];
+    int choice;
+    if (strcmp(order, "push") == 0 && fabs(strtod(how, NULL)) <= 10000)
+        plant_push(plant, (enum motor)motor, strtod(how, NULL));
+    else if (strcmp(order, "switch") == 0 && (choice = which(how, stuck, 3)) >= 0)
+        plant->carriages[motor].stuck = (enum stuck)choice;
+    else if (strcmp(order, "heat") == 0 && (choice = which(how, heats, 3)) >= 0)
+        l6470_heat(chip, (enum l6470_heat)choice);
+    else if (strcmp(order, "miscount") == 0 && fabs(strtod(how, NULL)) <= 10000)
+        chip->zero += round(strtod(how, NULL) * 128);
+    else if (strcmp(order, "tear") == 0)
+        plant->carriages[motor].torn = true;
+    else if (strcmp(order, "short") == 0)
+        l6470_short(chip);
+    else
+        return false;
+    return true;
+}
+
+bool control(struct plant *plant, const char *line)
+{
+    char order[16] = "", first[16] = "", second[16] = "";
+    int words = sscanf(line, "%15s %15s %15s", order, first, second);
+    if (words == 1 && strcmp(order, "pose") == 0) {
+        say_pose(plant);
+    } else if (words == 1 && strcmp(order, "extremes") == 0) {
+        say_extremes(plant);
+        memset(plant->extremes, 0, sizeof plant->extremes);
+    } else if (words == 2 && strcmp(order, "motors") == 0 && (!strcmp(first, "on") || !strcmp(first, "off"))) {
+        plant_motor_power(plant, strcmp(first, "on") == 0);
+    } else {
+        return words >= 2 && motor_of(first) >= 0 && on_motor(plant, order, motor_of(first), second);
+    }
+    return true;
+}

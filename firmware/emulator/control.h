@@ -1,0 +1,21 @@
+/* Orders to the rig's model, a line each: faults, and what one asks it. */
+#ifndef CONTROL_H
+#define CONTROL_H
+
+#include "plant.h"
+
+#define CONTROL_HELP \
+    "  pose                                the true pose\n" \
+    "  extremes                            highest speed and ramp of the drivers, and their way, since the last time\n" \
+    "  push MOTOR STEPS                    move a carriage by full steps; four lose the motor's hold\n" \
+    "  switch MOTOR works|open|closed      a limit switch that is stuck\n" \
+    "  heat MOTOR cool|warm|hot            a driver that warns, or shuts down\n" \
+    "  miscount MOTOR STEPS                a driver whose counter is off by full steps\n" \
+    "  tear MOTOR                          a belt that is off: the motor turns and nothing moves\n" \
+    "  short MOTOR                         a driver that sees too much current\n" \
+    "  motors on|off                       the motors' supply\n"
+
+/* Whether the order was one of these and done. */
+bool control(struct plant *plant, const char *line);
+
+#endif

@@ -1,0 +1,184 @@
+#include "plant.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "say.h"
+
+#define MICRO 128.0
+#define RESONANCE (2 * M_PI * 60) /* rad/s, of a NEMA 17 with its load */
+#define DAMPING (2 * 0.3 * RESONANCE)
+#define PULL (RESONANCE * RESONANCE * 2 / M_PI) /* full steps/s2 at one full step of lag, the most there is */
+#define FRICTION 20000.0                        /* full steps/s2 without current, 6 m/s2 */
+
+static const struct axis_constants constants[AXES] = AXIS_ROWS;
+
+/* In m or degrees: from step 0 to where the switch at home closes, from the highest position to where the other one
+ * closes, how much earlier that one opens, and how far behind them the frame ends. */
+static const struct {
+    double closes, beyond, hysteresis, frame;
+} ends[AXES] = {{0.001, 0.005, 0.001, 0.02}, {0.001, 0.005, 0.001, 0.02}, {1, 1.5, 1, 8}};
+
+static enum axis axis_of(enum motor motor)
+{
+    return motor == MOTOR_X ? AXIS_X : motor == MOTOR_ALPHA ? AXIS_YAW : AXIS_Y;
+}
+
+double plant_unit(enum motor motor)
+{
+    return (double)constants[axis_of(motor)].micro_q32 / 4294967296.0 * MICRO / 1e6;
+}
+
+/* m or degrees of an axis as full steps. */
+static double steps_of(enum motor motor, double length)
+{
+    return length * (axis_of(motor) == AXIS_YAW ? M_PI / 180 : 1) / plant_unit(motor);
+}
+
+static double length_of(enum motor motor)
+{
+    const struct axis_constants *c = &constants[axis_of(motor)];
+    return c->high * 1e-6 / plant_unit(motor) + c->offset / MICRO;
+}
+
+/* The field goes in microsteps. */
+static double field_of(const struct plant *plant, enum motor motor)
+{
+    return floor(plant->chain.chips[motor].field) / MICRO + plant->carriages[motor].origin;
+}
+
+static void see_switch(struct plant *plant, enum motor motor)
+{
+    struct carriage *c = &plant->carriages[motor];
+    enum axis axis = axis_of(motor);
+    double high = length_of(motor) + steps_of(motor, ends[axis].beyond);
+    double back = c->closed ? 1 : 0;
+    bool low_end = c->at < steps_of(motor, ends[axis].closes) * (back - 1);
+    bool high_end = c->at > high - back * steps_of(motor, ends[axis].hysteresis);
+    c->closed = low_end || high_end;
+    bool seen = c->stuck == SWITCH_WORKS ? c->closed : c->stuck == SWITCH_CLOSED;
+    if (seen != plant->chain.chips[motor].switch_closed)
+        say_event(plant->time, seen ? "closed" : "open", motor, 0);
+    l6470_switch(&plant->chain.chips[motor], seen);
+}
+
+static void hit_frame(struct plant *plant, enum motor motor)
+{
+    struct carriage *c = &plant->carriages[motor];
+    double room = steps_of(motor, ends[axis_of(motor)].frame), at = fmin(fmax(c->at, -room), length_of(motor) + room);
+    if (at == c->at) {
+        c->crashed = false;
+        return;
+    }
+    if (!c->crashed) {
+        plant->crashes++;
+        say_event(plant->time, "crash", motor, fabs(c->speed) * plant_unit(motor));
+    }
+    c->crashed = true;
+    c->at = at;
+    c->speed = 0;
+}
+
+static void note_slip(struct plant *plant, enum motor motor)
+{
+    struct carriage *c = &plant->carriages[motor];
+    long slips = lround((field_of(plant, motor) - c->at) / 4);
+    if (slips == c->slips)
+        return;
+    if (!plant->chain.chips[motor].bridges_off) {
+        say_event(plant->time, "slip", motor, (double)(slips - c->slips));
+        l6470_loss(&plant->chain.chips[motor]);
+    }
+    c->slips = slips;
+}
+
+static void move_rotor(struct plant *plant, enum motor motor, double field_speed)
+{
+    struct carriage *c = &plant->carriages[motor];
+    if (plant->chain.chips[motor].bridges_off) {
+        double loss = FRICTION * PLANT_DT;
+        c->speed = fabs(c->speed) < loss ? 0 : c->speed - copysign(loss, c->speed);
+    } else {
+        double lag = field_of(plant, motor) - c->at;
+        c->speed += (PULL * sin(M_PI_2 * lag) - DAMPING * (c->speed - field_speed)) * PLANT_DT;
+    }
+    c->at += c->speed * PLANT_DT;
+}
+
+static void note_extremes(struct plant *plant, enum motor motor, double before, double field)
+{
+    struct extremes *e = &plant->extremes[motor];
+    const struct l6470 *chip = &plant->chain.chips[motor];
+    double unit = plant_unit(motor), change = fabs(chip->speed - before) / MICRO * unit / PLANT_DT;
+    bool abrupt = chip->motion == L6470_STANDS || chip->motion == L6470_RELEASES;
+    e->speed = fmax(e->speed, fabs(chip->speed) / MICRO * unit);
+    e->ramp = abrupt ? e->ramp : fmax(e->ramp, change);
+    e->way += fabs(chip->field - field) / MICRO * unit;
+}
+
+static void step_motor(struct plant *plant, enum motor motor)
+{
+    struct l6470 *chip = &plant->chain.chips[motor];
+    double before = chip->speed, field = chip->field;
+    l6470_advance(chip, PLANT_DT);
+    note_extremes(plant, motor, before, field);
+    if (!plant->carriages[motor].torn) {
+        move_rotor(plant, motor, chip->speed / MICRO);
+        hit_frame(plant, motor);
+        note_slip(plant, motor);
+    }
+    see_switch(plant, motor);
+}
+
+void plant_step(struct plant *plant)
+{
+    for (int m = 0; m < MOTORS; m++)
+        step_motor(plant, (enum motor)m);
+    plant->time += PLANT_DT;
+}
+
+void plant_begin(struct plant *plant, const double *place)
+{
+    memset(plant, 0, sizeof *plant);
+    for (int m = 0; m < MOTORS; m++) {
+        struct carriage *c = &plant->carriages[m];
+        struct l6470 *chip = &plant->chain.chips[m];
+        chip->awake = true;
+        l6470_power(chip, true);
+        c->at = c->origin = place[axis_of(m)] / plant_unit(m) + constants[axis_of(m)].offset / MICRO;
+        see_switch(plant, m);
+    }
+}
+
+bool plant_moves(const struct plant *plant)
+{
+    for (int m = 0; m < MOTORS; m++)
+        if (plant->chain.chips[m].motion != L6470_STANDS)
+            return true;
+    return false;
+}
+
+struct pose plant_pose(const struct plant *plant)
+{
+    struct pose pose = {.skew = 0};
+    for (int m = 0; m < MOTORS; m++) {
+        const struct carriage *c = &plant->carriages[m];
+        enum axis axis = axis_of(m);
+        double half = axis == AXIS_Y ? 0.5 : 1, unit = plant_unit(m);
+        pose.place[axis] += half * (c->at - constants[axis].offset / MICRO) * unit;
+        pose.speed[axis] += half * c->speed * unit;
+    }
+    pose.skew = (plant->carriages[MOTOR_Y1].at - plant->carriages[MOTOR_Y2].at) * plant_unit(MOTOR_Y1);
+    return pose;
+}
+
+void plant_push(struct plant *plant, enum motor motor, double steps)
+{
+    plant->carriages[motor].at += steps;
+}
+
+void plant_motor_power(struct plant *plant, bool on)
+{
+    for (int m = 0; m < MOTORS; m++)
+        l6470_power(&plant->chain.chips[m], on);
+}

@@ -1,0 +1,104 @@
+/* The ATmega328P of an Arduino UNO R3: pins, clock, watchdog, and the loop. Pins are listed in firmware/README.md. */
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+#include <avr/wdt.h>
+#include <util/atomic.h>
+#include <util/delay.h>
+
+#include "../gantry.h"
+#include "../port.h"
+#include "../protocol.h"
+#include "uart.h"
+
+#define SELECT PB2       /* D10, low while a frame lasts */
+#define DATA_OUT PB3     /* D11 */
+#define DATA_CLOCK PB5   /* D13 */
+#define DRIVERS_ALIVE PD4 /* D4, low resets the drivers */
+#define TICKS_A_MS (F_CPU / 64 / 1000)
+
+static volatile uint32_t milliseconds;
+
+ISR(TIMER0_COMPA_vect)
+{
+    milliseconds++;
+}
+
+uint32_t port_now(void)
+{
+    uint32_t now;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { now = milliseconds; }
+    return now;
+}
+
+/* The first byte sent goes through to the last driver. */
+void port_exchange(uint8_t *bytes)
+{
+    PORTB &= (uint8_t)~(1 << SELECT);
+    for (uint8_t m = MOTORS; m-- > 0;) {
+        SPDR = bytes[m];
+        while (!(SPSR & (1 << SPIF))) {
+        }
+        bytes[m] = SPDR;
+    }
+    PORTB |= 1 << SELECT;
+    _delay_us(1); /* the drivers need 800 ns */
+}
+
+void port_reset_drivers(void)
+{
+    PORTD &= (uint8_t)~(1 << DRIVERS_ALIVE);
+    _delay_ms(1);
+    PORTD |= 1 << DRIVERS_ALIVE;
+    _delay_ms(2);
+}
+
+/* The pull-up comes before the output, so that the drivers notice nothing of a short reset. */
+static void start_pins(void)
+{
+    PORTD |= 1 << DRIVERS_ALIVE;
+    DDRD |= 1 << DRIVERS_ALIVE;
+    PORTB |= 1 << SELECT;
+    DDRB |= (1 << SELECT) | (1 << DATA_OUT) | (1 << DATA_CLOCK);
+    SPCR = (1 << SPE) | (1 << MSTR) | (1 << CPOL) | (1 << CPHA); /* 4 MHz, mode 3 */
+}
+
+static void start_clock(void)
+{
+    TCCR0A = 1 << WGM01;
+    TCCR0B = (1 << CS01) | (1 << CS00);
+    OCR0A = TICKS_A_MS - 1;
+    TIMSK0 = 1 << OCIE0A;
+}
+
+/* Until the next interrupt, a millisecond at most; one that comes just before is not slept over. */
+static void doze(void)
+{
+    cli();
+    if (!uart_has_byte()) {
+        sleep_enable();
+        sei();
+        sleep_cpu();
+        sleep_disable();
+    }
+    sei();
+}
+
+int main(void)
+{
+    MCUSR = 0;
+    wdt_enable(WDTO_120MS);
+    start_pins();
+    start_clock();
+    uart_start();
+    sei();
+    gantry_begin();
+    for (;;) {
+        wdt_reset();
+        uint8_t byte;
+        if (uart_read(&byte))
+            gantry_take(byte);
+        gantry_tick();
+        doze();
+    }
+}

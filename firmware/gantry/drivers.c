@@ -1,0 +1,121 @@
+#include "drivers.h"
+
+#include "port.h"
+#include "units.h"
+
+static const uint8_t axis_of[MOTORS] = {AXIS_X, AXIS_Y, AXIS_Y, AXIS_YAW};
+
+static uint32_t config_of(uint8_t motor)
+{
+    return motor == 0 ? DRIVER_CONFIG_FIRST : DRIVER_CONFIG_OTHERS;
+}
+
+static void exchange_arguments(uint32_t values[MOTORS], uint8_t bytes)
+{
+    uint8_t frame[MOTORS];
+    while (bytes-- > 0) {
+        for (uint8_t m = 0; m < MOTORS; m++)
+            frame[m] = (uint8_t)(values[m] >> (8 * bytes));
+        port_exchange(frame);
+        for (uint8_t m = 0; m < MOTORS; m++) {
+            values[m] &= ~((uint32_t)0xFF << (8 * bytes));
+            values[m] |= (uint32_t)frame[m] << (8 * bytes);
+        }
+    }
+}
+
+void drivers_send(const struct order orders[MOTORS], uint8_t bytes)
+{
+    uint8_t frame[MOTORS];
+    uint32_t values[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        frame[m] = orders[m].op;
+        values[m] = orders[m].op == OP_NOP ? 0 : orders[m].argument;
+    }
+    port_exchange(frame);
+    exchange_arguments(values, bytes);
+}
+
+static void ask(uint8_t op, uint8_t bytes, uint32_t values[MOTORS])
+{
+    uint8_t frame[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        frame[m] = op;
+        values[m] = 0;
+    }
+    port_exchange(frame);
+    exchange_arguments(values, bytes);
+}
+
+void drivers_get(uint8_t reg, uint8_t bytes, uint32_t values[MOTORS])
+{
+    ask(OP_GET | reg, bytes, values);
+}
+
+void drivers_set(uint8_t reg, uint8_t bytes, const uint32_t values[MOTORS])
+{
+    struct order orders[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        orders[m] = (struct order){OP_SET | reg, values[m]};
+    drivers_send(orders, bytes);
+}
+
+void drivers_set_all(uint8_t reg, uint8_t bytes, uint32_t value)
+{
+    const uint32_t values[MOTORS] = {value, value, value, value};
+    drivers_set(reg, bytes, values);
+}
+
+void drivers_status(uint16_t status[MOTORS], bool clear)
+{
+    uint32_t values[MOTORS];
+    ask(clear ? OP_GET_STATUS : OP_GET | REG_STATUS, 2, values);
+    for (uint8_t m = 0; m < MOTORS; m++)
+        status[m] = (uint16_t)values[m];
+}
+
+void drivers_position(int32_t position[MOTORS])
+{
+    uint32_t values[MOTORS];
+    drivers_get(REG_ABS_POS, 3, values);
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        int32_t low = (int32_t)(values[m] & 0x3FFFFFUL);
+        position[m] = low < 0x200000L ? low : low - 0x400000L;
+    }
+}
+
+static void configure_ramps(void)
+{
+    uint32_t ramps[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        ramps[m] = axes[axis_of[m]].ramp_register;
+    drivers_set(REG_ACC, 2, ramps);
+    drivers_set(REG_DEC, 2, ramps);
+}
+
+void drivers_configure(void)
+{
+    uint32_t configs[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        configs[m] = config_of(m);
+    drivers_set(REG_CONFIG, 2, configs);
+    drivers_set_all(REG_STEP_MODE, 1, STEP_MODE_REGISTER);
+    drivers_set_all(REG_KVAL_HOLD, 1, DRIVER_KVAL_HOLD);
+    drivers_set_all(REG_KVAL_RUN, 1, DRIVER_KVAL_RUN);
+    drivers_set_all(REG_KVAL_ACC, 1, DRIVER_KVAL_RAMP);
+    drivers_set_all(REG_KVAL_DEC, 1, DRIVER_KVAL_RAMP);
+    drivers_set_all(REG_OCD_TH, 1, DRIVER_OCD_TH);
+    drivers_set_all(REG_STALL_TH, 1, DRIVER_STALL_TH);
+    configure_ramps();
+}
+
+bool drivers_remember(void)
+{
+    uint32_t configs[MOTORS], marks[MOTORS];
+    drivers_get(REG_CONFIG, 2, configs);
+    drivers_get(REG_MARK, 3, marks);
+    for (uint8_t m = 0; m < MOTORS; m++)
+        if (configs[m] != config_of(m) || marks[m] != DRIVER_MARK)
+            return false;
+    return true;
+}

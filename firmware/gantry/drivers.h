@@ -1,0 +1,52 @@
+/* The chain of four L6470 (ST, DocID 16737): registers, commands, flags. */
+#ifndef DRIVERS_H
+#define DRIVERS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+enum { /* registers */
+    REG_ABS_POS = 0x01, REG_MARK = 0x03, REG_ACC = 0x05, REG_DEC = 0x06, REG_MAX_SPEED = 0x07, REG_KVAL_HOLD = 0x09,
+    REG_KVAL_RUN = 0x0A, REG_KVAL_ACC = 0x0B, REG_KVAL_DEC = 0x0C, REG_OCD_TH = 0x13, REG_STALL_TH = 0x14,
+    REG_STEP_MODE = 0x16, REG_CONFIG = 0x18, REG_STATUS = 0x19
+};
+
+enum { /* commands; those that move forward are one more; GO_UNTIL copies the position to MARK, RELEASE zeroes it */
+    OP_NOP = 0x00, OP_SET = 0x00, OP_GET = 0x20, OP_MOVE = 0x40, OP_RUN = 0x50, OP_GOTO = 0x60, OP_GO_UNTIL = 0x8A,
+    OP_RELEASE = 0x92, OP_SOFT_STOP = 0xB0, OP_HARD_STOP = 0xB8, OP_GET_STATUS = 0xD0, OP_RESET_POS = 0xD8, FORWARD = 0x01
+};
+
+enum { /* flags of STATUS */
+    FLAG_SW_CLOSED = 1 << 2, FLAG_SW_EVENT = 1 << 3, FLAG_MOTION = 3 << 5, FLAG_NOT_PERFORMED = 1 << 7,
+    FLAG_WRONG = 1 << 8, FLAG_BUSY_NOT = 1 << 1, FLAG_UVLO_NOT = 1 << 9, FLAG_WARM_NOT = 1 << 10,
+    FLAG_HOT_NOT = 1 << 11, FLAG_OCD_NOT = 1 << 12, FLAG_LOSS_A_NOT = 1 << 13, FLAG_LOSS_B_NOT = 1 << 14
+};
+
+struct order {
+    uint8_t op; /* OP_NOP leaves a driver as it is */
+    uint32_t argument;
+};
+
+/* Give each driver its order within one frame, and then the bytes of its argument. */
+void drivers_send(const struct order orders[MOTORS], uint8_t bytes);
+
+/* A register of each driver. */
+void drivers_get(uint8_t reg, uint8_t bytes, uint32_t values[MOTORS]);
+void drivers_set(uint8_t reg, uint8_t bytes, const uint32_t values[MOTORS]);
+void drivers_set_all(uint8_t reg, uint8_t bytes, uint32_t value);
+
+/* STATUS of each driver; clear takes back flags whose reason is over. */
+void drivers_status(uint16_t status[MOTORS], bool clear);
+
+/* ABS_POS of each driver in microsteps, with its sign. */
+void drivers_position(int32_t position[MOTORS]);
+
+/* Write everything that differs from a driver's reset state; they must stand. */
+void drivers_configure(void);
+
+/* Whether all drivers are configured, and bear the mark of a valid position. */
+bool drivers_remember(void);
+
+#endif

@@ -1,0 +1,118 @@
+#include "gantry.h"
+
+#include <string.h>
+
+#include "homing.h"
+#include "line.h"
+#include "motion.h"
+#include "port.h"
+#include "rig.h"
+
+static struct line line;
+static uint32_t ticked;
+
+static void answer_error(uint8_t error)
+{
+    char text[] = "$ERROR:0";
+    text[sizeof text - 2] = (char)('0' + error);
+    port_answer(text);
+}
+
+static uint8_t status(void)
+{
+    if (rig.trouble != 0)
+        return rig.trouble;
+    if (rig.mode == MODE_HOMING)
+        return STATUS_HOMING;
+    if (rig.mode == MODE_GOTO_SOON || rig.mode == MODE_GOTO || rig_moves())
+        return STATUS_MOVING;
+    return rig.calibrated ? STATUS_IDLE : STATUS_NOT_CALIBRATED;
+}
+
+static void answer_status(void)
+{
+    char text[] = "$0";
+    text[1] = (char)('0' + status());
+    port_answer(text);
+}
+
+static uint8_t answer_position(void)
+{
+    char text[3 * 12 + 2], *at = text;
+    if (!rig.calibrated)
+        return ERROR_UNCALIBRATED;
+    rig_look();
+    for (uint8_t a = 0; a < AXES; a++) {
+        *at++ = a == 0 ? '$' : ',';
+        at = line_number(at, rig_position(a));
+    }
+    port_answer(text);
+    return 0;
+}
+
+static uint8_t calibrate(void)
+{
+    if (rig.mode == MODE_HOMING)
+        return ERROR_HOMING;
+    homing_begin();
+    return 0;
+}
+
+static void stop(void)
+{
+    rig_stop(0);
+    rig_acknowledge();
+}
+
+static uint8_t obey(const struct request *request)
+{
+    switch (request->command) {
+    case COMMAND_GOTO:
+        return motion_goto(request->numbers);
+    case COMMAND_RUN:
+        return motion_run(request->numbers, port_now());
+    case COMMAND_STOP:
+        stop();
+        return 0;
+    case COMMAND_CALIBRATE:
+        return calibrate();
+    case COMMAND_POSITION:
+        return answer_position();
+    default:
+        answer_status();
+        return 0;
+    }
+}
+
+void gantry_take(uint8_t byte)
+{
+    struct request request;
+    enum line_state state = line_take(&line, byte);
+    if (state == LINE_OPEN || (state == LINE_DONE && line.text[0] == '\0'))
+        return;
+    uint8_t error = state == LINE_DAMAGED ? ERROR_DAMAGED : line_parse(line.text, &request);
+    if (error == 0)
+        error = obey(&request);
+    if (error != 0)
+        answer_error(error);
+}
+
+void gantry_begin(void)
+{
+    memset(&line, 0, sizeof line);
+    memset(&rig, 0, sizeof rig);
+    ticked = port_now();
+    homing_wake();
+}
+
+void gantry_tick(void)
+{
+    uint32_t now = port_now();
+    if (now - ticked < TICK_MS)
+        return;
+    ticked = now;
+    rig_look();
+    rig_judge();
+    motion_tick(now);
+    homing_tick();
+}

@@ -1,0 +1,182 @@
+#include "homing.h"
+
+#include <stdlib.h>
+
+#include "port.h"
+#include "rig.h"
+#include "units.h"
+
+/* SETTLE: brake. FORWARD, BACK: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at
+ * home. RELEASE: go until it opens. */
+enum phase { SETTLE, LEAVE_FORWARD, LEAVE_BACK, APPROACH, RELEASE };
+
+static int32_t travelled(enum motor motor)
+{
+    uint32_t way = ((uint32_t)rig.position[motor] - (uint32_t)rig.begin[motor]) & 0x3FFFFFUL;
+    return way < 0x200000UL ? (int32_t)way : (int32_t)(0x400000UL - way);
+}
+
+static bool pressed(enum motor motor)
+{
+    return (rig.status[motor] & FLAG_SW_CLOSED) != 0;
+}
+
+/* Whether a switch of the motor's axis is closed: y1 and y2 leave together. */
+static bool axis_pressed(enum motor motor)
+{
+    for (uint8_t m = 0; m < MOTORS; m++)
+        if (rig_axis(m) == rig_axis(motor) && pressed(m))
+            return true;
+    return false;
+}
+
+static void enter(enum phase phase, const struct order *orders)
+{
+    rig.phase = (uint8_t)phase;
+    for (uint8_t m = 0; m < MOTORS; m++)
+        rig.begin[m] = rig.position[m];
+    drivers_send(orders, orders[0].op == OP_RELEASE + FORWARD ? 0 : 3);
+}
+
+static void set_top_speeds(bool homing)
+{
+    uint32_t tops[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        tops[m] = homing ? axes[rig_axis(m)].homing_top_register : axes[rig_axis(m)].top_register;
+    drivers_set(REG_MAX_SPEED, 2, tops);
+}
+
+static void leave(enum phase phase, uint8_t op, int32_t times)
+{
+    struct order orders[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        uint32_t way = (uint32_t)(axes[rig_axis(m)].back_off * times);
+        orders[m] = axis_pressed(m) ? (struct order){op, way} : (struct order){OP_NOP, 0};
+    }
+    enter(phase, orders);
+}
+
+static void approach(void)
+{
+    struct order orders[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        orders[m] = (struct order){OP_GO_UNTIL, (uint32_t)axes[rig_axis(m)].homing_speed};
+    enter(APPROACH, orders);
+}
+
+/* The counters begin at 0 here as well, so that the way to where the switches open is seen. */
+static void release(void)
+{
+    struct order orders[MOTORS], zero[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        zero[m] = (struct order){OP_RESET_POS, 0};
+        orders[m] = (struct order){OP_RELEASE + FORWARD, 0};
+    }
+    drivers_send(zero, 0);
+    rig_look();
+    enter(RELEASE, orders);
+}
+
+static void set_up(void)
+{
+    port_reset_drivers();
+    drivers_configure();
+    rig_acknowledge();
+    set_top_speeds(true);
+}
+
+static void fail(void)
+{
+    rig_trouble(STATUS_FAULT, (1 << AXES) - 1);
+}
+
+static bool any_pressed(void)
+{
+    return axis_pressed(MOTOR_X) || axis_pressed(MOTOR_Y1) || axis_pressed(MOTOR_ALPHA);
+}
+
+static bool all_pressed(void)
+{
+    return pressed(MOTOR_X) && pressed(MOTOR_Y1) && pressed(MOTOR_Y2) && pressed(MOTOR_ALPHA);
+}
+
+/* Farther than the axis is long, or than a switch takes to open: the switch is stuck. Or y1 and y2 part. */
+static bool too_far(void)
+{
+    if (rig.phase != APPROACH && rig.phase != RELEASE)
+        return false;
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        enum axis axis = rig_axis(m);
+        int32_t length = units_steps(axis, axes[axis].high) + 4 * axes[axis].back_off;
+        if (travelled(m) > (rig.phase == APPROACH ? length : 2 * axes[axis].back_off))
+            return true;
+    }
+    int32_t apart = travelled(MOTOR_Y1) - travelled(MOTOR_Y2);
+    return rig.phase == APPROACH && labs(apart) > axes[AXIS_Y].skew;
+}
+
+static void finish(void)
+{
+    if (any_pressed()) {
+        fail();
+        return;
+    }
+    set_top_speeds(false);
+    rig_acknowledge();
+    drivers_set_all(REG_MARK, 3, DRIVER_MARK);
+    rig.calibrated = true;
+    rig.mode = MODE_REST;
+    for (uint8_t a = 0; a < AXES; a++)
+        rig.blocked[a] = rig.going[a] = 0;
+}
+
+/* All motors stand: go on with the next phase. */
+static void next_phase(void)
+{
+    if (rig.phase == SETTLE)
+        set_up();
+    if (rig.phase == SETTLE && any_pressed())
+        leave(LEAVE_FORWARD, OP_MOVE + FORWARD, 1);
+    else if (rig.phase == LEAVE_FORWARD && any_pressed())
+        leave(LEAVE_BACK, OP_MOVE, 2);
+    else if (rig.phase < APPROACH)
+        any_pressed() ? fail() : approach();
+    else if (rig.phase == APPROACH)
+        all_pressed() ? release() : fail();
+    else
+        finish();
+}
+
+void homing_begin(void)
+{
+    rig_acknowledge();
+    rig_stop(0);
+    rig_forget();
+    rig.mode = MODE_HOMING;
+    rig.phase = SETTLE;
+}
+
+void homing_tick(void)
+{
+    if (rig.mode != MODE_HOMING)
+        return;
+    if (too_far())
+        fail();
+    else if (!rig_moves())
+        next_phase();
+}
+
+void homing_wake(void)
+{
+    rig_look();
+    int32_t skew = rig.position[MOTOR_Y1] - rig.position[MOTOR_Y2];
+    rig.calibrated = drivers_remember() && labs(skew) <= axes[AXIS_Y].square;
+    if (rig.calibrated) {
+        rig_stop(0);
+        return;
+    }
+    port_reset_drivers();
+    drivers_configure();
+    set_top_speeds(false);
+    rig_acknowledge();
+}

@@ -1,0 +1,14 @@
+/* CALIBRATE: find each axis' switch, and call the place where it opens step 0. */
+#ifndef HOMING_H
+#define HOMING_H
+
+/* Begin; whatever moves brakes first, and the position is void until the end. */
+void homing_begin(void);
+
+/* One step. */
+void homing_tick(void);
+
+/* Take up a position that the drivers kept over a reset of the controller, or set them up anew. */
+void homing_wake(void);
+
+#endif

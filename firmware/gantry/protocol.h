@@ -1,0 +1,56 @@
+/* Made of firmware/protocol.yml by scripts/make-protocol: change it there.
+ * micro is 1e-6 m, or 1e-6 rad for the yaw; step is a microstep of the drivers. */
+#ifndef PROTOCOL_H
+#define PROTOCOL_H
+
+#include <stdint.h>
+
+#define BAUD 115200UL
+#define LINE_LONGEST 64
+#define WATCHDOG_MS 500
+#define TICK_MS 2
+#define MICROSTEPS 128
+#define STEP_MODE_REGISTER 7
+
+enum command { COMMAND_GOTO, COMMAND_RUN, COMMAND_STOP, COMMAND_CALIBRATE, COMMAND_POSITION, COMMAND_STATUS, COMMANDS };
+#define COMMAND_ROWS {{"GOTO", 3}, {"RUN", 3}, {"STOP", 0}, {"CALIBRATE", 0}, {"POSITION", 0}, {"STATUS", 0}}
+
+enum status { STATUS_IDLE = 0, STATUS_MOVING = 1, STATUS_HOMING = 2, STATUS_LIMIT = 3, STATUS_STALL = 4, STATUS_HOT = 5, STATUS_NOT_CALIBRATED = 6, STATUS_WATCHDOG = 7, STATUS_FAULT = 8 };
+enum error { ERROR_UNKNOWN = 1, ERROR_COUNT = 2, ERROR_NUMBER = 3, ERROR_BOUNDS = 4, ERROR_DAMAGED = 5, ERROR_UNCALIBRATED = 6, ERROR_HOMING = 7, ERROR_TROUBLE = 8, ERROR_BLOCKED = 9 };
+
+enum motor { MOTOR_X, MOTOR_Y1, MOTOR_Y2, MOTOR_ALPHA, MOTORS };
+enum axis { AXIS_X, AXIS_Y, AXIS_YAW, AXES };
+#define DRIVER_CONFIG_FIRST 0x2E8B
+#define DRIVER_CONFIG_OTHERS 0x2E8D
+#define DRIVER_KVAL_HOLD 0x20
+#define DRIVER_KVAL_RUN 0x3C
+#define DRIVER_KVAL_RAMP 0x3C
+#define DRIVER_OCD_TH 0x8
+#define DRIVER_STALL_TH 0x40
+#define DRIVER_MARK 0xD0D0
+
+struct axis_constants {
+    int64_t steps_q32; /* microsteps per micro, times 2^32 */
+    int64_t micro_q32; /* micro per microstep, times 2^32 */
+    int64_t speed_q32; /* units of SPEED per micro/s, times 2^32 */
+    int32_t offset; /* microsteps at 0 */
+    int32_t low; /* micro */
+    int32_t high; /* micro */
+    int32_t fastest; /* micro/s */
+    uint16_t edge; /* twice the braking before an edge, micro/s2 / 10^4 */
+    uint16_t top_register; /* MAX_SPEED */
+    uint16_t ramp_register; /* ACC and DEC */
+    int32_t homing_speed; /* units of SPEED */
+    uint16_t homing_top_register; /* MAX_SPEED while homing */
+    int32_t back_off; /* microsteps */
+    int32_t skew; /* microsteps */
+    int32_t square; /* microsteps */
+};
+
+#define AXIS_ROWS { \
+    {1825189302LL, 10106756627LL, 956924849LL, 382464L, -900000L, 950000L, 1000000L, 90L, 217L, 114L, 22280L, 22L, 1275L, 4250L, 425L}, \
+    {1825189302LL, 10106756627LL, 956924849LL, 297472L, -700000L, 700000L, 1000000L, 90L, 217L, 114L, 22280L, 22L, 1275L, 4250L, 425L}, \
+    {17324278LL, 1064791485521LL, 9082911LL, 10624L, -2633860L, 2967059L, 1000000L, 160L, 2L, 2L, 740L, 1L, 282L, 282L, 282L} \
+}
+
+#endif

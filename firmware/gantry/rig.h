@@ -1,0 +1,60 @@
+/* The rig as the firmware knows it: what it was told, what the drivers say, what went wrong. */
+#ifndef RIG_H
+#define RIG_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "drivers.h"
+#include "protocol.h"
+
+enum mode { MODE_REST, MODE_RUN, MODE_GOTO_SOON, MODE_GOTO, MODE_HOMING };
+
+struct rig {
+    enum mode mode;
+    uint8_t trouble; /* the status that ended a motion, until it is acknowledged; 0 for none */
+    bool calibrated;
+    uint32_t heard; /* ms, when the last RUN came */
+    uint16_t status[MOTORS];
+    int32_t position[MOTORS];
+    bool touched[MOTORS];   /* the switch closed, and has been dealt with */
+    int32_t want[AXES];     /* micro/s, of the last RUN */
+    int32_t told[AXES];     /* units of SPEED, of the last order */
+    int32_t goal[AXES];     /* steps */
+    int8_t going[AXES];     /* the direction of the last order: -1, 0 or 1 */
+    int8_t blocked[AXES];   /* the direction in which a switch is closed, or 0 */
+    uint8_t phase;          /* of homing */
+    int32_t begin[MOTORS];  /* position at the begin of homing's phase */
+};
+
+extern struct rig rig;
+
+/* The first motor of an axis, and the axis of a motor. */
+enum motor rig_motor(enum axis axis);
+enum axis rig_axis(enum motor motor);
+
+/* Read STATUS and ABS_POS of all drivers. */
+void rig_look(void);
+
+/* Whether any motor turns. */
+bool rig_moves(void);
+
+/* Measured position of an axis, micro. */
+int32_t rig_position(enum axis axis);
+
+/* Brake all axes; those in the mask (1 << axis) stop at once. */
+void rig_stop(uint8_t hard);
+
+/* The position is void from now on, also for whoever starts after a reset. */
+void rig_forget(void);
+
+/* End the motion with a status, as rig_stop does. */
+void rig_trouble(uint8_t status, uint8_t hard);
+
+/* Take back flags whose reason is over, and the trouble. */
+void rig_acknowledge(void);
+
+/* One step of the supervision: what the drivers say, and what follows from it. */
+void rig_judge(void);
+
+#endif

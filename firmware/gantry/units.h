@@ -1,0 +1,25 @@
+/* Conversions of Table 4.2, in integers, so that the tests on a host and the ATmega count alike. */
+#ifndef UNITS_H
+#define UNITS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+extern const struct axis_constants axes[AXES];
+
+/* Micro to microsteps from home, y = c x + offset, and back. */
+int32_t units_steps(enum axis axis, int32_t micro);
+int32_t units_micro(enum axis axis, int32_t steps);
+
+/* Micro/s to units of the drivers' SPEED, w = c v; the sign stays. */
+int32_t units_speed(enum axis axis, int32_t micro_s);
+
+/* Whether a position is within workspace and steps from home. */
+bool units_inside(enum axis axis, int32_t micro);
+
+/* The speed (micro/s, a multiple of 100) from which an axis stops within room (micro), 0 without room. */
+int32_t units_braking_speed(enum axis axis, int32_t room);
+
+#endif

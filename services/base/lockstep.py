@@ -1,0 +1,131 @@
+"""The clock of a service in lockstep: the time of the test goes on when the clock service says so, and no further.
+
+What a service hears comes inside the step message and nowhere else, and what it says goes back inside the answer, so
+that no lost or late datagram can change a result (``docs/lockstep.md``).
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.session import Session
+from services.base.announced import AnnouncedMemory, Screen
+from services.base.clock import Inbox
+from services.base.ear import Ear, Reply
+from services.base.observed import EPOCH, Observed
+from services.base.parts import STEP_DONE, cut
+
+__all__ = ["EPOCH", "LockstepClock"]
+
+_GOODBYES = 10
+
+
+class Order(NamedTuple):
+    """What the clock wants: go on to ``time``, knowing what was ``heard``; ``show`` the pictures that are new."""
+
+    number: int
+    time: int
+    show: bool
+    heard: list[Envelope]
+
+
+class LockstepClock:
+    """Test time as the clock service deals it out; ``name`` is the service's name in the test."""
+
+    relays = True
+
+    def __init__(self, session: Session, name: str, readers: int) -> None:
+        self._session, self._name = session, name
+        self._done = session.messages.type(STEP_DONE)
+        self._ear = Ear(session, name)
+        self._now = EPOCH - 1
+        self._number = -1
+        self._open = False
+        self._sent: list[bytes] = []
+        self._screen = Screen(readers)
+        self._observed = Observed()
+        self._next = 0
+
+    def now(self) -> int:
+        return self._now
+
+    def steps(self, period: int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+        """As ``Clock.steps``; messages are delivered in the order of their sample times."""
+        due = EPOCH
+        while (order := self._next_order(inbox, stopped)) is not None:
+            if inbox.observes:
+                self._observed.look(inbox, order.time, order.heard)
+            heard = deque(sorted(order.heard, key=lambda envelope: envelope.sample_time))
+            while due <= order.time:
+                while heard and heard[0].sample_time <= due:
+                    inbox.handle(heard.popleft())
+                if stopped():
+                    return
+                self._now = due
+                yield due
+                due += period
+            self._now = order.time
+            for envelope in heard:
+                inbox.handle(envelope)
+            if stopped() or (order.show and not self._screen.await_readers(stopped)):
+                return
+            self._answer(order.show)
+
+    def sent(self, frame: bytes) -> None:
+        """The service has sent this."""
+        self._sent.append(frame)
+
+    def expect(self, time: int) -> None:
+        """The test then goes on to this time in one step."""
+        self._next = time
+
+    def memory(self, name: str, size: int) -> SharedMemory:
+        """New shared memory whose pictures are announced once, when their readers wait for them."""
+        memory = AnnouncedMemory.create(name, size)
+        self._screen.memories.append(memory)
+        return memory
+
+    def close(self) -> None:
+        """The service ends: the step that it is in is answered, and its answer has arrived."""
+        if self._open:
+            self._open = False
+            self._ear.answer(self._reply(ended=True))
+            for _ in range(_GOODBYES):
+                if self._ear.is_acknowledged():
+                    break
+                self._ear.repeat()
+        self._ear.close()
+
+    def _next_order(self, inbox: Inbox, stopped: Callable[[], bool]) -> Order | None:
+        """The next step that is for this service; None when it is to stop."""
+        while not stopped():
+            step = self._ear.listen(inbox.observes, self._observed.overhear)
+            if step is not None:
+                self._number, self._open = step.number, True
+                return Order(step.number, step.time, step.show, [said.envelope for said in step.heard])
+        return None
+
+    def _answer(self, show: bool) -> None:
+        """A picture is announced behind the answer, so that all that its readers say stands behind that, too."""
+        self._open = False
+        self._ear.answer(self._reply(ended=False), on_the_bus=show)
+        if show:
+            self._screen.announce()
+
+    def _reply(self, ended: bool) -> Reply:
+        pieces = cut(self._sent)
+        self._sent = []
+        facts = {
+            "number": self._number,
+            "service": self._name,
+            "parts": len(pieces),
+            "memories": len(self._screen.memories),
+            "pictures": len(self._screen.new),
+            "sampled": self._screen.sampled,
+            "ended": ended,
+            "next": self._next,
+            "port": self._session.port,
+        }
+        return [self._done(part=part, frames=data, **facts) for part, data in enumerate(pieces)]

@@ -1,0 +1,225 @@
+"""The order of a step: the action layer advances, the environment senses, the application answers, evaluators look."""
+
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from dodo_dsl.opendlv.envelope import Envelope
+from services.base.lockstep import EPOCH
+from services.base.parts import Said, say
+from services.clock.answers import Answers
+from services.clock.exchange import Done, Order
+
+_SLICE = 0.05
+_AGAIN = 0.5
+SERVICE_PATIENCE = 60.0
+"""Wall time in s that a service of the test has for a step; none takes nearly as long."""
+
+
+class Unanswered(Exception):
+    """The application did not answer in time; one sentence."""
+
+
+class Stuck(Exception):
+    """A service of the test does not answer the clock; one sentence."""
+
+
+class TimedOut(Exception):
+    """The test time is over."""
+
+
+class Talk(Protocol):
+    """How orders get to the services, as Exchange has it."""
+
+    def ask(self, orders: Iterable[Order]) -> None: ...
+    def answer(self, service: str) -> Done | None: ...
+    def forget(self) -> None: ...
+    def pump(self, timeout: float, bus: bool = True) -> None: ...
+    def tell(self, said: Iterable[Said]) -> None: ...
+    def drain(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Roles:
+    """The services of a test: ``advance`` and ``sense`` go one after the other, ``judge`` and ``watch`` all at once."""
+
+    advance: tuple[str, ...]
+    sense: tuple[str, ...]
+    judge: tuple[str, ...]
+    watch: tuple[str, ...] = ()
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        return (*self.advance, *self.sense, *self.judge, *self.watch)
+
+
+@dataclass
+class Patience:
+    """Wall time in s that the application has for the first frame, and for each other one."""
+
+    first: float
+    others: float
+
+
+@dataclass
+class Stepper:
+    """Steps a test; ``period`` and ``timeout`` in us of test time."""
+
+    roles: Roles
+    period: int
+    timeout: int
+    patience: Patience
+    answers: Answers
+    talk: Talk
+    stopped: Callable[[], bool]
+    frames: int = 0
+    now: int = EPOCH
+    _backlog: dict[str, list[Said]] = field(default_factory=dict)
+    _ended: set[str] = field(default_factory=set)
+    _next: dict[str, int] = field(default_factory=dict)
+    _memories: int = 0
+    _first: list[Said] = field(default_factory=list)
+    spent: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    """Wall time in s by whom it was waited for."""
+
+    def __post_init__(self) -> None:
+        self._backlog = {name: [] for name in self.roles.all}
+
+    def meet(self) -> None:
+        """Find all services, before time begins; raises Stuck."""
+        self._memories = sum(done.memories for done in self._go(self.roles.all, EPOCH - 1))
+
+    def run(self, begin: Envelope) -> None:
+        """Until all evaluators have ended; raises Unanswered, Stuck and TimedOut."""
+        self._spread([say(begin)], "")
+        while not self.stopped():
+            shown = [
+                done
+                for name in (*self.roles.advance, *self.roles.sense)
+                for done in self._go((name,), self.now)
+                if done.pictures
+            ]
+            self.talk.drain()
+            self._see(shown) if shown or not self._memories else self._look()
+            if self._is_judged:
+                return
+            if self.now - EPOCH >= self.timeout:
+                raise TimedOut
+            self._spread([say(envelope) for envelope in self.answers.collect()], "")
+            self.now = self._following()
+
+    @property
+    def _is_judged(self) -> bool:
+        return set(self.roles.judge) <= self._ended
+
+    def _go(self, names: Sequence[str], until: int) -> list[Done]:
+        """All of them go on to a time."""
+        dones: list[Done] = []
+        for _ in self._going(names, until, dones):
+            self.talk.pump(_SLICE, bus=False)
+        return dones
+
+    def _going(self, names: Sequence[str], until: int, dones: list[Done]) -> Iterator[None]:
+        """As ``_go``, with something else to do in between; raises Stuck."""
+        wanted = [name for name in names if name not in self._ended]
+        began = time.monotonic()
+        self.talk.ask([Order(name, until, self._heard(name, until)) for name in wanted])
+        for name in wanted:
+            while (done := self.talk.answer(name)) is None:
+                if self.stopped():
+                    return
+                if time.monotonic() - began > SERVICE_PATIENCE:
+                    raise Stuck(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
+                yield
+            self._take(done)
+            dones.append(done)
+        self.spent[" and ".join(wanted)] += time.monotonic() - began
+
+    def _take(self, done: Done) -> None:
+        if not self.frames:
+            self._first.extend(done.sent)
+        self._spread(done.sent, done.service)
+        self._next[done.service] = done.next
+        if done.ended:
+            self._ended.add(done.service)
+
+    def _looking(self) -> Iterator[None]:
+        """The watchers look, and then the judges, as the last of these ends the test."""
+        yield from self._going(self.roles.watch, self.now, [])
+        yield from self._going(self.roles.judge, self.now, [])
+
+    def _look(self) -> None:
+        for _ in self._looking():
+            self.talk.pump(_SLICE)
+
+    def _heard(self, name: str, until: int) -> tuple[Said, ...]:
+        """What a service has not heard yet, up to the time that it goes on to."""
+        backlog = self._backlog[name]
+        self._backlog[name] = [said for said in backlog if until < said.envelope.sample_time <= self.now]
+        return tuple(said for said in backlog if not until < said.envelope.sample_time <= self.now)
+
+    def _spread(self, said: Sequence[Said], sender: str) -> None:
+        """What one said, all others will hear with their next step."""
+        for name, backlog in self._backlog.items():
+            if name != sender and name not in self._ended:
+                backlog.extend(said)
+
+    def _see(self, shown: Sequence[Done]) -> None:
+        """The application sees the new pictures, and answers, while watchers and judges look at the same step."""
+        self.frames += 1
+        began = time.monotonic()
+        patience = self.patience.first if self.frames == 1 else self.patience.others
+        self._show(shown, began, patience)
+        if any(done.ended for done in shown):  # the judges hear of its end when the last answer has come
+            self._await_answer(iter(()), began, patience)
+            self._spread([say(envelope) for envelope in self.answers.collect()], "")
+            self._look()
+        else:
+            self._await_answer(self._looking(), began, patience)
+
+    def _show(self, shown: Sequence[Done], began: float, patience: float) -> None:
+        """Readers are told of pictures as soon as they wait for them."""
+        again = began + _AGAIN
+        if not shown:
+            self.answers.open(self.now)
+        for camera in shown:
+            self.talk.ask([Order(camera.service, self.now, (), show=True)])
+            while self.talk.answer(camera.service) is None:
+                if self.stopped():
+                    return
+                if time.monotonic() - began > patience:
+                    self.talk.forget()
+                    raise Unanswered(self._sentence(patience, f"nobody waited for a picture of '{camera.service}'"))
+                self.talk.pump(_SLICE)
+                again = self._say_again(again)
+            self.answers.open(camera.sampled)
+
+    def _say_again(self, again: float) -> float:
+        """An application that starts late hears what was said before its first picture, as it would in real time."""
+        if self.frames > 1 or time.monotonic() < again:
+            return again
+        self.talk.tell(self._first)
+        return time.monotonic() + _AGAIN
+
+    def _await_answer(self, looking: Iterator[None], began: float, patience: float) -> None:
+        is_looking = True
+        while not self.stopped():
+            is_looking = is_looking and next(looking, self) is None
+            if self._is_judged or (self.answers.complete and not is_looking):
+                break
+            left = began + patience - time.monotonic()
+            if left <= 0 and not self.answers.complete:
+                missing = " and ".join(name.rpartition(".")[2] for name in self.answers.missing)
+                raise Unanswered(self._sentence(patience, f"{missing} missing"))
+            self.talk.pump(max(left, 0.0))
+        self.spent["the first answer" if self.frames == 1 else "the application"] += time.monotonic() - began
+
+    def _sentence(self, patience: float, what: str) -> str:
+        return f"the application did not answer frame {self.frames} within {patience:g} s ({what})"
+
+    def _following(self) -> int:
+        """The time of the next step: a period on, or when a source says that it goes on."""
+        told = [time for name, time in self._next.items() if time > self.now and name not in self._ended]
+        return min(told) if told else self.now + self.period

@@ -1,0 +1,83 @@
+"""The clock on the bus: it waits for the test's begin, steps it to its end, and tells the runner how far it got."""
+
+import json
+import logging
+import time
+from collections.abc import Callable
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
+from services.base.channel import Channel
+from services.base.lockstep import EPOCH
+from services.base.service import Service
+from services.clock.answers import Answers
+from services.clock.exchange import Exchange
+from services.clock.model import Patience, Roles, Stepper, Stuck, TimedOut, Unanswered
+
+_TELL_S = 1.0
+_SLICE = 0.05
+HEARD = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone")
+"""What the clock hears beside the application's answers."""
+
+_log = logging.getLogger(__name__)
+
+
+class ClockService(Service):
+    """Drives a test by its Stepper; ``period`` and ``timeout`` in us of test time."""
+
+    def __init__(
+        self,
+        session: Session,
+        channel: Channel,
+        roles: Roles,
+        answers: Answers,
+        period: int,
+        timeout: int,
+        patience: Patience,
+    ) -> None:
+        self._session, self._answers = session, answers
+        self._begin_id = session.messages.id("dodo.TestBegin")
+        exchange = Exchange(session, channel, answers.take)
+        self._stepper = Stepper(roles, period, timeout, patience, answers, exchange, self._over)
+        self._told = 0.0
+        self._stopped: Callable[[], bool] = lambda: False
+        self.drive = self._drive
+
+    def _drive(self, stopped: Callable[[], bool]) -> None:
+        self._stopped = stopped
+        begin = self._await_begin()
+        if begin is None:
+            return
+        self._tell_time()
+        kind, reason = "", ""
+        try:
+            self._stepper.meet()
+            self._stepper.run(begin._replace(sample_time=EPOCH, received=0))
+        except (Unanswered, Stuck, TimedOut) as problem:
+            kind, reason = type(problem).__name__.lower(), str(problem)
+        spent = sorted(self._stepper.spent.items(), key=lambda item: -item[1])
+        _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
+        self._tell_time(last=True)
+        if kind:
+            self._say(kind, reason=reason)
+
+    def _over(self) -> bool:
+        if time.monotonic() - self._told > _TELL_S:
+            self._tell_time()
+        return self._stopped()
+
+    def _await_begin(self) -> Envelope | None:
+        while not self._stopped():
+            envelope = self._session.receive(_SLICE)
+            if envelope is not None and envelope.data_type == self._begin_id:
+                return envelope
+        return None
+
+    def _tell_time(self, last: bool = False) -> None:
+        self._told = time.monotonic()
+        seconds = (self._stepper.now - EPOCH) / 1e6
+        self._say("time", s=seconds, frames=self._stepper.frames, surplus=self._answers.surplus, last=last)
+
+    @staticmethod
+    def _say(kind: str, **facts: object) -> None:
+        print(json.dumps({"dodo": kind, **facts}), flush=True)

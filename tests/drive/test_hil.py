@@ -1,0 +1,75 @@
+"""The hil tests on the emulated rig: the firmware's binary, the gantry, a camera at the rig's true place."""
+
+import math
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from tests.drive.applications import BLIND, ROOT, dodo, kiwi, results
+
+MICROSTEP, MICROSTEP_YAW = 2.36e-6, 0.000248
+MEASURED, TRUE = 0, 1
+
+
+@pytest.fixture(scope="module", autouse=True)
+def firmware() -> None:
+    if shutil.which("avr-gcc") is None:
+        pytest.skip("avr-gcc is missing: scripts/install-firmware-tools installs it on Debian")
+    subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), "firmware", "emulator"], check=True)
+
+
+def run(report: Path, *words: str, code: int) -> dict[str, Any]:
+    """The one test's result. A machine that is too busy for the emulated rig gets two more tries."""
+    dodo("run", *words, "--retry-errors", "2", "--report", str(report), code=code)
+    (test,) = results(report).values()
+    return test
+
+
+def poses(recording: Path, sender: int) -> NDArray[np.float64]:
+    """Time in s, x and y in m, yaw in rad of each Frame of a sender."""
+    messages, rows = MessageSet.standard(), []
+    for envelope in read_envelopes(recording):
+        if (envelope.data_type, envelope.sender_stamp) == (messages.id("opendlv.sim.Frame"), sender):
+            frame: Any = messages.decode(envelope.data_type, envelope.payload)
+            rows.append((envelope.sample_time / 1e6, frame.x, frame.y, 2 * math.atan2(frame.qz, frame.qw)))
+    return np.array(rows)
+
+
+def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> None:
+    test = run(tmp_path, "hil-dynamic", code=0)
+    assert (test["outcome"], test["level"]) == ("passed", "hil")
+    recording = tmp_path / "hil-dynamic" / "test.rec"
+    measured, true = poses(recording, MEASURED), poses(recording, TRUE)
+    assert len(measured) > 40
+    assert len(true) > 200
+    assert np.abs(measured[0, 1:3] - true[0, 1:3]).max() <= MICROSTEP
+    assert abs(measured[0, 3] - true[0, 3]) <= MICROSTEP_YAW
+    seen = np.stack([np.interp(measured[:, 0], true[:, 0], true[:, column]) for column in (1, 2, 3)], axis=1)
+    assert np.abs(measured[:, 1:] - seen)[:, :2].max() < 0.02  # one message is up to 30 ms older than the other
+    every = true[::10]
+    speeds = np.diff(every[:, 1:], axis=0) / np.diff(every[:, 0])[:, None]
+    assert 0.3 < np.hypot(speeds[:, 0], speeds[:, 1]).max() < 1.0
+    assert np.abs(speeds[:, 2]).max() < 1.0
+    assert true[:, 1].max() < 0.95
+
+
+def test_a_reversed_application_hits_the_wall_on_the_rig(tmp_path: Path) -> None:
+    application = kiwi(tmp_path / "app", None, steering="--reverse")
+    test = run(tmp_path / "report", "hil-dynamic", "--application", str(application), code=1)
+    assert test["outcome"] == "failed"
+    assert test["reason"].startswith("hit wall ")
+
+
+def test_the_static_rig_sees_its_board(tmp_path: Path) -> None:
+    test = run(tmp_path / "good", "hil-camera", code=0)
+    assert test["outcome"] == "passed"
+    application = kiwi(tmp_path / "app", BLIND)
+    test = run(tmp_path / "blind", "hil-camera", "--application", str(application), code=1)
+    assert "no detection came" in test["reason"]

@@ -1,0 +1,185 @@
+"""Whole tests in lockstep: the registry, and applications of all manners."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from dodo_dsl.run.lanes import namespaces_refusal
+
+ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+CURVE = "sil-closed-left-curve"
+
+
+def dodo(*words: str, code: int) -> str:
+    command = [sys.executable, "-m", "dodo_dsl", "run", *words]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=120)
+    assert result.returncode == code, result.stdout + result.stderr
+    return result.stdout
+
+
+def results(report: Path) -> dict[str, dict[str, Any]]:
+    return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}
+
+
+def application(folder: Path, script: str, command: str, **about: Any) -> Path:
+    """A compose file for a script of this folder."""
+    shutil.copy(HERE / script, folder)
+    service = {"image": "x", "command": f"--cid=111 --name=video0.argb {command}", "x-dodo-process": ["python", script]}
+    path = folder / "docker-compose.yml"
+    path.write_text(yaml.safe_dump({"services": {"app": {**service, **about}}}))
+    return path
+
+
+def run(folder: Path, manner: str, code: int, *words: str) -> tuple[dict[str, Any], list[str]]:
+    """What became of the test, and the pictures that the application saw."""
+    folder.mkdir(exist_ok=True)
+    path, report = application(folder, "manners.py", f"--manner={manner}"), folder / "report"
+    dodo(CURVE, "--application", str(path), "--report", str(report), *words, code=code)
+    log = (report / CURVE / "logs" / "application.app.log").read_text()
+    return results(report)[CURVE], [line for line in log.splitlines() if line.startswith("picture")]
+
+
+def surplus(folder: Path) -> int:
+    log = (folder / "report" / CURVE / "logs" / "environment.dodo-clock.log").read_text()
+    lines = [line for line in log.splitlines() if line.startswith('{"dodo": "time"')]
+    return int(json.loads(lines[-1])["surplus"])
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], list[str]]:
+    """With an application that copies sample times and answers once; it hits a wall."""
+    return run(tmp_path_factory.mktemp("plain"), "copies", 1)
+
+
+def test_verdict_clock_and_test_time_are_in_the_results(plain: tuple[dict[str, Any], list[str]]) -> None:
+    test, pictures = plain
+    assert (test["outcome"], test["clock"]) == ("failed", "lockstep")
+    assert test["reason"].startswith("hit wall ")
+    assert test["sim_s"] > 1.0
+    times = [int(picture.split()[1]) for picture in pictures]
+    assert times == [1_700_000_000_000_000 + n * 100_000 for n in range(len(times))]
+    assert test["sim_s"] * 10 - 1 <= len(pictures) <= test["sim_s"] * 10 + 1
+
+
+@pytest.mark.parametrize("manner", ["own-times", "twice", "slow", "restarts"])
+def test_manners_change_neither_values_nor_pictures(
+    plain: tuple[dict[str, Any], list[str]], manner: str, tmp_path: Path
+) -> None:
+    test, pictures = run(tmp_path, manner, 1)
+    known = min(len(pictures), len(plain[1]))
+    assert (test["reason"], test["checks"]) == (plain[0]["reason"], plain[0]["checks"])
+    assert pictures[:known] == plain[1][:known]
+    assert known >= len(plain[1]) - 1, "the last picture is shown as the test ends"
+    assert (surplus(tmp_path) >= 2 * (known - 2)) == (manner == "twice")
+
+
+def test_on_the_host_it_is_the_same(
+    plain: tuple[dict[str, Any], list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    test, _ = run(tmp_path, "copies", 1, "--isolation", "host")
+    assert (test["reason"], test["checks"]) == (plain[0]["reason"], plain[0]["checks"])
+
+
+@pytest.mark.parametrize(
+    ("manner", "reason"),
+    [
+        ("stops", "did not answer frame 11 within 2 s (GroundSteeringRequest and PedalPositionRequest missing)"),
+        ("leaves", "service 'app' ended with exit code 3 after "),
+    ],
+)
+def test_no_answer_is_the_application_s_fault(manner: str, reason: str, tmp_path: Path) -> None:
+    test, _ = run(tmp_path, manner, 1)
+    assert test["outcome"] == "failed"
+    assert reason in test["reason"]
+
+
+@pytest.mark.parametrize(
+    ("manner", "missing"),
+    [("forgets", "PedalPositionRequest missing"), ("silent", "nobody waited for a picture of 'camera'")],
+)
+def test_the_first_picture_has_a_patience_of_its_own(manner: str, missing: str, tmp_path: Path) -> None:
+    """The 30 s are shortened in what was compiled."""
+    path, out, report = application(tmp_path, "manners.py", f"--manner={manner}"), tmp_path / "out", tmp_path / "report"
+    command = [sys.executable, "-m", "dodo_dsl", "compile", CURVE, "--application", str(path), "-o", str(out)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    plan = json.loads((out / CURVE / "test.json").read_text())
+    (clock,) = (service for service in plan["services"] if service["name"] == "dodo-clock")
+    clock["flags"].append({"name": "first-patience", "value": "3", "kind": "text"})
+    (out / CURVE / "test.json").write_text(json.dumps(plan))
+    dodo("--compiled", str(out / CURVE), "--report", str(report), code=1)
+    test = results(report)[CURVE]
+    assert test["reason"] == f"the application did not answer frame 1 within 3 s ({missing})"
+    assert test["sim_s"] == 0.0
+
+
+def test_libcluon_in_lockstep(tmp_path: Path) -> None:
+    pytest.importorskip("pycluon")
+    seen = []
+    for number in range(2):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        path = application(folder, "cluon_app.py", "--steering=0.12")
+        report = folder / "report"
+        dodo(CURVE, "--application", str(path), "--report", str(report), code=1)
+        test = results(report)[CURVE]
+        assert test["reason"].startswith("hit wall left ")
+        log = (report / CURVE / "logs" / "application.app.log").read_text()
+        stamps = [json.loads(line)["stamp"] for line in log.splitlines() if line.startswith("{")]
+        assert stamps[:3] == [1_700_000_000.0, 1_700_000_000.1, 1_700_000_000.2]
+        seen.append((test["reason"], test["checks"]))
+    assert seen[0] == seen[1]
+
+
+def test_the_registry_in_lockstep(tmp_path: Path) -> None:
+    """Closed and open loop, and recordings, with the example application: each picture is answered."""
+    if why := namespaces_refusal():
+        pytest.skip(f"no namespaces here: {why}")
+    report = tmp_path / "report"
+    names = ("dil-*", "sil-open-*", "sil-closed-straight")
+    dodo(*names, "--clock", "lockstep", "-j", "2", "--report", str(report), code=0)
+    tests = results(report)
+    assert {t["clock"] for t in tests.values()} == {"lockstep"}
+    assert sum(t["sim_s"] for t in tests.values()) > 40
+
+
+def test_wall_time_has_a_limit_of_its_own(tmp_path: Path) -> None:
+    test, _ = run(tmp_path, "slow", 3, "--wall-timeout", "0.5")
+    assert test["outcome"] == "error"
+    assert test["reason"].startswith("the test took more than 0.5 s of wall time")
+
+
+def test_test_time_has_a_limit(tmp_path: Path) -> None:
+    spec = tmp_path / "tests" / "sil-short" / "sil-short.dodo.yml"
+    spec.parent.mkdir(parents=True)
+    shutil.copytree(ROOT / "tests_registry" / "maps", tmp_path / "tests" / "maps")
+    text = (ROOT / "tests_registry" / CURVE / f"{CURVE}.dodo.yml").read_text()
+    for old, new in ((CURVE, "sil-short"), ("timeout: 60 s", "timeout: 1 s"), ("max-time: 40 s", "max-time: 900 ms")):
+        text = text.replace(old, new)
+    spec.write_text(text)
+    report = tmp_path / "report"
+    dodo(str(spec), "--report", str(report), code=1)
+    test = results(report)["sil-short"]
+    assert test["outcome"] == "failed"
+    assert test["sim_s"] <= 1.0
+
+
+def test_the_other_clock_for_one_run(tmp_path: Path) -> None:
+    test, _ = run(tmp_path, "copies", 1, "--clock", "realtime")
+    assert (test["clock"], test["sim_s"]) == ("realtime", None)
+    assert test["execution_s"] > 1.0
+
+
+def test_repeated_under_load_it_is_the_same(tmp_path: Path) -> None:
+    """Verdict, way and pictures of three runs beside processes that take all of the processor."""
+    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), CURVE, "3", "5"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=240)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert f"{CURVE}: 3 of 3 runs gave " in result.stdout

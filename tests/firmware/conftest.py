@@ -1,0 +1,70 @@
+"""Builds the firmware and what tests it, once; BENCH names another build of the core's test program instead."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.firmware.programs import BUILT, ROOT, Bench, Rig
+
+SIMAVR = Path("/usr/include/simavr/sim_avr.h")
+
+
+def _make(*targets: str) -> None:
+    words = ["make", "-s", "-C", str(ROOT / "firmware"), *targets]
+    made = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert made.returncode == 0, made.stdout + made.stderr
+
+
+@pytest.fixture(scope="session")
+def bench_program() -> Path:
+    if "BENCH" in os.environ:
+        return Path(os.environ["BENCH"])
+    if shutil.which("gcc") is None or shutil.which("make") is None:
+        pytest.skip("gcc or make is missing: scripts/install-firmware-tools installs them on Debian")
+    _make("bench")
+    return BUILT / "bench"
+
+
+@pytest.fixture(scope="session")
+def firmware() -> None:
+    """The binary and its emulator are there."""
+    if shutil.which("avr-gcc") is None or not SIMAVR.is_file():
+        pytest.skip("avr-gcc or simavr is missing: scripts/install-firmware-tools installs them on Debian")
+    _make("firmware", "emulator")
+
+
+@pytest.fixture
+def fresh(bench_program: Path) -> Iterator[Bench]:
+    """The core as it starts."""
+    with Bench(bench_program) as bench:
+        yield bench
+
+
+@pytest.fixture
+def bench(fresh: Bench) -> Bench:
+    """The core, calibrated and in the middle."""
+    fresh.calibrate()
+    fresh.go(0, 0, 0)
+    fresh.extremes()
+    return fresh
+
+
+@pytest.fixture
+def new_rig(firmware: None) -> Iterator[Rig]:
+    """The emulated rig as it starts, with its port open."""
+    with Rig() as rig:
+        rig.open()
+        yield rig
+
+
+@pytest.fixture
+def rig(new_rig: Rig) -> Rig:
+    """The emulated rig, calibrated and away from all edges."""
+    new_rig.calibrate()
+    new_rig.go(-0.4, -0.3, -1)
+    new_rig.extremes()
+    return new_rig

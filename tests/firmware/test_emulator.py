@@ -1,0 +1,199 @@
+"""The firmware's binary on the emulated rig: the port, the drivers, the true pose, faults."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import termios
+import time
+from pathlib import Path
+
+import pytest
+import serial
+
+from services.gantry.table import ACCELERATION, SPEED, Error, Status
+from tests.firmware.programs import ELF, EMULATOR, Rig
+
+
+def test_calibrate_goto_run_and_position(new_rig: Rig) -> None:
+    assert new_rig.status() == Status.NOT_CALIBRATED
+    new_rig.calibrate()
+    assert new_rig.is_true()
+    new_rig.go(0.3, -0.2, 1.2)
+    assert new_rig.position()[:2] == pytest.approx((0.3, -0.2), abs=3e-6)
+    assert new_rig.is_true()
+    new_rig.keep_running("0.2,0.1,-0.3", 1)
+    pose = new_rig.pose()
+    assert (pose["vx"], pose["vy"], pose["vyaw"]) == pytest.approx((0.2, 0.1, -0.3), rel=0.05)
+    new_rig.say("$STOP")
+    new_rig.run(1)
+    assert new_rig.is_true()
+    extremes = new_rig.extremes()
+    assert all(fast <= most for fast, most in zip(extremes["speed"], SPEED.values(), strict=True))
+    assert all(ramp <= most for ramp, most in zip(extremes["ramp"], ACCELERATION.values(), strict=True))
+    assert new_rig.events == [one for one in new_rig.events if one["event"] in ("reset", "closed", "open")]
+
+
+def test_run_brakes_before_the_edge(rig: Rig) -> None:
+    rig.go(0.6, 0.5, 2.5)
+    rig.keep_running("0.8,0.8,0.8", 3)
+    pose = rig.pose()
+    assert 0.94 < pose["x"] <= 0.950003
+    assert 0.69 < pose["y"] <= 0.700003
+    assert rig.status() in (Status.IDLE, Status.MOVING)
+
+
+@pytest.mark.parametrize(
+    ("order", "status"),
+    [
+        ("push x 8", Status.STALL),
+        ("switch y2 closed", Status.LIMIT),
+        ("heat alpha warm", Status.HOT),
+        ("heat y1 hot", Status.HOT),
+        ("short x", Status.FAULT),
+        ("motors off", Status.FAULT),
+    ],
+)
+def test_faults_stop_the_rig_and_have_a_status(rig: Rig, order: str, status: Status) -> None:
+    rig.keep_running("0.1,0.1,0.2", 0.4)
+    rig.order(order)
+    rig.run(0.02)
+    assert rig.status() == status
+    rig.run(0.6)
+    assert not rig.pose()["moves"]
+    assert rig.speed() < 1e-3
+
+
+def test_noise_on_the_line_moves_nothing_by_itself(rig: Rig) -> None:
+    rig.order("noise 1000")
+    for _ in range(40):
+        rig.say("$STATUS")
+        rig.say("#RUN:0.1,0.1,0.1")
+    rig.order("noise 0")
+    rig.run(0.1)
+    rig.say("")
+    assert rig.extremes()["way"] == [0, 0, 0]
+    assert rig.status() == Status.IDLE
+
+
+def test_a_byte_that_the_receiver_loses_voids_its_line(rig: Rig) -> None:
+    rig.order("lose")
+    assert rig.say("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.DAMAGED)}"]
+    rig.run(0.2)
+    assert rig.extremes()["way"] == [0, 0, 0]
+    assert rig.order("overruns")[0]["overruns"] == 1
+    assert rig.status() == Status.IDLE
+
+
+def test_opening_the_port_resets_the_controller_and_the_position_stays(rig: Rig) -> None:
+    rig.close()
+    rig.run(0.1)
+    resets = len(rig.happened("reset"))
+    rig.open()
+    assert len(rig.happened("reset")) == resets + 1
+    assert rig.status() == Status.IDLE
+    assert rig.is_true()
+
+
+def test_a_port_that_keeps_dtr_up_resets_nothing(rig: Rig) -> None:
+    assert rig.port is not None
+    attributes = termios.tcgetattr(rig.port.fileno())
+    attributes[2] &= ~termios.HUPCL
+    termios.tcsetattr(rig.port.fileno(), termios.TCSANOW, attributes)
+    rig.close()
+    rig.run(0.1)
+    resets = len(rig.happened("reset"))
+    rig.open()
+    assert len(rig.happened("reset")) == resets
+    assert rig.status() == Status.IDLE
+
+
+def test_with_a_boot_loader_the_drivers_forget(firmware: None) -> None:
+    with Rig("--boot", "1.0") as rig:
+        rig.open()
+        rig.run(1.2)
+        rig.calibrate()
+        rig.order("reset")
+        rig.run(1.2)
+        assert rig.status() == Status.NOT_CALIBRATED
+
+
+def test_help_ends_with_an_example_that_runs(firmware: None, tmp_path: Path) -> None:
+    text = subprocess.run([EMULATOR, "--help"], capture_output=True, text=True, check=True).stdout
+    words = text.splitlines()[-1].removeprefix("example: ").split()
+    assert words[0] == "rig-emulator" and words[-1] == "build/firmware/gantry.elf"
+    link = tmp_path / "rig"
+    process = subprocess.Popen(
+        [EMULATOR, "--link", link, "--publish", tmp_path / "pose", ELF],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None and process.stdin is not None
+    try:
+        while "port" not in (line := process.stdout.readline()):
+            assert line
+        assert os.path.realpath(link) == json.loads(line)["port"]
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+            listener.bind(str(tmp_path / "pose"))
+            listener.settimeout(10)
+            while "x" not in (pose := json.loads(listener.recv(1024))):
+                pass
+            assert {"t", "x", "y", "yaw"} <= pose.keys()
+        with serial.Serial(str(link), 115200, timeout=10) as port:
+            answer = b""
+            while not answer:
+                port.write(b"$STATUS\n")
+                time.sleep(0.02)
+                answer = port.read(port.in_waiting)
+        assert b"$6\n" in answer
+    finally:
+        process.stdin.close()  # which ends it
+        process.stdout.close()
+        assert process.wait(10) == 0
+    assert not link.is_symlink()
+
+
+def test_it_admits_that_it_was_late(firmware: None) -> None:
+    process = subprocess.Popen([EMULATOR, ELF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdin is not None
+    try:
+        while "x" not in (line := process.stdout.readline()):
+            assert line
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.2)
+        process.send_signal(signal.SIGCONT)
+        while "late" not in (line := process.stdout.readline()):
+            assert line
+        assert json.loads(line)["late"] > 0.05
+        assert json.loads(line)["total"] >= json.loads(line)["late"]
+    finally:
+        process.terminate()
+        process.stdin.close()
+        process.stdout.close()
+        assert process.wait(10) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "expected options"),
+        (["--start", "here", str(ELF)], "expected options"),
+        (["--boot", "-1", str(ELF)], "expected options"),
+        (["/dev/null"], "is no firmware"),
+        (["missing.elf"], "is no firmware"),
+        ([__file__], "is no firmware"),
+        (["--link", "/nowhere/rig", str(ELF)], "no link"),
+    ],
+)
+def test_mistakes_are_said_in_one_sentence(firmware: None, words: list[str], sentence: str) -> None:
+    done = subprocess.run([EMULATOR, *words], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+    assert done.returncode == 2
+    assert sentence in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_orders_that_are_none_are_answered(new_rig: Rig) -> None:
+    for order in ("run -1", "run x", "switch z open", "heat x", "nothing", "motors perhaps"):
+        with pytest.raises(AssertionError, match="error"):
+            new_rig.order(order)

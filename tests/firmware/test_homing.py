@@ -1,0 +1,152 @@
+"""CALIBRATE, and what a reset leaves of it."""
+
+from pathlib import Path
+
+import pytest
+
+from services.gantry.table import MICROSTEP, Error, Status
+from tests.firmware.programs import Bench
+
+HOME = (-0.9, -0.7, -2.63386)
+
+
+def test_home_is_where_the_switches_open(fresh: Bench) -> None:
+    fresh.say("$CALIBRATE")
+    assert fresh.status() == Status.HOMING
+    assert fresh.say("$POSITION") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    fresh.until(Status.IDLE)
+    assert fresh.position() == pytest.approx(HOME, abs=1e-5)
+    fresh.run(0.3)
+    assert fresh.is_true()
+    assert fresh.extremes()["speed"][0] <= 0.11
+    assert fresh.happened("crash") == [] and fresh.happened("slip") == []
+
+
+@pytest.mark.parametrize(
+    "place",
+    [(-0.9012, -0.7012, -152.0), (0.9553, 0.7053, 171.6), (0.9553, -0.7012, 0.0), (0.0, 0.7053, -152.0)],
+    ids=["home", "far end", "mixed", "some"],
+)
+def test_it_finds_home_from_a_closed_switch_at_either_end(bench_program: Path, place: tuple[float, ...]) -> None:
+    with Bench(bench_program, (place[0], place[1], place[2])) as bench:
+        bench.calibrate()
+        bench.run(0.3)
+        assert bench.is_true()
+        assert bench.happened("crash") == []
+
+
+def test_y1_and_y2_are_square_afterwards(fresh: Bench) -> None:
+    fresh.order("push y1 12")
+    fresh.run(0.1)
+    assert abs(fresh.pose()["skew"]) > 0.003
+    fresh.calibrate()
+    fresh.run(0.3)
+    assert abs(fresh.pose()["skew"]) <= MICROSTEP["y"]
+
+
+def test_a_pair_that_is_far_from_square_is_not_torn_on(fresh: Bench) -> None:
+    fresh.order("push y1 80")
+    fresh.run(0.1)
+    fresh.say("$CALIBRATE")
+    fresh.until(Status.FAULT)
+    assert abs(fresh.pose()["skew"]) < 0.03
+
+
+@pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
+@pytest.mark.parametrize("stuck", ["open", "closed"])
+def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, motor: str, stuck: str) -> None:
+    """An open one is noticed at the frame, at homing speed, and by the way; a closed one before anything goes far."""
+    bench.go(-0.5, -0.4, -2)
+    bench.order(f"switch {motor} {stuck}")
+    bench.extremes()
+    bench.say("$CALIBRATE")
+    passed = 0.0
+    while (status := bench.status()) == Status.HOMING:
+        assert passed < 60
+        bench.run(0.5)
+        passed += 0.5
+    assert status in (Status.FAULT, Status.STALL)
+    assert all(one["value"] <= 0.4 for one in bench.happened("crash"))
+    if stuck == "closed":
+        assert max(bench.extremes()["way"][:2]) < 0.02
+    bench.run(1)
+    assert not bench.pose()["moves"]
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+
+
+def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
+    fresh.order("tear x")
+    fresh.say("$CALIBRATE")
+    fresh.until(Status.FAULT)
+    assert 1.85 < fresh.extremes()["way"][0] < 1.9
+
+
+def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
+    fresh.say("$CALIBRATE")
+    fresh.run(1)
+    fresh.order("switch x closed")
+    fresh.run(0.01)
+    fresh.order("switch x works")
+    fresh.run(0.2)
+    before = fresh.pose()["x"]
+    fresh.until(Status.FAULT)
+    fresh.run(0.1)
+    assert fresh.pose()["x"] == pytest.approx(before, abs=1e-4)
+
+
+def test_only_stop_ends_it_early(fresh: Bench) -> None:
+    fresh.say("$CALIBRATE")
+    fresh.run(1)
+    for line in ("$RUN:0.1,0,0", "$GOTO:0,0,0", "$CALIBRATE"):
+        assert fresh.say(line) == [f"$ERROR:{int(Error.HOMING)}"]
+    fresh.say("$STOP")
+    fresh.run(1)
+    assert fresh.status() == Status.NOT_CALIBRATED
+    assert not fresh.pose()["moves"]
+
+
+def test_calibrate_brakes_first(bench: Bench) -> None:
+    bench.keep_running("0.5,0,0", 1.2)
+    bench.calibrate()
+    assert max(bench.extremes()["ramp"][:2]) <= 0.5
+    assert bench.happened("slip") == []
+
+
+def test_a_reset_takes_up_the_position_of_the_drivers(bench: Bench) -> None:
+    bench.keep_running("0.3,-0.2,0.4", 0.6)
+    bench.order("restart")
+    bench.run(1.2)
+    assert bench.status() == Status.IDLE
+    assert not bench.pose()["moves"]
+    bench.run(0.2)
+    assert bench.is_true()
+    assert max(bench.extremes()["ramp"][:2]) <= 0.5
+
+
+@pytest.mark.parametrize("what", ["homing", "power", "stall"])
+def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str) -> None:
+    if what == "homing":
+        bench.say("$CALIBRATE")
+        bench.run(1)
+    elif what == "power":
+        bench.order("motors off")
+        bench.order("motors on")
+    else:
+        bench.order("push x 8")
+        bench.run(0.1)
+    bench.order("restart")
+    bench.run(0.5)
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
+def test_a_reset_does_not_take_up_a_part(bench: Bench, motor: str) -> None:
+    """The other three drivers know where they are."""
+    bench.order(f"short {motor}")
+    bench.run(0.1)
+    bench.order("restart")
+    bench.run(0.1)
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED

@@ -1,0 +1,89 @@
+"""What drivers report, and what the firmware's core makes of it."""
+
+import pytest
+
+from services.gantry.table import Status
+from tests.firmware.programs import Bench
+
+MOTORS = ("x", "y1", "y2", "alpha")
+
+
+@pytest.mark.parametrize("motor", MOTORS)
+@pytest.mark.parametrize(
+    ("order", "status", "void"),
+    [
+        ("heat {} warm", Status.HOT, False),
+        ("heat {} hot", Status.HOT, True),
+        ("short {}", Status.FAULT, True),
+        ("push {} 8", Status.STALL, True),
+    ],
+)
+def test_trouble_stops_everything(bench: Bench, motor: str, order: str, status: Status, void: bool) -> None:
+    bench.keep_running("0.1,0.1,0.2", 0.5)
+    bench.order(order.format(motor))
+    bench.run(0.01)
+    assert bench.status() == status
+    bench.run(1)
+    assert not bench.pose()["moves"]
+    bench.order(f"heat {motor} cool")
+    bench.say("$STOP")
+    assert bench.status() == (Status.NOT_CALIBRATED if void else Status.IDLE)
+    assert abs(bench.pose()["skew"]) < 0.012
+
+
+def test_a_pair_whose_counters_part_stops_and_is_void(bench: Bench) -> None:
+    bench.keep_running("0,0.1,0", 0.5)
+    bench.order("miscount y2 8")
+    bench.run(0.01)
+    assert bench.status() == Status.FAULT
+    bench.run(0.1)
+    assert not bench.pose()["moves"]
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+
+
+def test_heat_that_lasts_comes_back(bench: Bench) -> None:
+    bench.order("heat x warm")
+    bench.run(0.01)
+    bench.say("$STOP")
+    bench.run(0.01)
+    assert bench.status() == Status.HOT
+
+
+def test_motors_without_supply_are_a_fault_until_they_have_it_and_are_calibrated(bench: Bench) -> None:
+    bench.keep_running("0.2,0.1,0", 0.5)
+    bench.order("motors off")
+    bench.run(0.3)
+    assert bench.status() == Status.FAULT
+    assert bench.speed() < 1e-3
+    bench.say("$CALIBRATE")
+    bench.run(0.1)
+    assert bench.status() == Status.FAULT
+    bench.order("motors on")
+    bench.say("$STOP")
+    bench.run(0.01)
+    assert bench.status() == Status.NOT_CALIBRATED
+    bench.calibrate()
+    bench.go(0.1, 0.1, 0.1)
+    assert bench.is_true()
+
+
+def test_the_first_trouble_is_what_status_says(bench: Bench) -> None:
+    bench.keep_running("0.2,0,0", 0.6)
+    bench.order("switch x closed")
+    bench.run(0.05)
+    bench.order("heat y1 hot")
+    bench.run(0.05)
+    assert bench.status() == Status.LIMIT
+
+
+def test_a_hard_stop_from_high_speed_voids_the_position(bench: Bench) -> None:
+    """The motor slips, as the switch stops it harder than it can hold."""
+    bench.keep_running("0.6,0,0", 1.3)
+    bench.order("switch x closed")
+    bench.run(0.5)
+    assert bench.status() == Status.LIMIT
+    assert bench.happened("slip")
+    bench.order("switch x works")
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED

@@ -1,0 +1,138 @@
+"""Ways of pulling the plug while the rig runs, in the emulated rig's own time."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+
+from services.gantry.table import ACCELERATION, Status
+from tests.firmware.programs import Rig
+
+VELOCITY = "0.3,0.2,0.4"
+BEGIN = 0.55
+"""s until braking begins."""
+AT_ONCE = 0.1
+"""s in which carriages without current come to rest."""
+REST = max(0.3 / ACCELERATION["x"], 0.4 / ACCELERATION["yaw"] * 1.1)
+
+
+def close_port(rig: Rig) -> None:
+    rig.close()
+
+
+def say_nothing(rig: Rig) -> None:
+    """The host hangs with its port open."""
+
+
+def only_garbage(rig: Rig) -> None:
+    """The cable is broken and picks up noise."""
+    assert rig.port is not None
+    rig.port.write(b"\x00\xff$RU\x80N:0.3,0.2\n" * 40)
+
+
+def pull_cable(rig: Rig) -> None:
+    """The controller has a supply of its own."""
+    rig.order("unplug")
+
+
+def pull_cable_and_power(rig: Rig) -> None:
+    rig.order("unplug power")
+
+
+def hang(rig: Rig) -> None:
+    rig.order("hang")
+
+
+def hold_in_reset(rig: Rig) -> None:
+    rig.order("hold on")
+
+
+def motor_supply(rig: Rig) -> None:
+    rig.order("motors off")
+
+
+def open_again(rig: Rig) -> None:
+    """Another program opens the port, which resets the controller."""
+    rig.close()
+    rig.run(0.02)
+    rig.open()
+
+
+def kill_client(rig: Rig) -> None:
+    """The program that holds the port is killed."""
+    rig.close()
+    rig.run(0.02)
+    hold = "import serial, sys, time\nport = serial.Serial(sys.argv[1], 115200)\nprint(flush=True)\ntime.sleep(60)"
+    client = subprocess.Popen([sys.executable, "-c", hold, rig.path], stdout=subprocess.PIPE)
+    assert client.stdout is not None
+    client.stdout.readline()
+    os.kill(client.pid, signal.SIGKILL)
+    client.wait()
+    client.stdout.close()
+
+
+GENTLE = [close_port, say_nothing, only_garbage, pull_cable, hang, open_again, kill_client]
+ABRUPT = [pull_cable_and_power, hold_in_reset, motor_supply]
+
+
+def speeds(rig: Rig, seconds: float) -> list[tuple[float, ...]]:
+    found = []
+    for _ in range(round(seconds / 0.01)):
+        rig.run(0.01)
+        pose = rig.pose()
+        found.append((abs(pose["vx"]), abs(pose["vy"]), abs(pose["vyaw"])))
+    return found
+
+
+@pytest.mark.parametrize("pull", GENTLE, ids=lambda pull: pull.__name__)
+def test_the_rig_brakes(rig: Rig, pull: Callable[[Rig], None]) -> None:
+    rig.keep_running(VELOCITY, 1.2)
+    before = speeds(rig, 0.01)[0]
+    rig.extremes()
+    pull(rig)
+    first = speeds(rig, BEGIN + 0.03)[-1]
+    assert all(now < then - 0.005 for now, then in zip(first, before, strict=True)), "braking has not begun"
+    rest = speeds(rig, REST + 0.1)
+    assert all(
+        after <= earlier + 0.002
+        for a, b in itertools.pairwise(rest)
+        for earlier, after in zip(a[:2], b[:2], strict=True)
+    )
+    assert max(rest[-1]) < 0.005
+    assert all(ramp <= most for ramp, most in zip(rig.extremes()["ramp"], ACCELERATION.values(), strict=True))
+    assert rig.happened("slip") == [] and rig.happened("crash") == []
+
+
+@pytest.mark.parametrize("pull", ABRUPT, ids=lambda pull: pull.__name__)
+def test_the_rig_stops_at_once_without_power(rig: Rig, pull: Callable[[Rig], None]) -> None:
+    rig.keep_running(VELOCITY, 1.2)
+    pull(rig)
+    assert max(speeds(rig, (0.25 if pull is hold_in_reset else 0) + AT_ONCE)[-1]) < 0.002
+    assert rig.happened("crash") == []
+
+
+def test_after_the_cable_alone_it_goes_on_where_it_was(rig: Rig) -> None:
+    rig.keep_running(VELOCITY, 1)
+    rig.order("unplug")
+    rig.close()
+    rig.run(2)
+    rig.plug()
+    rig.open()
+    assert rig.status() == Status.IDLE
+    assert rig.is_true()
+
+
+def test_after_a_loss_of_power_it_asks_for_calibrate(rig: Rig) -> None:
+    rig.keep_running(VELOCITY, 1)
+    rig.order("unplug power")
+    rig.close()
+    rig.run(2)
+    rig.plug()
+    rig.open()
+    assert rig.status() == Status.NOT_CALIBRATED
+    rig.calibrate()
+    assert rig.is_true()

@@ -1,0 +1,69 @@
+"""One who looks at everything sees each message of a lockstep test once, in the step that it belongs to."""
+
+from dodo_dsl.opendlv.envelope import Envelope
+from services.base.observed import EPOCH, Observed
+
+STEP = 100_000
+
+
+class Seen:
+    """An inbox that remembers."""
+
+    observes = True
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[bytes, int]] = []
+
+    def overhear(self, envelope: Envelope) -> None:
+        self.seen.append((envelope.payload, envelope.sample_time))
+
+    def handle(self, envelope: Envelope) -> None:
+        raise AssertionError
+
+    def receive(self, timeout: float) -> Envelope | None:
+        raise AssertionError
+
+
+def said(payload: bytes, time: int, received: int = 0) -> Envelope:
+    return Envelope(1003, payload, 5, received, time, 0)
+
+
+def test_copies_on_the_bus_count_once_however_late_they_are() -> None:
+    observed, inbox = Observed(), Seen()
+    observed.overhear(said(b"a", EPOCH, 9))
+    observed.look(inbox, EPOCH, [said(b"a", EPOCH), said(b"b", EPOCH)])
+    observed.overhear(said(b"b", EPOCH, 9))
+    observed.look(inbox, EPOCH + STEP, [])
+    assert inbox.seen == [(b"a", EPOCH), (b"b", EPOCH)]
+
+
+def test_what_was_lost_on_the_bus_is_seen_all_the_same() -> None:
+    observed, inbox = Observed(), Seen()
+    observed.look(inbox, EPOCH, [said(b"a", EPOCH)])
+    assert inbox.seen == [(b"a", EPOCH)]
+
+
+def test_the_application_counts_as_it_is_on_the_bus_and_not_as_it_is_handed_on() -> None:
+    observed, inbox = Observed(), Seen()
+    observed.overhear(said(b"own time", 77, 9))
+    observed.look(inbox, EPOCH, [said(b"own time", EPOCH, 9)])
+    assert inbox.seen == [(b"own time", 77)]
+
+
+def test_a_later_step_s_message_waits_for_that() -> None:
+    observed, inbox = Observed(), Seen()
+    observed.overhear(said(b"early", EPOCH + STEP, 9))
+    observed.look(inbox, EPOCH, [])
+    assert inbox.seen == []
+    observed.look(inbox, EPOCH + STEP, [])
+    assert inbox.seen == [(b"early", EPOCH + STEP)]
+
+
+def test_the_first_messages_said_again_much_later() -> None:
+    observed, inbox = Observed(), Seen()
+    observed.look(inbox, EPOCH, [said(b"a", EPOCH)])
+    for step in range(1, 200):
+        observed.look(inbox, EPOCH + step * STEP, [])
+    observed.overhear(said(b"a", EPOCH, 9))
+    observed.look(inbox, EPOCH + 200 * STEP, [])
+    assert inbox.seen == [(b"a", EPOCH)]

@@ -1,0 +1,90 @@
+"""Which of the application's messages answer a frame."""
+
+import pytest
+
+from dodo_dsl.opendlv.envelope import Envelope
+from services.clock.answers import Answers, Kind, kinds
+
+STEER, PEDAL, BOX, READY = 1090, 1086, 1134, 1054
+FRAME, NEXT, ELSEWHEN = 1_000_000, 1_100_000, 77
+WANTED = (Kind("steer", STEER), Kind("pedal", PEDAL))
+
+
+def said(kind: int, time: int, payload: bytes = b"", stamp: int = 0) -> Envelope:
+    return Envelope(kind, payload, 0, 0, time, stamp)
+
+
+def answering(*envelopes: Envelope, **about: object) -> Answers:
+    answers = Answers(WANTED, **about)  # type: ignore[arg-type]
+    answers.open(FRAME)
+    for envelope in envelopes:
+        answers.take(envelope)
+    return answers
+
+
+def test_complete_when_each_came_once() -> None:
+    answers = answering(said(STEER, FRAME))
+    assert not answers.complete
+    assert answers.missing == ["pedal"]
+    answers.take(said(PEDAL, FRAME))
+    assert answers.complete
+    assert [e.data_type for e in answers.collect()] == [STEER, PEDAL]
+
+
+def test_the_first_after_the_frame_counts_where_sample_times_are_not_copied() -> None:
+    answers = answering(said(STEER, ELSEWHEN, b"first"), said(STEER, ELSEWHEN + 9, b"second"), said(PEDAL, ELSEWHEN))
+    assert answers.complete
+    assert [(e.payload, e.sample_time) for e in answers.collect()] == [(b"first", FRAME), (b"", FRAME)]
+    assert answers.surplus == 1
+
+
+def test_what_was_said_before_the_frame_was_seen_is_no_answer_to_it() -> None:
+    answers = answering(said(STEER, FRAME), said(PEDAL, FRAME), said(STEER, ELSEWHEN, b"late"))
+    answers.collect()
+    answers.open(NEXT)
+    answers.take(said(PEDAL, FRAME, b"late, too"))
+    assert answers.missing == ["steer", "pedal"]
+    assert answers.surplus == 2
+
+
+def test_nothing_counts_before_the_first_frame() -> None:
+    answers = Answers(WANTED, (Kind("box", BOX),))
+    answers.take(said(STEER, ELSEWHEN))
+    answers.take(said(BOX, ELSEWHEN))
+    answers.open(FRAME)
+    assert answers.missing == ["steer", "pedal"]
+    assert answers.collect() == []
+
+
+def test_done_ends_the_answer_whatever_came() -> None:
+    answers = answering(said(STEER, FRAME), done=Kind("ready", READY, 2))
+    answers.take(said(READY, FRAME, stamp=1))
+    assert answers.missing == ["ready"]
+    answers.take(said(READY, FRAME, stamp=2))
+    assert answers.complete
+    assert [e.data_type for e in answers.collect()] == [STEER]
+    answers.open(NEXT)
+    answers.take(said(READY, FRAME, stamp=2))
+    assert not answers.complete, "a late word about the frame before"
+
+
+def test_others_are_handed_on_all_of_them_in_an_order_of_their_own() -> None:
+    boxes = [said(BOX, FRAME, b"1", 7), said(BOX, ELSEWHEN, b"2", 7), said(BOX, FRAME, b"3", 3)]
+    answers = answering(*boxes, said(4711, FRAME), heard=(Kind("box", BOX),))
+    assert [(e.payload, e.sample_time) for e in answers.collect()] == [(b"3", FRAME), (b"1", FRAME), (b"2", FRAME)]
+    assert answers.collect() == []
+
+
+def test_one_who_answers_twice_drives_as_one_who_answers_once() -> None:
+    once = answering(said(STEER, FRAME, b"a"), said(PEDAL, FRAME, b"b"))
+    twice = answering(*(said(kind, FRAME, data) for kind, data in ((STEER, b"a"), (STEER, b"x"), (PEDAL, b"b"))))
+    twice.take(said(PEDAL, FRAME, b"y"))
+    assert once.collect() == twice.collect()
+    assert (once.surplus, twice.surplus) == (0, 2)
+
+
+def test_names_with_and_without_a_stamp() -> None:
+    assert kinds(["a.B", "a.B/3"], {"a.B": 5}) == (Kind("a.B", 5), Kind("a.B/3", 5, 3))
+    for wrong in ("a.C", "a.B/x"):
+        with pytest.raises(ValueError, match="is no message, expected a name such as"):
+            kinds([wrong], {"a.B": 5})

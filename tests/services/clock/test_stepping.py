@@ -1,0 +1,143 @@
+"""The same way whatever the application's manners, its speed and the losses on the way."""
+
+import random
+from typing import Any
+
+import pytest
+
+from dodo_dsl.opendlv.session import Session
+from services.base import channel, ear
+from services.clock import exchange
+from services.clock.model import Patience, Stepper, Unanswered
+from tests.services.clock.toys import STEP, Toys
+
+Way = list[tuple[int, float]]
+
+
+@pytest.fixture
+def toys(cid: int) -> Toys:
+    return Toys(cid)
+
+
+def expected(steps: int) -> Way:
+    """The way of a mover that hears of each picture's answer with the next step."""
+    place, speed, way = 0.0, 1.0, []
+    for step in range(steps):
+        for tenth in range(10 if step else 1):
+            place += speed * 0.01
+            way.append(((step - 1) * STEP + (tenth + 1) * STEP // 10 if step else 0, place))
+        speed = 1.5 - place
+    return way
+
+
+def close(way: Way, other: Way) -> bool:
+    """Frames carry single precision."""
+    return all(a[0] == b[0] and abs(a[1] - b[1]) < 1e-5 for a, b in zip(way, other, strict=True))
+
+
+def test_the_way_is_as_computed_by_hand(toys: Toys) -> None:
+    application = toys.application()
+    way, stepper = toys.run(application)
+    assert close(way, expected(21))
+    assert (stepper.frames, stepper.answers.surplus) == (21, 0)
+    assert application.seen[:2] == pytest.approx([0.01, 0.11], abs=0.05)
+
+
+MANNERS: dict[str, dict[str, Any]] = {
+    "own-sample-times": {"copies": False},
+    "twice": {"times": 2},
+    "twice-own-sample-times": {"times": 2, "copies": False},
+    "slow-at-times": {"pause": lambda frame: 0.1 * (frame % 7 == 0)},
+}
+
+
+@pytest.mark.parametrize("manner", MANNERS)
+def test_manners_change_nothing(toys: Toys, manner: str) -> None:
+    application = toys.application(**MANNERS[manner])
+    way, stepper = toys.run(application)
+    assert close(way, expected(21))
+    assert len(application.seen) in (20, 21), "every picture once"
+    most = 21 * (application.times - 1)
+    assert most - 2 <= stepper.answers.surplus <= most
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    """A third of what clock and services tell each other is lost, some comes twice, some after the next."""
+    chance = random.Random(seed)
+    plain, held = channel.Channel.send, []
+
+    def send(self: channel.Channel, message: Any, to: Any) -> None:
+        fate = chance.random()
+        if fate < 0.3:
+            return
+        if fate < 0.4:
+            held.append((self, message, to))
+            return
+        for _ in range(2 if fate < 0.5 else 1):
+            plain(self, message, to)
+        while held:
+            late, what, whom = held.pop()
+            if late._socket.fileno() >= 0:
+                plain(late, what, whom)
+
+    monkeypatch.setattr(channel.Channel, "send", send)
+    monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
+    monkeypatch.setattr(exchange, "_SLICE", 0.01)
+    monkeypatch.setattr(ear, "SLICE_MS", 10)
+    way, stepper = toys.run(toys.application())
+    assert close(way, expected(21))
+    assert stepper.frames == 21
+
+
+def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.base.parts.PART_BYTES", 100)
+    way, _ = toys.run(toys.application())
+    assert close(way, expected(21))
+
+
+def test_an_application_without_an_answer_of_its_own_is_awaited_by_its_readers(toys: Toys) -> None:
+    """Nothing is known to answer: it has done what it does when it waits for the next picture."""
+    toys.answers = ()
+    application = toys.application(pause=lambda _: 0.01)
+    _, stepper = toys.run(application)
+    assert stepper.frames == 21
+    assert len(application.seen) == 21
+
+
+def test_silence_is_named_with_frame_and_message(toys: Toys) -> None:
+    toys.patience = Patience(2.0, 0.2)
+    with pytest.raises(Unanswered) as caught:
+        toys.run(toys.application(times=0))
+    assert str(caught.value) == "the application did not answer frame 1 within 2 s (GroundSteeringRequest missing)"
+
+
+def test_an_end_in_the_middle_is_named(toys: Toys) -> None:
+    toys.patience = Patience(2.0, 0.2)
+    with pytest.raises(Unanswered) as caught:
+        toys.run(toys.application(most=7))
+    assert (
+        str(caught.value)
+        == "the application did not answer frame 8 within 0.2 s (nobody waited for a picture of 'eye')"
+    )
+
+
+def test_the_stepper_goes_to_the_time_that_a_source_tells() -> None:
+    stepper = Stepper.__new__(Stepper)
+    stepper.period, stepper.now, stepper._ended = 100, 1000, {"gone"}
+    stepper._next = {"a": 0, "gone": 1001}
+    assert stepper._following() == 1100
+    stepper._next = {"a": 1040, "b": 1030, "c": 900, "gone": 1001}
+    assert stepper._following() == 1030
+
+
+def test_messages_on_the_channel_wake_nobody_else(cid: int) -> None:
+    with Session(cid) as other:
+        ours, theirs = (channel.Channel(cid, other.messages) for _ in range(2))
+        address = ("127.0.0.1", theirs._socket.getsockname()[1])
+        ours.send(other.messages.type("dodo.Step")(number=3), address)
+        assert other.receive(0.2) is None
+        came = theirs.receive()
+        assert came is not None and came[0].data_type == 2902
+        for each in (ours, theirs):
+            each.close()
