@@ -11,7 +11,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.run import engine
 from dodo_dsl.run.lanes import namespaces_refusal
 from tests.faults import Book
-from tests.run.helpers import BEGUN, DRIVES, FAIL, PASS, READY, WAIT, Bench
+from tests.run.helpers import BEGUN, DRIVES, FAIL, PASS, READY, STARTED, WAIT, Bench
 
 SHARES = """
 from dodo_dsl.opendlv.memory import SharedMemory
@@ -104,7 +104,10 @@ def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mo
 
 def run_all(bench: Bench, faults: dict[str, Fault]) -> dict[str, Outcome]:
     """The outcomes of all faults at once, each a test."""
-    plans = [bench.plan(f.judge, f.application, f.environment, slug=slug, timeout_s=30.0) for slug, f in faults.items()]
+    plans = [
+        bench.plan(f.judge, STARTED + f.application, f.environment, slug=slug, timeout_s=30.0)
+        for slug, f in faults.items()
+    ]
     return {outcome.slug: outcome for outcome in bench.run(*plans, parallel=len(plans))}
 
 
