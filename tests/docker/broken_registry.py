@@ -1,4 +1,8 @@
-"""An image registry that ends the connection in the middle of a layer, each time."""
+"""An image registry that ends the connection in the middle of a layer.
+
+An engine asks again, six times in more than a minute by default. To make it give up at once, a forgetful registry says
+at the second time that it has no such layer.
+"""
 
 import hashlib
 import json
@@ -10,8 +14,6 @@ from types import TracebackType
 from typing import Any, Self
 
 IMAGE = "broken:1"
-TRIES = 6
-"""How often an engine asks for a layer by default before it gives up."""
 _MANIFEST = "application/vnd.docker.distribution.manifest.v2+json"
 _LAYER = os.urandom(1 << 20)
 
@@ -59,7 +61,12 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def _break_off(self) -> None:
-        self.server.breaks += 1  # type: ignore[attr-defined]
+        server = self.server
+        assert isinstance(server, _Server)
+        server.breaks += 1
+        if server.is_forgetful and server.breaks > 1:
+            self.send_error(404)
+            return
         self.send_response(200)
         self.send_header("Content-Length", str(len(_LAYER)))
         self.end_headers()
@@ -71,12 +78,20 @@ class _Handler(BaseHTTPRequestHandler):
         pass
 
 
+class _Server(ThreadingHTTPServer):
+    breaks = 0
+    is_forgetful = False
+
+
 class BrokenRegistry:
     """Serves on 127.0.0.1 while it is entered; ``image`` is the reference of an image that never arrives."""
 
+    def __init__(self, is_forgetful: bool = False) -> None:
+        self._is_forgetful = is_forgetful
+
     def __enter__(self) -> Self:
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), _Handler)
-        self._server.breaks = 0  # type: ignore[attr-defined]
+        self._server = _Server(("127.0.0.1", 0), _Handler)
+        self._server.is_forgetful = self._is_forgetful
         self._thread = Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
         self.image = f"127.0.0.1:{self._server.server_port}/{IMAGE}"
@@ -85,7 +100,7 @@ class BrokenRegistry:
     @property
     def breaks(self) -> int:
         """How often the layer was asked for."""
-        return int(self._server.breaks)  # type: ignore[attr-defined]
+        return self._server.breaks
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._server.shutdown()

@@ -13,7 +13,7 @@ import pytest
 
 from dodo_dsl.run import engine
 from dodo_dsl.run.backends import Job
-from tests.docker.broken_registry import TRIES, BrokenRegistry
+from tests.docker.broken_registry import BrokenRegistry
 from tests.docker.compose import Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
@@ -33,6 +33,7 @@ MISSING = "127.0.0.1:9/dodo-no-such-image:1"
 SCRIPTED = {slug: fault for slug, fault in FAULTS.items() if fault is not NEIGHBOUR}
 KINDS = {
     "missing": ("An image is missing", "error", f"image {MISSING} cannot be pulled: "),
+    "pull": ("The connection breaks in the middle of a pull", "error", "image 127.0.0.1:"),
     "hungry": (
         "The application takes more memory than it may",
         "failed",
@@ -68,18 +69,6 @@ def start(crate: Crate, job: Job, **variables: str) -> "subprocess.Popen[str]":
     )
 
 
-@pytest.fixture(scope="module", autouse=True)
-def broken_pull(tmp_path_factory: pytest.TempPathFactory, images: None) -> Iterator["subprocess.Popen[str]"]:
-    """A run whose image never arrives: the engine tries for more than a minute, while the other tests go on."""
-    crate = new_crate(tmp_path_factory.mktemp("broken"))
-    with BrokenRegistry() as registry:
-        process = start(crate, crate.job("pull", image=registry.image))
-        yield process
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
-    assert crate.left() == []
-
-
 def told(process: "subprocess.Popen[str]", result: str) -> str:
     """The reason in the last lines of a run of one test."""
     out, _ = process.communicate(timeout=200)
@@ -92,15 +81,19 @@ def test_faults_at_once(crate: Crate, book: Book) -> None:
     jobs = [crate.job(slug, f.judge, f.application, f.environment) for slug, f in FAULTS.items()]
     jobs.append(crate.job("hungry", application=HUNGRY, mem_limit="64m", memswap_limit="64m"))
     jobs.append(crate.job("missing", image=MISSING))
-    outcomes = crate.run(*jobs)
+    with BrokenRegistry(is_forgetful=True) as registry:
+        jobs.append(crate.job("pull", image=registry.image))
+        outcomes = crate.run(*jobs)
+    said = [text for _, text in crate.progress.phases]
+    assert f"pulling {registry.image}: the connection broke, the engine tries again" in said
     assert outcomes["neighbour"].outcome == "passed", outcomes["neighbour"].reason
     for slug, (_, outcome, sentence) in KINDS.items():
         assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)
     numbers = crate.log("many-lines").split("\n")[:-1]
     assert len(numbers) > 10_000
     assert numbers == [str(n) for n in range(len(numbers))]
-    said = crate.log("long-line")
-    assert (len(said), said[-7:]) == (5_000_007, "\nafter\n")
+    line = crate.log("long-line")
+    assert (len(line), line[-7:]) == (5_000_007, "\nafter\n")
     for slug, (name, *_) in KINDS.items():
         book.record(name, "docker", outcomes[slug].outcome, outcomes[slug].reason)
 
@@ -176,12 +169,5 @@ def test_interrupt_does_not_wait_for_a_pull(crate: Crate) -> None:
         wait_for(run, "the connection broke")
         run.send_signal(signal.SIGINT)
         assert told(run, "ERROR") == "the run was interrupted"
-        assert registry.breaks < TRIES
+        assert registry.breaks < 6, "the engine's last try"
     assert run.returncode == 130
-
-
-def test_pull_that_breaks(broken_pull: "subprocess.Popen[str]", book: Book) -> None:
-    out = wait_for(broken_pull, "the connection broke, the engine tries again")
-    assert "pulling 127.0.0.1:" in out
-    book.record("The connection breaks in the middle of a pull", "docker", "error", told(broken_pull, "ERROR"))
-    assert broken_pull.returncode == 3
