@@ -18,7 +18,7 @@ from tests.docker.compose import Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
 from tests.run.desk import ROOT, wait_for
-from tests.run.helpers import DRIVES, READY, WAIT, Bench
+from tests.run.helpers import BEGUN, DRIVES, PASS, READY, WAIT, Bench
 from tests.run.test_faults import FAULTS, NEIGHBOUR
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("images")]
@@ -118,49 +118,34 @@ def test_disk_with_the_report_is_full(crate: Crate, small_disk: Path, book: Book
     book.record("The disk with the report is full", "docker", "passed", f"{reason}; 'dodo-report' {unwritten}")
 
 
-def test_engine_that_goes_away(crate: Crate, book: Book) -> None:
-    """To this run it has gone; what the run cannot take down any more, the next one does."""
+def test_runners_without_engine_killed_and_unharmed(crate: Crate, book: Book) -> None:
+    """Three at once: what the first two cannot take down any more, the next run does."""
     socket = engine_socket()
     if socket is None:
         pytest.skip("the engine is not reached by a socket of this machine")
-    job = crate.job("cut")
     with EngineProxy(socket, crate.bench.folder / "engine.sock") as proxy:
-        run = start(crate, job, **proxy.variables)
-        wait_for(run, "running")
-        neighbour = start(crate, crate.job("beside", judge=DRIVES))
-        wait_for(neighbour, "running")
+        cut, killed = start(crate, crate.job("cut"), **proxy.variables), start(crate, crate.job("killed"))
+        beside = start(crate, crate.job("beside", judge=READY + BEGUN + "time.sleep(3)\n" + PASS))
+        for run in (cut, killed, beside):
+            wait_for(run, "running")
+        killed.kill()
+        killed.communicate()
         proxy.cut()
-        reason = told(run, "ERROR")
-    assert run.returncode == 3
-    assert told(neighbour, "PASSED") == "it drove"
-    left = crate.left()
-    assert len([name for name in left if f"-{job.plan.slug}-" in name]) > 4
-    second = start(crate, crate.job("again", judge=DRIVES))
-    said = wait_for(second, "removed what a killed run left: ")
-    assert f"{job.plan.slug}: 7 containers, networks and volumes" in said
-    assert told(second, "PASSED") == "it drove"
+        reason = told(cut, "ERROR")
+    assert cut.returncode == 3
     book.record("The engine goes away in the middle of a test", "docker", "error", reason)
-
-
-def test_runner_that_is_killed(crate: Crate, book: Book) -> None:
-    job = crate.job("killed")
-    run = start(crate, job)
-    wait_for(run, "running")
-    run.kill()
-    run.communicate()
-    assert len(crate.left()) > 4
-    second = start(crate, crate.job("again", judge=DRIVES))
-    said = wait_for(second, "removed what a killed run left: ")
-    assert told(second, "PASSED") == "it drove"
-    note = said.splitlines()[-1].replace(job.plan.slug, "test")
+    book.record("Two runners at once", "docker", "passed", told(beside, "PASSED"))
+    left = crate.left()
+    assert all(any(f"-{slug}-" in name for name in left) for slug in ("cut", "killed"))
+    assert not any("-beside-" in name for name in left)
+    again = start(crate, crate.job("again", judge=DRIVES))
+    notes = [wait_for(again, "removed what a killed run left: ").splitlines()[-1] for _ in range(2)]
+    assert told(again, "PASSED") == "it drove"
+    assert {f"{crate.mark}-{slug}: 7 containers, networks and volumes" for slug in ("cut", "killed")} == {
+        note.removeprefix("removed what a killed run left: ") for note in notes
+    }
+    note = notes[0].replace(f"{crate.mark}-cut", "test")
     book.record("The runner is killed, and run again", "docker", "passed", note)
-
-
-def test_two_runners_at_once(crate: Crate, book: Book) -> None:
-    """Both begin with the same subnet, and one leaves it to the other."""
-    runs = [start(crate, crate.job(f"run-{n}", judge=DRIVES)) for n in range(2)]
-    for run in runs:
-        book.record("Two runners at once", "docker", "passed", told(run, "PASSED"))
 
 
 def test_interrupt_does_not_wait_for_a_pull(crate: Crate) -> None:
