@@ -123,7 +123,7 @@ class Containers:
                 async with lanes.host_lane(replace_flags(plan), (plan.cid,), say):
                     yield backend
         finally:
-            lease.release()
+            lease.leave() if backend.left_behind else lease.release()
 
 
 def replace_flags(plan: Plan) -> Plan:
