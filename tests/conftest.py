@@ -18,6 +18,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Runs of tests are no part of this user's history."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DODO_RIGS", str(tmp_path_factory.mktemp("rigs")))
         patch.setenv("DODO_HISTORY", str(tmp_path_factory.mktemp("state") / "history.jsonl"))
         yield
 

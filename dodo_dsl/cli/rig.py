@@ -12,8 +12,8 @@ from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.run import leases, rigs
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.deployment import find_deployment, load_deployment
-from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.manifest import Parameter
+from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.values import ValueProblem, convert
 
 EXAMPLES = """examples:
@@ -44,7 +44,7 @@ class _Usage(Exception):
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     try:
         chosen = _chosen(options)
-        results = [_one(options, rig, lambda text: stderr.write(f"{text}\n")) for rig in chosen]
+        results = [_one(options, rig, lambda text: print(text, file=stderr)) for rig in chosen]
     except _Usage as error:
         stderr.write(f"dodo rig: {error}\n")
         return Exit.USAGE
@@ -76,7 +76,7 @@ def _chosen(options: argparse.Namespace) -> list[Rig]:
     return [rig]
 
 
-def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], object]) -> dict[str, Any]:
+def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
     """Does the action on one rig; a fault of it is part of a status."""
     result: dict[str, Any] = {"rig": rig.name, "kind": rig.kind, "quarantine": ""}
     if options.action == "clear":
@@ -96,15 +96,11 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], object]) ->
         return {**result, "error": str(problem)}
 
 
-async def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], object]) -> dict[str, Any]:
+async def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
     words = [*_flags(rig), options.action, *(f"{number:g}" for number in options.place)]
     what = f"'dodo rig {options.action}'"
-    async with rigs.leased(rig.cid, what, lambda text: void(say(text)), options.wait):
+    async with rigs.leased(rig.cid, what, say, options.wait):
         return await rigs.ask(rigs.HAND, words)
-
-
-def void(_: object) -> None:
-    """Nothing."""
 
 
 def _flags(rig: Rig) -> list[str]:
@@ -137,7 +133,7 @@ def _sentence(result: dict[str, Any]) -> str:
     elif "says" in result:
         at = ""
         if result["x"] is not None:
-            at = f" at x = {result['x']:.3f} m, y = {result['y']:.3f} m, yaw = {result['yaw']:.1f} degrees"
+            at = f", x = {result['x']:.3f} m, y = {result['y']:.3f} m, " + (f"yaw = {result['yaw']:.1f} degrees")
         parts.append(f"{result['says']}{at}")
     if result["quarantine"]:
         parts.append(f"in quarantine: {result['quarantine']}; `dodo rig clear {result['rig']}` ends that")

@@ -25,11 +25,15 @@ _END_S = 5.0
 
 
 class RigProblem(Exception):
-    """The rig cannot do it, or its program gave no answer; ``usage`` when it was asked for what it must not do."""
+    """The rig cannot do it; ``usage`` when it was asked for what it must not do."""
 
     def __init__(self, text: str, usage: bool = False) -> None:
         super().__init__(text)
         self.usage = usage
+
+
+class NoAnswer(RigProblem):
+    """The rig's program did not run as it should, which says nothing about the rig."""
 
 
 def folder() -> Path:
@@ -98,21 +102,26 @@ async def ask(program: Sequence[str], words: Sequence[str], patience_s: float = 
     """What a rig's program answers; it is told to end, so that it stops the rig, when the caller is. RigProblem."""
     environment = {**base_environment(), "PYTHONPATH": package_path()}
     process = await asyncio.create_subprocess_exec(
-        *program, *words, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-        env=environment, start_new_session=True,
-    )  # fmt: skip
+        *program,
+        *words,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+        env=environment,
+        start_new_session=True,
+    )
     try:
         async with asyncio.timeout(patience_s):
             out, err = await process.communicate()
     except TimeoutError:
-        raise RigProblem(f"the rig's program gave no answer within {patience_s:g} s") from None
+        raise NoAnswer(f"the rig's program gave no answer within {patience_s:g} s") from None
     finally:
         await _ended(process)
     try:
         said: dict[str, Any] = json.loads(out)
     except ValueError:
         last = (err.decode(errors="replace").strip().splitlines() or ["it said nothing"])[-1]
-        raise RigProblem(f"the rig's program gave no answer: {last}") from None
+        raise NoAnswer(f"the rig's program gave no answer: {last}") from None
     if "error" in said:
         raise RigProblem(str(said["error"]), usage=process.returncode == 2)
     return said
@@ -130,9 +139,14 @@ async def _ended(process: asyncio.subprocess.Process) -> None:
         await process.wait()
 
 
+def is_real(plan: Plan) -> bool:
+    """Whether a test runs on hardware, whose CID is its alone."""
+    return bool(plan.rig) and plan.rig != EMULATED
+
+
 async def examine(plan: Plan, say: Callable[[str], None]) -> None:
     """Before a test on a real rig: BackendError when it is in quarantine, or fails its check and is put there."""
-    if not plan.rig or plan.rig == EMULATED:
+    if not is_real(plan):
         return
     try:
         reason = quarantined(plan.rig)
@@ -155,9 +169,13 @@ async def _fault(plan: Plan) -> str:
         if program is None:
             continue
         module, action, names = program
+        if any(flag.kind == "path" and flag.name == "file" for flag in service.flags):
+            continue  # a file is alive
         words = [f"--{flag.name}={flag.value}" for flag in service.flags if flag.name in names]
         try:
             said = await ask(("python", "-m", module), [*words, *action])
+        except NoAnswer:
+            raise
         except RigProblem as problem:
             return str(problem)
         if not said.get("ok"):
@@ -169,5 +187,6 @@ HAND = ("python", "-m", "services.gantry.hand")
 RANGES = ("range-x", "range-y", "range-yaw")
 CHECKS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "gantry": ("services.gantry.hand", ("check",), ("serial", *RANGES)),
+    "camera": ("services.camera.check", (), ("source", "width", "height", "freq", "exposure")),
 }
 """For each service that has hardware: the module that checks it, its action, and the test's flags that it takes."""

@@ -98,7 +98,8 @@ def _homing(link: Link, limits: Limits, patience: float) -> list[Check]:
 
 def _difference(link: Link, limits: Limits, axis: str, patience: float) -> float:
     """By how much an axis has its switch elsewhere the second time (m or rad)."""
-    low, high = getattr(limits.low, axis), getattr(limits.high, axis)
+    low: float = getattr(limits.low, axis)
+    high: float = getattr(limits.high, axis)
     way = min(WAYS[axis], (high - low) / 2)
     took = []
     for times in (1, 2):
