@@ -21,6 +21,8 @@ from services.camera.service import open_camera
 
 BRIGHTNESS = 0.04, 0.97
 """Mean brightness of a lit picture, as a share of white."""
+BLACK, WHITE = 16.0, 235.0
+"""Of the Y plane (BT.601)."""
 CONTRAST = 0.02
 """Least standard deviation of brightness: a covered lens or a blown picture has less."""
 
@@ -39,7 +41,7 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
 
 def judged(picture: Picture) -> dict[str, Any]:
     """``ok``, ``reason``, and brightness and contrast as shares of white."""
-    luma = picture.i420[: picture.i420.shape[0] * 2 // 3] / 255
+    luma = (picture.i420[: picture.i420.shape[0] * 2 // 3] - BLACK) / (WHITE - BLACK)
     brightness, contrast = round(float(luma.mean()), 4), round(float(luma.std()), 4)
     low, high = BRIGHTNESS
     reason = ""
