@@ -82,3 +82,13 @@ def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
     ground = read_ground(tmp_path)
     assert [name for name, _ in ground.lines] == ["left", "right", "finish"]
     assert [len(points) for _, points in ground.models] == [2]
+
+
+def test_the_readme_has_a_table_of_the_services() -> None:
+    manifests = [(folder, yaml.safe_load((folder / "service.yml").read_text())) for folder in MANIFESTS]
+    rows = [
+        f"| [{about['name']}](services/{folder.name}) | {', '.join(about['layers'])} | {about['description']} |"
+        for folder, about in manifests
+        if not about.get("automatic")
+    ]
+    assert "\n".join(["|---|---|---|", *rows, ""]) in README

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import shlex
 from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
@@ -68,7 +69,7 @@ def _explain(checked: Checked, name: str, stdout: TextIO, stderr: TextIO) -> int
         return Exit.USAGE
     stdout.write(f"{manifest.name} ({', '.join(manifest.layers)}): {manifest.description}\n\nparameters:\n")
     for parameter in manifest.parameters.values():
-        default = "" if parameter.default is None else f", default {parameter.default}"
+        default = "" if parameter.default in (None, []) else f", default {parameter.default}"
         facts = "required" if parameter.required else f"{parameter.type}{default}"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
         stdout.write(f"  {parameter.name}: {facts} {unit}".rstrip() + f"\n      {parameter.help}\n")
@@ -76,6 +77,8 @@ def _explain(checked: Checked, name: str, stdout: TextIO, stderr: TextIO) -> int
         for way, names in (("in", ports.inputs), ("out", ports.outputs)):
             if names:
                 stdout.write(f"{title} {way}: {', '.join(names)}\n")
+    if manifest.example is not None:
+        stdout.write(f"alone: {shlex.join([*manifest.process, '--cid=128', *manifest.example])}\n")
     return Exit.OK
 
 

@@ -104,11 +104,11 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         except (_Usage, selection.NoSuchTest) as error:
             stderr.write(f"dodo run: {error}\n")
             return Exit.USAGE
-        outcomes = _run(runner, jobs, options.report, stdout)
+        outcomes, is_reported = _run(runner, jobs, options.report, stdout)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
-    return _exit_code(outcomes, runner.interrupted)
+    return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
 
 
 def _more_descriptors() -> None:
@@ -254,7 +254,8 @@ def _backends(
     return Processes(deployment.cids, options.isolation, (descriptor,))
 
 
-def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> list[Outcome]:
+def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> tuple[list[Outcome], bool]:
+    """The outcomes, and whether the report holds all of them; without it they are told all the same."""
     forget(report.resolve(), [job.plan.slug for job in jobs])
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
@@ -264,11 +265,15 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> l
         history.add((tests[outcome.slug], outcome) for outcome in outcomes)
         times = history.times({(job.plan.spec, job.test) for job in jobs}, runner.backends.name)
         drawables = {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs}
-        problems = write_report(report, outcomes, drawables, times)
+        problems, unwritten = [], ""
+        try:
+            problems = write_report(report, outcomes, drawables, times)
+        except OSError as error:
+            unwritten = f"'{report}' cannot take the whole report: {error.strerror or error}"
     stdout.writelines(f"{problem}\n" for problem in problems)
     summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
-    stdout.write(f"report: {report / 'index.html'}\n")
-    return outcomes
+    stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}\n")
+    return outcomes, not unwritten
 
 
 @contextlib.contextmanager

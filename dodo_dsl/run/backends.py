@@ -128,7 +128,7 @@ class Containers:
                     await rigs.examine(plan, say)
                     yield backend
         finally:
-            lease.release()
+            lease.leave() if backend.left_behind else lease.release()
 
 
 def replace_flags(plan: Plan) -> Plan:

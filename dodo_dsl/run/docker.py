@@ -62,6 +62,7 @@ class DockerBackend:
         self._out_of_memory: set[str] = set()
         self._events: Any = None
         self._closing = False
+        self.left_behind = False
 
     async def open(self) -> None:
         code, out, problem = await self._compose("config", "--format", "json")
@@ -150,7 +151,7 @@ class DockerBackend:
         except Exception as error:  # noqa: BLE001  (whatever ends the stream, the engine is out of sight)
             why = f"the Docker engine went away: {error}"
         else:
-            why = "the Docker engine ended its events"
+            why = "the Docker engine went away: its events ended"
         if not self._closing:
             self._tell(self._queue.put_nowait, Lost(why))
 
@@ -179,8 +180,9 @@ class DockerBackend:
         self._queue.put_nowait(Exited(name, code, name in self._out_of_memory))
 
     async def start(self, layer: str) -> dict[str, bool]:
-        own = [s.name for s in self.plan.layer(layer)]
-        names = own or [s.name for s in self.plan.application.services if s.name in self._containers]
+        names = [s.name for s in self.plan.layer(layer)]
+        if layer == "application":
+            names = [s.name for s in self.plan.application.services if s.name in self._containers]
         judges = {s.name for s in self.plan.services if s.judge}
         for name in names:
             self._outputs[name] = Output(
@@ -279,14 +281,27 @@ class DockerBackend:
         return kept
 
     def _take_down(self) -> None:
+        """What cannot be removed, as the engine has gone, is left to the next run."""
         from docker.errors import DockerException
 
-        with contextlib.suppress(DockerException, OSError):
+        try:
             stop_project(self._client, self.project)
             for container in self._containers.values():
                 if self._records(container):
-                    copy_out(container, f"{_REPORT}/.", self.report)
+                    self._copy_report(container)
             remove_project(self._client, self.project)
+        except (DockerException, OSError):
+            self.left_behind = True
+            self._say("the engine does not take it down: the next run does, or dodo doctor --clean")
+
+    def _copy_report(self, container: Any) -> None:
+        from docker.errors import DockerException
+
+        try:
+            copy_out(container, f"{_REPORT}/.", self.report)
+        except (DockerException, OSError) as error:
+            why = getattr(error, "strerror", None) or error
+            self._say(f"the report misses files of {container.labels[SERVICE_LABEL]}: {why}")
 
     def _records(self, container: Any) -> bool:
         name = container.labels[SERVICE_LABEL]

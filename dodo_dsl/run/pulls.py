@@ -1,6 +1,7 @@
 """Images before a test's clock starts: DoDo's own are pulled when missing, the application's are resolved anew."""
 
 import asyncio
+import threading
 from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
@@ -15,6 +16,7 @@ class Pulls:
     def __init__(self, client: Any) -> None:
         self._client = client
         self._tasks: dict[str, asyncio.Task[str]] = {}
+        self._over = threading.Event()
 
     async def provide(self, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
         """Makes the images local; returns notes on what was taken as it is. Raises BackendError."""
@@ -23,7 +25,15 @@ class Pulls:
         return [note for note in await asyncio.gather(*waits) if note]
 
     async def _pull_once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str:
-        return await self.once(image, lambda: asyncio.to_thread(work, image, say))
+        return await self.once(image, lambda: self._in_thread(work, image, say))
+
+    async def _in_thread(self, work: Callable[[str, Say], str], image: str, say: Say) -> str:
+        """Pulls on while tests wait for it; the end of an interrupted run does not."""
+        try:
+            return await asyncio.to_thread(work, image, say)
+        except asyncio.CancelledError:
+            self._over.set()
+            raise
 
     async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str]]) -> str:
         """Does a piece of work once for all tests of the run; those that come later wait for the first."""
@@ -62,9 +72,11 @@ class Pulls:
         progress = _Progress(image, say)
         try:
             for line in self._client.api.pull(*split_reference(image), stream=True, decode=True):
+                if self._over.is_set():
+                    return
                 progress.take(line)
         except DockerException as error:
-            raise BackendError(f"image {image} cannot be pulled: {_reason(str(error))}") from error
+            raise BackendError(f"image {image} cannot be pulled: {_reason(_said(error))}") from error
 
 
 def split_reference(image: str) -> tuple[str, str]:
@@ -76,6 +88,11 @@ def split_reference(image: str) -> tuple[str, str]:
     return (repository, tag) if sign and "/" not in tag else (image, "latest")
 
 
+def _said(error: Exception) -> str:
+    """The engine's own words, without those of the client around them."""
+    return str(getattr(error, "explanation", None) or error)
+
+
 def _reason(text: str) -> str:
     if any(word in text for word in ("unauthorized", "denied", "no basic auth")):
         return f"{text}; the registry wants a log-in: docker login"
@@ -83,17 +100,21 @@ def _reason(text: str) -> str:
 
 
 class _Progress:
-    """Megabytes of an image's layers, told once a tenth."""
+    """Megabytes of an image's layers, told once a tenth, and that the engine has to try again, told once."""
 
     def __init__(self, image: str, say: Say) -> None:
         self._image = image
         self._say = say
         self._layers: dict[str, tuple[int, int]] = {}
         self._told = -1
+        self._retried = False
 
     def take(self, line: dict[str, Any]) -> None:
         if "error" in line:
             raise BackendError(f"image {self._image} cannot be pulled: {_reason(str(line['error']))}")
+        if str(line.get("status")).startswith("Retrying") and not self._retried:
+            self._retried = True
+            self._say(f"pulling {self._image}: the connection broke, the engine tries again")
         detail = line.get("progressDetail") or {}
         if line.get("status") == "Downloading" and detail.get("total"):
             self._layers[line["id"]] = (detail["current"], detail["total"])

@@ -182,7 +182,7 @@ class Runner:
         except BackendError as error:
             return self._without_answer(job.plan, str(error))
         except OSError as error:
-            return self._without_answer(job.plan, f"this machine cannot run the test: {error}")
+            return self._without_answer(job.plan, f"this machine cannot run the test: {_without_number(error)}")
         return outcome
 
     def _without_answer(self, plan: Plan, reason: str) -> Outcome:
@@ -200,6 +200,11 @@ class Runner:
             clock=plan.clock,
             backend=self.backends.name,
         )
+
+
+def _without_number(error: OSError) -> str:
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror or error}"
 
 
 def set_aside(report: Path, attempt: int) -> None:

@@ -48,7 +48,7 @@ class Ports:
 
 @dataclass(frozen=True)
 class Manifest:
-    """One service; ``folder`` holds its ``service.yml``."""
+    """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to try it alone with, if any."""
 
     folder: Path
     name: str
@@ -60,6 +60,7 @@ class Manifest:
     messages: Ports = Ports()
     memory: Ports = Ports()
     devices: tuple[str, ...] = ()
+    example: tuple[str, ...] | None = None
 
 
 def _ports(raw: dict[str, list[str]] | None) -> Ports:
@@ -99,6 +100,7 @@ def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
         messages=_ports(raw.get("messages")),
         memory=_ports(raw.get("memory")),
         devices=tuple(raw.get("devices") or ()),
+        example=tuple(raw["example"]) if "example" in raw else None,
     )
     return manifest, found
 

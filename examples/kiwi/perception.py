@@ -50,7 +50,8 @@ def find_cones(image: MatLike) -> list[Cone]:
     """The cones in an image of blue, green, red (and alpha), the nearest of each colour first."""
     height, width = image.shape[:2]
     top = int(HORIZON * height)
-    hsv = cv2.cvtColor(white_balanced(np.ascontiguousarray(image[top:, :, :3])), cv2.COLOR_BGR2HSV)
+    ground = image[top:] if image.shape[2] == 3 else cv2.cvtColor(image[top:], cv2.COLOR_BGRA2BGR)
+    hsv = cv2.cvtColor(white_balanced(ground), cv2.COLOR_BGR2HSV)
     return [
         Cone(colour, x / width, (top + y) / height, w / width, h / height)
         for colour, (low, high) in HSV_RANGES.items()
@@ -62,24 +63,24 @@ def white_balanced(ground: MatLike) -> MatLike:
     """The ground as in white light: most of it is floor, and floors are nearly grey."""
     median = np.median(ground[::8, ::8].reshape(-1, 3), axis=0)
     gains = np.clip(median.mean() / np.maximum(median, 1), 0.5, 2) ** WHITE
-    return cv2.LUT(ground, np.clip(np.arange(256)[:, None] * gains, 0, 255).astype(np.uint8)[None])
+    return cv2.multiply(ground, (*gains, 1.0))
 
 
 def _boxes(mask: MatLike, smallest: float) -> list[Rect]:
     """Boxes (x, y, width, height in pixels) of the patches in a mask that may be cones, the lowest first."""
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    _, _, patches, _ = cv2.connectedComponentsWithStats(mask)
-    boxes = [((x, y, width, height), area) for x, y, width, height, area in patches[1:].tolist()]
-    cones = [box for box, area in boxes if box[2] * box[3] >= smallest and _may_be_cone(box, area, mask.shape)]
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    boxes = [cv2.boundingRect(contour) for contour in contours]
+    cones = [box for box in boxes if box[2] * box[3] >= smallest and _may_be_cone(box, mask)]
     return sorted(cones, key=lambda box: -(box[1] + box[3]))
 
 
-def _may_be_cone(box: Rect, area: int, size: tuple[int, ...]) -> bool:
+def _may_be_cone(box: Rect, mask: MatLike) -> bool:
     """Whether a patch is neither as wide nor as high as furniture; one cut off by the image may have any shape."""
     x, y, width, height = box
-    cut = x == 0 or x + width == size[1] or y + height == size[0]
-    shaped = SLENDER[0] <= height / width <= SLENDER[1] and area >= FILLED * width * height
-    return y > 0 and (cut or shaped)
+    cut = x == 0 or x + width == mask.shape[1] or y + height == mask.shape[0]
+    filled = cv2.countNonZero(mask[y : y + height, x : x + width]) / (width * height)
+    return y > 0 and (cut or (SLENDER[0] <= height / width <= SLENDER[1] and filled >= FILLED))
 
 
 def announce(session: Session, cones: list[Cone], frame: int, sample_time: int, source: argparse.Namespace) -> None:

@@ -25,6 +25,12 @@ COMMON: dict[str, About] = {
         "maximum": 4_294_967_295,
         "help": "Sender stamp of what is sent, where no parameter says otherwise.",
     },
+    "log-id": {
+        "type": "integer",
+        "minimum": 0,
+        "maximum": 4_294_967_295,
+        "help": "Sender stamp under which the log's lines are sent too, as LogMessage; without one they are not.",
+    },
     "verbose": {"type": "boolean", "default": False, "help": "Say more about what happens."},
 }
 

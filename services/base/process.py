@@ -15,6 +15,7 @@ from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, parse
 from services.base.loop import Loop
 from services.base.manifest import load_manifest
+from services.base.published import published
 from services.base.service import Build, Context
 from services.base.usage import help_text
 
@@ -73,6 +74,7 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
         ready.unlink(missing_ok=True)  # of one that was killed
         with ExitStack() as resources:
             session = resources.enter_context(Session(flags["cid"], _messages()))
+            resources.enter_context(published(session, flags["log-id"]))
             clock = clock or _clock(session, role)
             service = build(Context(name, flags, session.messages, resources, clock, session))
             code = BROKEN

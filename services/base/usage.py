@@ -1,5 +1,6 @@
 """The text of ``--help``, made from the manifest."""
 
+import shlex
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,8 +16,15 @@ def help_text(manifest: Mapping[str, Any]) -> str:
         lines += [f"  --{name}  ({_facts(about)})", f"      {about['help']}"]
     lines.append("  --help")
     lines.append("      Say this.")
+    return "\n".join([*lines, "", f"example: {example_line(manifest)}"]) + "\n"
+
+
+def example_line(manifest: Mapping[str, Any]) -> str:
+    """A command that starts the service alone: with the manifest's example, or else what is required."""
+    known = parameters(manifest)
     required = [f"--{name}={example(about)}" for name, about in known.items() if about.get("required")]
-    return "\n".join([*lines, "", f"example: {' '.join([command, *required])}"]) + "\n"
+    words = [f"--cid={example(known['cid'])}", *manifest["example"]] if "example" in manifest else required
+    return shlex.join([*manifest["process"], *words])
 
 
 def _facts(about: About) -> str:

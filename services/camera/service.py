@@ -1,13 +1,15 @@
 """The camera as a service: pictures into shared memory at a fixed rate."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from dodo_dsl.opendlv.memory import SharedMemory
-from services.base import Context, Flags, Service, period_of
+from services.base import Context, Flags, Output, Service, period_of
 from services.base.signals import interruptible
 from services.camera.files import FileCamera
 from services.camera.grabber import SILENCE, Camera, Grabber
 from services.camera.picture import CameraError, Image, Picture
+from services.camera.report import Report
 from services.camera.rpicam import RpiCamera
 from services.camera.v4l2 import V4l2Camera
 
@@ -15,22 +17,24 @@ EMULATED = "an emulated camera belongs to the emulated rig, which comes with a l
 
 
 class CameraService(Service):
-    """Shares the newest picture at each instant of its rate, and none twice."""
+    """Shares the newest picture at each instant of its rate, and none twice; ``report`` says that it does."""
 
-    def __init__(self, camera: Grabber | FileCamera, argb: SharedMemory, i420: SharedMemory, freq: float) -> None:
+    def __init__(
+        self, camera: Grabber | FileCamera, argb: SharedMemory, i420: SharedMemory, freq: float, report: Report
+    ) -> None:
         self.period = period_of(freq)
-        self._camera, self._argb, self._i420 = camera, argb, i420
+        self._camera, self._argb, self._i420, self._report = camera, argb, i420, report
         self.shared = 0
         """How many pictures were shared."""
 
-    def update(self, now: int) -> tuple[()]:
+    def update(self, now: int) -> Iterable[Output]:
         picture: Picture | None = self._camera.take() if isinstance(self._camera, Grabber) else self._camera.read()
         if picture is not None:
             time = now if picture.time is None else picture.time
             share(self._argb, picture.argb, time)
             share(self._i420, picture.i420, time)
             self.shared += 1
-        return ()
+        return self._report.say(picture is not None, now)
 
 
 def share(memory: SharedMemory, image: Image, time: int) -> None:
@@ -69,16 +73,17 @@ def build(context: Context) -> Service:
         raise ValueError(f"--width={width} and --height={height} must be even for I420")
     argb = context.memory(flags["name.argb"], width * height * 4)
     i420 = context.memory(flags["name.i420"], width * height * 3 // 2)
+    report = Report(context.messages, flags["status-id"], 2 * max(period_of(freq), round(flags["exposure"] * 1e6)))
     camera = open_camera(flags)
     for note in getattr(camera, "notes", ()):
         context.log.warning("%s", note)
     if isinstance(camera, FileCamera):
         context.resources.callback(camera.close)
-        return CameraService(camera, argb, i420, freq)
+        return CameraService(camera, argb, i420, freq, report)
     silence = max(SILENCE, 2 * flags["exposure"])
     grabber = Grabber(camera, flags["source"], silence)
     context.resources.callback(grabber.close)
     with interruptible():
         if not grabber.wait(silence):
             raise CameraError(f"the camera {flags['source']} has given no picture for {silence:g} s")
-    return CameraService(grabber, argb, i420, freq)
+    return CameraService(grabber, argb, i420, freq, report)

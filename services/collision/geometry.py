@@ -58,10 +58,12 @@ def swept(start: Pose, end: Pose, box: Box) -> shapely.Geometry:
     change = math.remainder(end.heading - start.heading, math.tau)
     parts = max(1, math.ceil(abs(change) / TURN))
     ways = [index / parts for index in range(parts + 1)]
-    rings = [corners(_between(start, end, change, way), box) for way in ways]
+    rings = [corners(between(start, end, way), box) for way in ways]
     hulls = [shapely.MultiPoint(a + b).convex_hull for a, b in pairwise(rings)]
     return hulls[0] if parts == 1 else shapely.union_all(hulls)
 
 
-def _between(start: Pose, end: Pose, change: float, way: float) -> Pose:
+def between(start: Pose, end: Pose, way: float) -> Pose:
+    """The pose after a share of the way from one pose to the next, turned the shorter way round."""
+    change = math.remainder(end.heading - start.heading, math.tau)
     return Pose(start.x + way * (end.x - start.x), start.y + way * (end.y - start.y), start.heading + way * change)

@@ -1,10 +1,7 @@
 """What is measured while the vehicle drives, and the checks made of it."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
-
-import shapely
 
 from services.base import Check
 from services.collision.geometry import Pose
@@ -27,21 +24,24 @@ class Measures:
         self.distance += length
         self.max_speed = max(self.max_speed or 0.0, length * MICROSECONDS / (end[0] - start[0]))
 
-    def approach(self, area: shapely.Geometry, walls: Iterable[shapely.Geometry]) -> None:
-        """The vehicle covered an area beside the walls; touching is a margin of zero."""
-        margins = [float(shapely.distance(wall, area)) for wall in walls]
-        if self.wall_margin is not None:
-            margins.append(self.wall_margin)
-        self.wall_margin = min(margins, default=None)
+    def approach(self, margin: float) -> None:
+        """The vehicle came this close to a wall, in m; touching is a margin of zero."""
+        self.wall_margin = margin if self.wall_margin is None else min(self.wall_margin, margin)
 
     def goal_check(self, max_time: float) -> Check:
         """The time to the goal; null, and not ok, when it was not reached."""
         return Check("time-to-goal", self.time_to_goal, {"max": max_time}, "s", self.time_to_goal is not None)
 
-    def wall_check(self) -> Check:
-        """The margin, which has to be *above* its limit of zero: a wall touched is a wall hit."""
+    def wall_check(self, limit: float) -> Check:
+        """The margin, at least its limit; a limit of zero has to be *exceeded*, as a wall touched is a wall hit."""
         margin = self.wall_margin
-        return Check("wall-margin", margin, {"min": 0.0}, "m", margin is not None and margin > 0.0)
+        is_kept = margin is not None and margin >= limit and margin > 0.0
+        return Check("wall-margin", margin, {"min": limit}, "m", is_kept)
+
+    @staticmethod
+    def gate_check(crossed: int, gates: int) -> Check:
+        """The gates crossed in their order: all of them are to be."""
+        return Check("gates", crossed, {"min": gates}, "", crossed == gates)
 
     def drive_checks(self) -> tuple[Check, Check]:
         """What has no limit."""

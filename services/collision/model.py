@@ -1,14 +1,15 @@
-"""The judge of a closed loop: the goal is to be reached in time, and no wall touched on the way."""
+"""The judge of a closed loop: gates and goal are to be reached in time, and no wall touched on the way."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
 from typing import Literal
 
 import shapely
 
 from services.base import Verdict
-from services.collision.geometry import Box, Pose, outline, swept
+from services.collision.gates import Gates
+from services.collision.geometry import Box, Pose, between, outline, swept
 from services.collision.measures import Measures
+from services.collision.track import Track, fault_of_start, nearest, place, touched
 
 MICROSECONDS = 1_000_000
 REQUESTS = ("GroundSteeringRequest", "PedalPositionRequest")
@@ -16,15 +17,6 @@ REQUESTS = ("GroundSteeringRequest", "PedalPositionRequest")
 
 class UnjudgeableError(Exception):
     """There is nothing to judge the application by: the test itself is at fault."""
-
-
-@dataclass(frozen=True)
-class Track:
-    """What may not be touched and what is to be reached: obstacles by name (m), and the time for it (s)."""
-
-    walls: Mapping[str, shapely.MultiLineString]
-    goal: Mapping[str, shapely.MultiLineString]
-    max_time: float
 
 
 class Judge:
@@ -39,6 +31,8 @@ class Judge:
         self.track = track
         self.box = box
         self._measures = Measures()
+        self._gates = Gates(track.gates)
+        self._early = False
         self._heard: set[str] = set()
         self._begun = False
         self._zero: int | None = None
@@ -79,7 +73,9 @@ class Judge:
             return
         start, self._last = self._last, (time, pose)
         if start is None:
-            self._check_start(pose)
+            fault = fault_of_start(self.track, outline(pose, self.box))
+            if fault is not None:
+                raise UnjudgeableError(f"{fault}, {place(pose)}")
         elif self._elapsed(time) > self.track.max_time:
             self._out_of_time()
         elif self._elapsed(time) >= 0:
@@ -90,23 +86,37 @@ class Judge:
             self._zero = time
         return (time - self._zero) / MICROSECONDS
 
-    def _check_start(self, pose: Pose) -> None:
-        rectangle = outline(pose, self.box)
-        for kind, obstacles in (("wall", self.track.walls), ("goal", self.track.goal)):
-            name = _touched(obstacles, rectangle)
-            if name is not None:
-                raise UnjudgeableError(f"the vehicle stands on {kind} {name} from the start, {_place(pose)}")
-
     def _judge(self, start: tuple[int, Pose], time: int, pose: Pose) -> None:
-        way = swept(start[1], pose, self.box)
+        area, when = swept(start[1], pose, self.box), f"after {self._elapsed(time):.2f} s"
         self._measures.move(start, (time, pose))
-        self._measures.approach(way, self.track.walls.values())
-        wall, goal = _touched(self.track.walls, way), _touched(self.track.goal, way)
+        wall, (margin, near) = touched(self.track.walls, area), self._approach(area)
+        goal = self._reached(start[1], pose, area)
         if wall is not None:
-            self._decide("failed", f"hit wall {wall} after {self._elapsed(time):.2f} s {_place(pose)}")
+            self._decide("failed", f"hit wall {wall} {when} {place(pose)}")
+        elif margin < self.track.min_margin:
+            limit = f"it is to keep {self.track.min_margin:g} m away"
+            self._decide("failed", f"came within {margin:.3f} m of wall {near} {when} {place(pose)}: {limit}")
         elif goal is not None:
             self._measures.time_to_goal = self._elapsed(time)
-            self._decide("passed", f"reached {goal} after {self._elapsed(time):.2f} s")
+            self._decide("passed", f"{goal} {when}")
+
+    def _approach(self, area: shapely.Geometry) -> tuple[float, str]:
+        near = nearest(self.track.walls, area)
+        if near is not None:
+            self._measures.approach(near[0])
+        return near or (math.inf, "")
+
+    def _reached(self, start: Pose, end: Pose, area: shapely.Geometry) -> str | None:
+        """That the goal was reached after all gates, or the last gate where there is no goal; None when it was not."""
+        share = self._gates.move(start, end)
+        if share is None:
+            self._early = self._early or touched(self.track.goal, area) is not None
+            return None
+        if self.track.gates and not self.track.goal:
+            return f"crossed the last gate, {self.track.gates[-1][0]},"
+        rest = area if share == 0.0 else swept(between(start, end, share), end, self.box)
+        name = touched(self.track.goal, rest)
+        return name and f"reached {name}"
 
     def _out_of_time(self) -> None:
         span = f"{self.track.max_time:.2f} s"
@@ -119,25 +129,22 @@ class Judge:
         aside = f"; the application sent no {silent[0]}" if silent else ""
         if len(silent) == len(REQUESTS):
             self._decide("failed", f"the application sent no {' and no '.join(silent)} {within}")
-        elif self.track.goal:
+        elif self.track.goal or self.track.gates:
             self._decide("failed", f"{self._missed(self._last[1], within)}{aside}")
         else:
             self._decide("passed", f"stayed clear of {' and '.join(self.track.walls)} {during}{aside}")
 
     def _missed(self, pose: Pose, within: str) -> str:
-        name, goal = next(iter(self.track.goal.items()))
-        away = shapely.distance(goal, outline(pose, self.box))
-        return f"did not reach {name} {within}: the vehicle is {_place(pose)}, {away:.2f} m from it"
+        name, lines = self._gates.next or next(iter(self.track.goal.items()))
+        away = f"the vehicle is {place(pose)}, {shapely.distance(lines, outline(pose, self.box)):.2f} m from"
+        if self._gates.next is None:
+            return f"did not reach {name} {within}: {away} it"
+        early = f"; {next(iter(self.track.goal))} does not count before the gates" if self._early else ""
+        return f"crossed {self._gates.crossed} of {len(self._gates)} gates {within}: {away} {name}, the next{early}"
 
     def _decide(self, outcome: Literal["passed", "failed"], reason: str) -> None:
-        goal = (self._measures.goal_check(self.track.max_time),) if self.track.goal else ()
-        walls = (self._measures.wall_check(),) if self.track.walls else ()
-        self.verdict = Verdict(outcome, reason, (*goal, *walls, *self._measures.drive_checks()))
-
-
-def _touched(obstacles: Mapping[str, shapely.MultiLineString], area: shapely.Geometry) -> str | None:
-    return next((name for name, lines in obstacles.items() if shapely.intersects(lines, area)), None)
-
-
-def _place(pose: Pose) -> str:
-    return f"at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"
+        track, measures = self.track, self._measures
+        goal = (measures.goal_check(track.max_time),) if track.goal or track.gates else ()
+        gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
+        walls = (measures.wall_check(track.min_margin),) if track.walls else ()
+        self.verdict = Verdict(outcome, reason, (*goal, *gates, *walls, *measures.drive_checks()))

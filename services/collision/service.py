@@ -9,8 +9,9 @@ from google.protobuf.message import Message
 
 from services.base import Context, Flags, Handler, Output, Service
 from services.collision.geometry import Box, Pose, heading_of
-from services.collision.model import REQUESTS, Judge, Track
+from services.collision.model import REQUESTS, Judge
 from services.collision.obstacles import load, pick
+from services.collision.track import Track
 
 PERIOD = 10_000  # us
 
@@ -56,15 +57,25 @@ class Collision(Service):
 
 
 def track(flags: Flags) -> Track:
-    """The obstacles that the flags name, from the map; raises MapError, and ValueError when nothing is named."""
-    path, goal, walls = Path(flags["map-path"]), flags["goal"], flags["walls"]
-    if not goal and not walls:
-        raise ValueError("there is nothing to judge by: give --goal, --walls or both")
+    """The obstacles that the flags name, from the map; raises MapError, and ValueError for what makes no track."""
+    path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
+    if not goal and not walls and not gates:
+        raise ValueError("there is nothing to judge by: give --goal, --gates or --walls")
     if goal in walls:
         raise ValueError(f"--goal={goal} is one of the --walls too")
+    for name in gates:
+        if name in walls:
+            raise ValueError(f"{name} of --gates is one of the --walls too")
+    if flags["min-margin"] and not walls:
+        raise ValueError("--min-margin is a distance to --walls, of which there are none")
     obstacles = load(path)
+    picked = pick(obstacles, gates, "gates", path)
     return Track(
-        pick(obstacles, walls, "walls", path), pick(obstacles, [goal] if goal else [], "goal", path), flags["max-time"]
+        walls=pick(obstacles, walls, "walls", path),
+        goal=pick(obstacles, [goal] if goal else [], "goal", path),
+        max_time=flags["max-time"],
+        gates=tuple((name, picked[name]) for name in gates),
+        min_margin=flags["min-margin"],
     )
 
 

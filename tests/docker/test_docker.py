@@ -112,21 +112,6 @@ def test_hostile_neighbours_are_neither_heard_nor_felt(tmp_path: Path) -> None:
         assert log.startswith(f"hostile: {harm}")
 
 
-def test_killed_runner_is_cleaned_up_by_the_next_run(tmp_path: Path) -> None:
-    process = start(tmp_path, "sil-closed-left-curve", "--report", str(tmp_path / "killed"))
-    assert process.stdout is not None
-    for line in process.stdout:
-        if "running" in line:
-            break
-    process.send_signal(signal.SIGKILL)
-    process.communicate(timeout=30)
-    assert of_dodo()["containers"] > 5
-    second = start(tmp_path, "sil-closed-straight", "--report", str(tmp_path / "second"))
-    out, _ = second.communicate(timeout=240)
-    assert second.returncode == 0, out
-    assert "removed what a killed run left: sil-closed-left-curve" in out
-
-
 def test_reaping_touches_nothing_else(tmp_path: Path) -> None:
     """A stranger's container stays, though a killed run's goes."""
     base = f"dodo/sandbox:{__version__}"
@@ -141,19 +126,6 @@ def test_reaping_touches_nothing_else(tmp_path: Path) -> None:
         assert stranger in running.split()
     finally:
         subprocess.run(["docker", "rm", "-f", stranger], capture_output=True, check=True)
-
-
-def test_missing_image_is_an_error_with_its_name(tmp_path: Path) -> None:
-    compose = tmp_path / "docker-compose.yml"
-    service = {"image": "127.0.0.1:9/dodo-no-such-image:1", "command": "--cid=111 --name=video0.argb"}
-    compose.write_text(yaml.safe_dump({"services": {"app": service}}))
-    words = ["sil-closed-straight", "--application", str(compose), "--report", str(tmp_path / "report")]
-    process = start(tmp_path, *words)
-    out, _ = process.communicate(timeout=60)
-    assert process.returncode == 3, out
-    (test,) = results(tmp_path / "report").values()
-    assert test["outcome"] == "error"
-    assert str(test["reason"]).startswith("image 127.0.0.1:9/dodo-no-such-image:1 cannot be pulled: ")
 
 
 @pytest.mark.parametrize(
@@ -173,25 +145,6 @@ def test_applications_that_end(command: list[str], reason: str, tmp_path: Path) 
     (test,) = results(tmp_path / "report").values()
     assert str(test["reason"]).startswith(reason), out
     assert test["outcome"] == ("error" if "started" in reason else "failed")
-
-
-def test_application_that_is_killed(tmp_path: Path) -> None:
-    compose = tmp_path / "docker-compose.yml"
-    service = {"image": f"dodo/base:{__version__}", "entrypoint": ["sleep", "600"], "environment": ["CID=111"]}
-    compose.write_text(yaml.safe_dump({"services": {"app": service}}))
-    words = ["sil-closed-straight", "--application", str(compose), "--report", str(tmp_path / "report")]
-    process = start(tmp_path, *words)
-    assert process.stdout is not None
-    for line in process.stdout:
-        if "running" in line:
-            break
-    chosen = ["docker", "ps", "-q", "--filter", "label=com.docker.compose.service=app"]
-    container = subprocess.run(chosen, capture_output=True, text=True, check=True).stdout.split()
-    subprocess.run(["docker", "kill", *container], capture_output=True, check=True)
-    out, _ = process.communicate(timeout=60)
-    (test,) = results(tmp_path / "report").values()
-    assert str(test["reason"]).startswith("application service 'app' was killed by SIGKILL after"), out
-    assert test["outcome"] == "failed"
 
 
 def test_interrupt_takes_everything_down(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TESTS = ("sil-closed-left-curve", "sil-open-straight")
+TESTS = ("sil-closed-left-curve", "dil-static-rig")
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("images")]
 

@@ -49,7 +49,7 @@ def test_wrong_applications_fail_for_the_right_reason(
 ) -> None:
     application = kiwi(tmp_path / "app", edit, **words)
     report = tmp_path / "report"
-    dodo("run", *reasons, "-j", "4", "--application", str(application), "--report", str(report), code=1)
+    dodo("run", *reasons, "--clock", "lockstep", "--application", str(application), "--report", str(report), code=1)
     for slug, test in results(report).items():
         assert test["outcome"] == "failed", (wrong, test)
         assert reasons[slug] in test["reason"], (wrong, test)

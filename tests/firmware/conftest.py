@@ -10,6 +10,8 @@ import pytest
 
 from tests.firmware.programs import BUILT, ROOT, Bench, Rig
 
+SIMAVR = Path("/usr/include/simavr/sim_avr.h")
+
 
 def _make(*targets: str) -> None:
     words = ["make", "-s", "-C", str(ROOT / "firmware"), *targets]
@@ -30,8 +32,8 @@ def bench_program() -> Path:
 @pytest.fixture(scope="session")
 def firmware() -> None:
     """The binary and its emulator are there."""
-    if shutil.which("avr-gcc") is None:
-        pytest.skip("avr-gcc is missing: scripts/install-firmware-tools installs it on Debian")
+    if shutil.which("avr-gcc") is None or not SIMAVR.is_file():
+        pytest.skip("avr-gcc or simavr is missing: scripts/install-firmware-tools installs them on Debian")
     _make("firmware", "emulator")
 
 

@@ -75,6 +75,16 @@ def test_service_says_its_help(built: dict[str, str], manifest: Manifest) -> Non
 
 
 @each_service
+def test_service_finds_all_that_it_imports(built: dict[str, str], manifest: Manifest) -> None:
+    """Also what it loads only where a flag asks for it."""
+    package = f"services.{manifest.folder.name}"
+    look = "import importlib, pkgutil, sys; package = importlib.import_module(sys.argv[1]); "
+    look += "names = [m.name for m in pkgutil.iter_modules(package.__path__, sys.argv[1] + '.')]; "
+    look += "[importlib.import_module(name) for name in names if not name.endswith('.__main__')]; print(len(names))"
+    assert int(run(built[manifest.image], "python3", "-c", look, package)) >= 1
+
+
+@each_service
 def test_labels_and_user(built: dict[str, str], manifest: Manifest) -> None:
     about = config(built[manifest.image])
     assert about["User"] == "10001:10001"
@@ -129,6 +139,25 @@ def test_service_gets_healthy_and_ends_when_told_to(built: dict[str, str], volum
         assert docker("logs", container).splitlines()[0] == '{"dodo": "ready"}'
         docker("stop", "--time", "10", container)
         assert docker("inspect", "--format", "{{.State.ExitCode}}", container) == "0"
+
+
+@each_service
+def test_service_gets_healthy_with_its_example(built: dict[str, str], volume: str, manifest: Manifest) -> None:
+    """So the libraries are there that it loads late, such as the decoder of video."""
+    about = yaml.safe_load((manifest.folder / "service.yml").read_text())
+    if "example" not in about or manifest.devices == ("{serial}",):
+        pytest.skip("its example needs a rig, or the clock of a test")
+    files = ("--volume", f"{ROOT / 'tests_registry'}:/opt/dodo/tests_registry:ro")
+    words = (manifest.name, "--cid=131", *about["example"])
+    with started(built[manifest.image], volume, *words, flags=files) as container:
+        assert await_health(container) == "healthy"
+
+
+def test_recorder_can_encode_pictures(built: dict[str, str]) -> None:
+    look = "from dodo_dsl.opendlv import pixels as p, video_encoder as v; import numpy; "
+    look += "picture = p.view(numpy.zeros(p.size('i420', 64, 48), numpy.uint8), 'i420', 64, 48); "
+    look += "print(len(v.VideoEncoder('i420', 64, 48, 4).encode(picture)) > 0)"
+    assert run(built["rec-recorder"], "python3", "-c", look) == "True"
 
 
 def test_service_that_is_not_ready_is_not_healthy(built: dict[str, str], volume: str) -> None:

@@ -123,11 +123,12 @@ def test_unplugged_in_mid_test_and_then_quarantined(place: Place) -> None:
     puller.join()
     assert test["outcome"] == "error" and "has been away for" in test["reason"] + "".join(test["last_lines"])
     assert not list((place.folder / "state").glob("*"))
-    reason = "there is no serial port"
+    reason = "is no device"
     assert reason in place.test(code=3)["reason"]
     place.rig.plug()
     again = place.test(code=3)
     assert "rig fake is in quarantine" in again["reason"] and reason in again["reason"]
     assert "in quarantine" in place.dodo("rig", "status", code=1)
+    assert "PROBLEM  rig fake" in place.dodo("doctor", code=1)
     place.dodo("rig", "clear", "fake", code=0)
     assert "quarantine" not in place.dodo("rig", "status", code=0)

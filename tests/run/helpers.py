@@ -15,6 +15,14 @@ READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
 PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'
 FAIL = 'print(\'{"dodo": "verdict", "outcome": "failed", "reason": "hit wall left", "checks": []}\', flush=True)\n'
 WAIT = "import time; time.sleep(600)\n"
+STARTED = 'open(sys.argv[0].rpartition("-")[0] + "-started", "w").close()\n'
+"""What an application does first, so that others, by BEGUN, go on only when the test has begun."""
+BEGUN = """
+while not os.path.exists(sys.argv[0].rpartition("-")[0] + "-started"):
+    time.sleep(0.05)
+time.sleep(1)
+"""
+DRIVES = READY + BEGUN + "time.sleep(1)\n" + PASS
 CIDS = range(200, 230)
 
 

@@ -11,87 +11,15 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-import jsonschema
 import pytest
 
-from dodo_dsl import data
-from dodo_dsl.plan.model import Plan, to_json
-from tests.run.helpers import FAIL, PASS, READY, WAIT, Bench
-
-ROOT = Path(__file__).parents[2]
-
-
-class Desk:
-    """Compiled tests, a report folder and a lease folder of their own."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.bench = Bench(folder)
-        self.environment = {**os.environ, "DODO_LEASES": str(folder / "leases")}
-
-    def compiled(self, plan: Plan) -> Path:
-        target = self.folder / "generated" / plan.slug
-        target.mkdir(parents=True, exist_ok=True)
-        (target / "test.json").write_text(to_json(plan))
-        return target
-
-    def start(self, plan: Plan, *flags: str, report: str = "report") -> "subprocess.Popen[str]":
-        words = ["run", "--compiled", str(self.compiled(plan)), "--report", str(self.folder / report), *flags]
-        return subprocess.Popen(
-            [sys.executable, "-m", "dodo_dsl", *words],
-            cwd=self.folder,
-            env={**self.environment, "PYTHONPATH": str(ROOT)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-
-    def results(self, report: str = "report") -> list[dict[str, object]]:
-        document = json.loads((self.folder / report / "results.json").read_text())
-        jsonschema.validate(document, json.loads((data.schemas() / "results.schema.json").read_text()))
-        return list(document["tests"])
+from tests.run.desk import ROOT, Desk, gone, marks, processes_with, wait_for
+from tests.run.helpers import FAIL, PASS, READY, WAIT
 
 
 @pytest.fixture
 def desk(tmp_path: Path) -> Desk:
     return Desk(tmp_path)
-
-
-def wait_for(process: "subprocess.Popen[str]", text: str) -> str:
-    """Reads the command's output up to a line that holds ``text``."""
-    assert process.stdout is not None
-    seen = ""
-    for line in process.stdout:
-        seen += line
-        if text in line:
-            return seen
-    raise AssertionError(f"it ended without '{text}':\n{seen}")
-
-
-def processes_with(mark: str) -> list[str]:
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            text = path.read_bytes()
-        except OSError:
-            continue
-        if mark.encode() in text:
-            found.append(path.parent.name)
-    return found
-
-
-def gone(mark: str, seconds: float = 8.0) -> bool:
-    deadline = time.monotonic() + seconds
-    while processes_with(mark):
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.05)
-    return True
-
-
-def marks(desk: Desk) -> str:
-    """What the command lines of all services of a desk hold, and nothing else's does."""
-    return str(desk.folder / "test-")
 
 
 def test_passes_with_exit_code_0(desk: Desk) -> None:
@@ -195,48 +123,6 @@ def test_tampered_compiled_tests_are_refused(desk: Desk, change: dict[str, objec
     result = subprocess.run(command, cwd=desk.folder, env=environment, capture_output=True, text=True, check=False)
     assert result.returncode == 2
     assert "not a compiled test" in result.stderr
-
-
-@pytest.mark.parametrize("isolation", ["network", "host"])
-def test_killed_runner_leaves_nothing(desk: Desk, isolation: str) -> None:
-    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", isolation)
-    wait_for(process, "running")
-    process.kill()
-    process.communicate(timeout=30)
-    assert gone(marks(desk))
-
-
-def test_next_run_removes_what_a_killed_sandbox_left_on_the_host(desk: Desk) -> None:
-    """Runner and sandbox both killed: only the lease's record says what was there."""
-    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", "host")
-    wait_for(process, "running")
-    sandboxes = [pid for pid in processes_with("dodo_dsl.run.sandbox") if parent(pid) == process.pid]
-    assert len(sandboxes) == 1
-    os.kill(int(sandboxes[0]), signal.SIGSTOP)
-    process.kill()
-    os.kill(int(sandboxes[0]), signal.SIGKILL)
-    process.communicate(timeout=30)
-    assert processes_with(marks(desk))
-    second = desk.start(desk.bench.plan(slug="second"), report="second")
-    out, _ = second.communicate(timeout=30)
-    assert second.returncode == 0, out
-    assert "removed what a killed run left: test: 3 processes" in out
-    assert gone(marks(desk))
-
-
-def parent(pid: str) -> int:
-    return int(Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()[1])
-
-
-@pytest.mark.parametrize("isolation", ["network", "host"])
-def test_two_runs_at_once(desk: Desk, isolation: str) -> None:
-    plans = [desk.bench.plan(slug=f"test-{n}", judge=READY + "time.sleep(1)\n" + PASS) for n in range(2)]
-    processes = [desk.start(p, "--isolation", isolation, report=p.slug) for p in plans]
-    outs = [p.communicate(timeout=40)[0] for p in processes]
-    assert [p.returncode for p in processes] == [0, 0], outs
-    cids = [desk.results(p.slug)[0]["cid"] for p in plans]
-    if isolation == "host":
-        assert len(set(cids)) == 2
 
 
 def test_foreign_traffic_is_refused_with_its_sender(desk: Desk) -> None:

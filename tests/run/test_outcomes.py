@@ -32,18 +32,6 @@ CASES = {
         "failed",
         "application service 'app' ended with exit code 3 after",
     ),
-    "application-is-killed": (
-        {"application": "os.kill(os.getpid(), 9)", "judge": READY + WAIT},
-        "failed",
-        "application service 'app' was killed by SIGKILL after",
-    ),
-    "no-verdict": ({"judge": READY}, "error", "evaluator 'judge' ended without a verdict"),
-    "two-verdicts": ({"judge": READY + PASS + FAIL}, "error", "evaluator 'judge' gave 2 verdicts, expected one"),
-    "malformed-verdict": (
-        {"judge": READY + 'print(\'{"dodo": "verdict", "outcome": "maybe"}\')\n' + WAIT},
-        "error",
-        "the verdict of evaluator 'judge' is malformed: its outcome is \"maybe\", expected passed or failed",
-    ),
     "judge-crashes-after-its-verdict": (
         {"judge": READY + PASS + "raise SystemExit(2)"},
         "error",

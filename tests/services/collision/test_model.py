@@ -1,5 +1,6 @@
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import pytest
 import shapely
@@ -9,7 +10,8 @@ from hypothesis import strategies as st
 
 from services.base import Verdict
 from services.collision.geometry import Box, Pose
-from services.collision.model import REQUESTS, Judge, Track, UnjudgeableError
+from services.collision.model import REQUESTS, Judge, UnjudgeableError
+from services.collision.track import Track
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND
@@ -212,6 +214,103 @@ def test_without_walls_no_margin_is_checked() -> None:
     it = judge(Track({}, LANE.goal, 2.0))
     drive(it, (0, 0, 0, 0), (1, 3, 0, 0))
     assert list(values(it)) == ["time-to-goal", "distance", "max-speed"]
+
+
+LAP = replace(LANE, gates=(("east", line(1, -0.2, 1, 0.2)), ("west", line(2, -0.2, 2, 0.2))))
+
+
+def test_the_goal_counts_after_all_gates() -> None:
+    it = judge(LAP)
+    drive(it, (0, 0, 0, 0), (1, 0.99, 0, 0), (2, 1.5, 0, 0), (3, 2.5, 0, 0), (4, 3, 0, 0))
+    assert (decided(it).outcome, decided(it).reason) == ("passed", "reached finish after 4.00 s")
+    assert values(it)["gates"] == 2 and oks(it)["gates"]
+
+
+def test_a_goal_before_the_gates_does_not_end_the_test() -> None:
+    it = judge(LAP)
+    drive(it, (0, 1.5, 0, 0), (1, 3.0, 0, 0), (2, 1.5, 0, 0))
+    assert it.verdict is None
+    it.update(BEGIN + 41 * SECOND)
+    assert decided(it).reason == (
+        "crossed 0 of 2 gates within 40.00 s: the vehicle is at x = 1.50 m, y = 0.00 m, 0.32 m from east, the next; "
+        "finish does not count before the gates"
+    )
+    checks = {check.name: check for check in decided(it).checks}
+    assert (checks["gates"].value, checks["gates"].limit, checks["gates"].ok) == (0, {"min": 2}, False)
+    assert not checks["time-to-goal"].ok
+
+
+def test_gates_and_goal_in_one_frame_count_in_the_order_of_the_way() -> None:
+    it = judge(LAP)
+    drive(it, (0, 0, 0, 0), (1, 3, 0, 0))
+    assert decided(it).reason == "reached finish after 1.00 s"
+    it = judge(LAP)
+    drive(it, (0, 3.5, 0, 0), (1, 0, 0, 0))
+    assert it.verdict is None
+    it.end(BEGIN + 2 * SECOND)
+    assert decided(it).reason.startswith("crossed 1 of 2 gates before the input ended after 2.00 s: ")
+    backwards = judge(replace(LAP, gates=LAP.gates[::-1]))
+    drive(backwards, (0, 3.5, 0, 0), (1, 0, 0, 0))
+    assert backwards.verdict is None, "the goal lay before the gates on this way"
+    drive(backwards, (2, 3, 0, 0))
+    assert decided(backwards).reason == "reached finish after 2.00 s"
+
+
+def test_with_all_gates_crossed_the_goal_is_what_was_missed() -> None:
+    it = judge(LAP)
+    drive(it, (0, 0, 0, 0), (2, 2.5, 0, 0))
+    it.end(BEGIN + 2 * SECOND)
+    assert decided(it).reason.startswith("did not reach finish before the input ended after 2.00 s: ")
+    assert oks(it)["gates"]
+
+
+def test_a_lap_may_begin_on_the_line_where_it_ends() -> None:
+    it = judge(LAP)
+    drive(it, (0, 3, 0, 0), (1, 0, 0, 0), (2, 2.5, 0, 0), (3, 3, 0, 0))
+    assert decided(it).reason == "reached finish after 3.00 s"
+
+
+def test_without_a_goal_the_last_gate_ends_the_test() -> None:
+    it = judge(replace(LAP, goal={}))
+    drive(it, (0, 0, 0, 0), (1, 1.5, 0, 0), (2, 2.1, 0, 0))
+    assert (decided(it).outcome, decided(it).reason) == ("passed", "crossed the last gate, west, after 2.00 s")
+    assert values(it)["time-to-goal"] == 2.0
+
+
+def test_a_margin_not_kept_is_a_failure() -> None:
+    it = judge(replace(LANE, min_margin=0.05))
+    drive(it, (0, 0, 0, 0), (1, 0.5, 0.0699, 0))
+    assert it.verdict is None
+    drive(it, (2, 1.0, 0.0751, 0))
+    assert (decided(it).outcome, decided(it).reason) == (
+        "failed",
+        "came within 0.045 m of wall left after 2.00 s at x = 1.00 m, y = 0.08 m: it is to keep 0.05 m away",
+    )
+    (check,) = [check for check in decided(it).checks if check.name == "wall-margin"]
+    assert (check.value, check.limit, check.ok) == (pytest.approx(0.0449), {"min": 0.05}, False)
+
+
+def test_a_margin_kept_is_a_check_with_its_limit() -> None:
+    it = judge(replace(LANE, min_margin=0.05))
+    drive(it, (0, 0, 0, 0), (1, 3, 0.0699, 0))
+    assert decided(it).outcome == "passed" and oks(it)["wall-margin"]
+
+
+def test_a_hit_is_said_rather_than_the_margin_and_the_margin_rather_than_the_goal() -> None:
+    it = judge(replace(LANE, min_margin=0.05))
+    drive(it, (0, 0, 0, 0), (1, 0.5, 0.15, 0))
+    assert decided(it).reason.startswith("hit wall left")
+    it = judge(replace(LANE, min_margin=0.05))
+    drive(it, (0, 2.5, 0, 0), (1, 3, 0.0751, 0))
+    assert decided(it).reason.startswith("came within 0.045 m of wall left")
+
+
+def test_a_start_within_the_margin_is_the_fault_of_the_test() -> None:
+    sentence = (
+        "the vehicle stands 0.045 m from wall left from the start, closer than the 0.05 m that it is to keep, at x"
+    )
+    with pytest.raises(UnjudgeableError, match=sentence):
+        drive(judge(replace(LANE, min_margin=0.05)), (0, 0.0, 0.0751, 0))
 
 
 def test_time_zero_is_the_first_request_when_it_comes_before_the_begin() -> None:

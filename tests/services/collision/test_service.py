@@ -33,8 +33,13 @@ def lane(tmp_path: Path) -> Iterator[Path]:
 
 def service(lane: Path, **changes: Any) -> Collision:
     flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
+    none: dict[str, Any] = {"gates": [], "min-margin": 0.0}
     return Collision(
-        Context("collision", Flags({**flags, "map-path": str(lane), "frame-id": 2, **changes}), MessageSet.standard())
+        Context(
+            "collision",
+            Flags({**flags, **none, "map-path": str(lane), "frame-id": 2, **changes}),
+            MessageSet.standard(),
+        )
     )
 
 
@@ -82,13 +87,16 @@ def test_a_frame_without_an_attitude_is_no_sample(lane: Path, caplog: pytest.Log
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"goal": None, "walls": []}, "there is nothing to judge by: give --goal, --walls or both"),
+        ({"goal": None, "walls": []}, "there is nothing to judge by: give --goal, --gates or --walls"),
         ({"goal": "left"}, "--goal=left is one of the --walls too"),
+        ({"gates": ["finish", "left"]}, "left of --gates is one of the --walls too"),
+        ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
+        ({"walls": [], "min-margin": 0.1}, "--min-margin is a distance to --walls, of which there are none"),
         ({"goal": "finnish"}, "has no obstacle 'finnish'; did you mean 'finish'?"),
     ],
 )
 def test_flags_that_make_no_track_are_refused(lane: Path, changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=f"{re.escape(message)}$"):
+    with pytest.raises(ValueError, match=f"{re.escape(message.format(lane=lane))}$"):
         service(lane, **changes)
 
 
@@ -117,6 +125,21 @@ def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
         "name": "time-to-goal", "value": 2.01, "limit": {"max": 60}, "unit": "s", "ok": True
     }  # fmt: skip
     assert checks["wall-margin"]["value"] == pytest.approx(0.07, abs=1e-6)
+
+
+def test_gates_and_margin_come_from_the_flags(lane: Path, cid: int) -> None:
+    flags = (f"--cid={cid}", f"--map-path={lane}", "--gates=finish", "--walls=left,right", "--min-margin=0.05")
+    with Session(cid) as session, running("collision", lane, *flags) as process:
+        say(session, "dodo.TestBegin", sample_time=START)
+        say(session, FRAME, sample_time=START + 10_000, qw=1.0)
+        say(session, FRAME, sample_time=START + 2_010_000, x=3.1, qw=1.0)
+        code, output, errors = finished(process)
+    assert (code, errors) == (0, "")
+    verdict = json.loads(output)
+    assert (verdict["outcome"], verdict["reason"]) == ("passed", "crossed the last gate, finish, after 2.01 s")
+    checks = {check["name"]: check for check in verdict["checks"]}
+    assert checks["gates"] == {"name": "gates", "value": 1, "limit": {"min": 1}, "unit": "", "ok": True}
+    assert checks["wall-margin"]["limit"] == {"min": 0.05}
 
 
 def test_the_end_of_the_input_of_a_silent_application(lane: Path, cid: int) -> None:

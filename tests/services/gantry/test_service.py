@@ -208,7 +208,7 @@ def test_a_start_that_is_not_reached(cid: int, rig: FakeRig) -> None:
         (["--serial=/etc/passwd"], "is no device"),
         (["--serial=ttyACM0"], "is no device"),
         (["--serial=/dev/ttyNONE7"], "there is no serial port /dev/ttyNONE7; is the rig plugged in?"),
-        (["--serial=emulated"], "the emulated rig is not built: `make firmware` does it"),
+        (["--serial=emulated"], "the emulated rig is not built: `make firmware` builds it"),
         (["--serial=/dev/null", "--range-x=0.5"], "the start is out of the rig's ranges: at x = 0.000 m"),
     ],
 )

@@ -1,0 +1,63 @@
+"""Gates: lines that the vehicle's centre has to cross one after the other. Metres, world frame."""
+
+from collections.abc import Iterator, Sequence
+
+import shapely
+
+from services.collision.geometry import Pose
+
+Gate = tuple[str, shapely.MultiLineString]
+
+
+class Gates:
+    """Counts the gates crossed, in either direction and in their order; a gate out of turn does not count.
+
+    The name of a gate may stand more than once, for a course of several laps.
+    """
+
+    def __init__(self, gates: Sequence[Gate]) -> None:
+        self._gates = gates
+        self.crossed = 0
+
+    def __len__(self) -> int:
+        return len(self._gates)
+
+    @property
+    def next(self) -> Gate | None:
+        """The gate that is to be crossed next; None when all were."""
+        return self._gates[self.crossed] if self.crossed < len(self) else None
+
+    def move(self, start: Pose, end: Pose) -> float | None:
+        """The centre went straight from one pose to the next.
+
+        Returns the share of this way after which all gates were crossed, None while some are left.
+        """
+        reached = 0.0 if self.next is None else -1.0
+        while self.next is not None:
+            ahead = [share for share in crossings(self.next[1], start, end) if share > reached]
+            if not ahead:
+                return None
+            reached = min(ahead)
+            self.crossed += 1
+        return reached
+
+
+def crossings(lines: shapely.MultiLineString, start: Pose, end: Pose) -> Iterator[float]:
+    """The shares of the way from one pose to the next at which it crosses lines.
+
+    Every point is on one side of a line: one that lies on it counts as left of it. So a way made of several
+    moves crosses a line exactly as often as its ends say, wherever the moves begin and end.
+    """
+    for (x1, y1), (x2, y2) in (segment for line in lines.geoms for segment in _segments(line)):
+        before = (x2 - x1) * (start.y - y1) - (y2 - y1) * (start.x - x1)
+        after = (x2 - x1) * (end.y - y1) - (y2 - y1) * (end.x - x1)
+        if (before >= 0) != (after >= 0) and _is_left(start, end, x1, y1) != _is_left(start, end, x2, y2):
+            yield before / (before - after)
+
+
+def _segments(line: shapely.LineString) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+    return zip(line.coords[:-1], line.coords[1:], strict=True)
+
+
+def _is_left(start: Pose, end: Pose, x: float, y: float) -> bool:
+    return (end.x - start.x) * (y - start.y) - (end.y - start.y) * (x - start.x) >= 0

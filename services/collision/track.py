@@ -1,0 +1,55 @@
+"""What a vehicle is judged by: the obstacles of a map by what they are for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import shapely
+
+from services.collision.gates import Gate
+from services.collision.geometry import Pose
+
+Obstacles = Mapping[str, shapely.MultiLineString]
+
+
+@dataclass(frozen=True)
+class Track:
+    """What may not be touched, and what is to be reached; `gates` are to be crossed before, in their order.
+
+    Obstacles by name in m, `max_time` in s. The vehicle keeps `min_margin` m away from walls; with 0 it only may
+    not touch them.
+    """
+
+    walls: Obstacles
+    goal: Obstacles
+    max_time: float
+    gates: tuple[Gate, ...] = ()
+    min_margin: float = 0.0
+
+
+def touched(obstacles: Obstacles, area: shapely.Geometry) -> str | None:
+    """The first obstacle that an area touches."""
+    return next((name for name, lines in obstacles.items() if shapely.intersects(lines, area)), None)
+
+
+def nearest(obstacles: Obstacles, area: shapely.Geometry) -> tuple[float, str] | None:
+    """The smallest distance of an area to an obstacle (m), and the obstacle's name; None without obstacles."""
+    return min(((float(shapely.distance(lines, area)), name) for name, lines in obstacles.items()), default=None)
+
+
+def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
+    """What is wrong with a test whose vehicle covers this area when it is first seen; None for nothing."""
+    ends = {} if track.gates else track.goal  # a lap may begin on the line where it ends
+    for kind, obstacles in (("wall", track.walls), ("goal", ends)):
+        name = touched(obstacles, area)
+        if name is not None:
+            return f"the vehicle stands on {kind} {name} from the start"
+    near = nearest(track.walls, area)
+    if near is not None and near[0] < track.min_margin:
+        limit = f"closer than the {track.min_margin:g} m that it is to keep"
+        return f"the vehicle stands {near[0]:.3f} m from wall {near[1]} from the start, {limit}"
+    return None
+
+
+def place(pose: Pose) -> str:
+    """Where the vehicle is, as it stands in sentences."""
+    return f"at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"

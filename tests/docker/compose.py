@@ -1,0 +1,101 @@
+"""Tests of small scripts in containers: compose files written by hand, as the compiler would lay them out."""
+
+import asyncio
+import json
+import subprocess
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import __version__
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Flag, Plan, to_json
+from dodo_dsl.run.backends import Containers, Job
+from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.schedule import schedule
+from tests.run.helpers import READY, STARTED, WAIT, Bench, Recorded
+
+IMAGE = f"dodo/base:{__version__}"
+SUBNETS = [f"10.213.{third}.{fourth}/28" for third in range(240, 256) for fourth in range(0, 256, 16)]
+
+
+@dataclass
+class Crate:
+    """Makes tests whose slugs begin with ``mark``, by which all that an engine holds of them is found."""
+
+    bench: Bench
+    mark: str
+    progress: Recorded = field(default_factory=Recorded)
+
+    def job(
+        self,
+        slug: str,
+        judge: str = READY + WAIT,
+        application: str = WAIT,
+        environment: str = READY + WAIT,
+        timeout_s: float = 60.0,
+        report: Path | None = None,
+        **app: Any,
+    ) -> Job:
+        """A test of three scripts; ``app`` are keys of the application's service in its compose file."""
+        plan = self.bench.plan(judge, STARTED + application, environment, f"{self.mark}-{slug}", timeout_s)
+        camera, evaluator = plan.services
+        plan = replace(plan, services=(replace(camera, flags=(Flag("rec", "test.rec", "report"),)), evaluator))
+        folder = self.bench.folder / "compiled" / plan.slug
+        folder.mkdir(parents=True)
+        (folder / "test.json").write_text(to_json(plan))
+        (folder / ".env").write_text(f"COMPOSE_PROJECT_NAME={plan.slug}\n")
+        (folder / "docker-compose.yml").write_text(json.dumps(self._compose(plan, app)))
+        return Job(plan, folder, (report or self.bench.folder / "report") / plan.slug)
+
+    def _compose(self, plan: Plan, app: dict[str, Any]) -> dict[str, Any]:
+        def service(name: str) -> dict[str, Any]:
+            script = f"/scripts/{plan.slug}-{name}.py"
+            return {
+                "image": IMAGE,
+                "entrypoint": ["python3", "-u", script],
+                "volumes": [f"{self.bench.folder}:/scripts", "tmp:/tmp"],
+                "init": True,
+                "stop_grace_period": "1s",
+            }
+
+        sandbox = {"image": f"dodo/sandbox:{__version__}", "command": ["sleep", "infinity"], "init": True}
+        flags = {"command": ["--cid=111", "--name=video0.argb"]}
+        records = {"volumes": [*service("camera")["volumes"], "report:/dodo/report"]}
+        subnet = {"subnet": "${DODO_SUBNET:-10.213.240.0/28}"}
+        return {
+            "services": {
+                "camera": {**service("camera"), **records},
+                "judge": service("judge"),
+                "sandbox": sandbox,
+                "app": {**service("app"), **flags, **app},
+            },
+            "networks": {"default": {"ipam": {"config": [subnet]}}},
+            "volumes": {"tmp": {}, "report": {}},
+        }
+
+    def run(self, *jobs: Job) -> dict[str, Outcome]:
+        """The outcomes by slug without the mark, all at once."""
+        runner = Runner(self.progress, Containers(SUBNETS), schedule(len(jobs), lambda job: 1.0), Policy())
+        return {o.slug.removeprefix(f"{self.mark}-"): o for o in asyncio.run(runner.run(jobs))}
+
+    def log(self, slug: str) -> str:
+        """What the application of a test logged."""
+        logs = self.bench.folder / "report" / f"{self.mark}-{slug}" / "logs"
+        return (logs / "application.app.log").read_text()
+
+    def left(self) -> list[str]:
+        """Containers, networks and volumes of these tests, and leases."""
+        names = [name for words in _LISTS for name in _docker(*words) if f"dodo-{self.mark}-" in name]
+        return names + [path.name for path in (self.bench.folder / "leases").glob("*.json")]
+
+
+_LISTS = (
+    ("ps", "-a", "--format", "{{.Names}}"),
+    ("network", "ls", "--format", "{{.Name}}"),
+    ("volume", "ls", "--format", "{{.Name}}"),
+)
+
+
+def _docker(*words: str) -> list[str]:
+    return subprocess.run(["docker", *words], capture_output=True, text=True, check=True).stdout.splitlines()

@@ -1,0 +1,113 @@
+"""Faults of the runner itself and of its disk, with a real ``dodo run``."""
+
+import os
+import re
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.plan.model import Flag, Plan, Service
+from tests.faults import Book
+from tests.run.desk import Desk, gone, marks, processes_with, wait_for
+from tests.run.helpers import PASS, READY, WAIT
+
+FLOODS = "while True: print('x' * 1000, flush=True)\n"
+TALKS = """
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
+with Session(int(sys.argv[1].partition("=")[2])) as bus:
+    while True:
+        bus.send_envelope(Envelope(1086, b"", 1, 1, 1, 0))
+        time.sleep(0.05)
+"""
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    return Desk(tmp_path)
+
+
+def recorded(plan: Plan) -> Plan:
+    """The same test, with the recorder that every compiled test has."""
+    flags = (Flag("rec", "test.rec", "report"), Flag("cid", str(plan.cid)))
+    process = ("python", "-m", "services.rec_recorder")
+    recorder = Service("environment", "dodo-recorder", "rec-recorder", "x", process, flags)
+    return replace(plan, services=(recorder, *plan.services))
+
+
+def test_disk_with_the_report_is_full(desk: Desk, small_disk: Path, book: Book) -> None:
+    """Logs fill the disk, then the recorder cannot go on; the run says so without a report."""
+    plan = desk.bench.plan(READY + WAIT, FLOODS, slug="test-full", timeout_s=30.0)
+    script = desk.bench.script("test-talker", "import sys, time\n" + READY + TALKS)
+    talker = Service("environment", "talker", "x", "x", script, (Flag("cid", str(plan.cid)),))
+    plan = replace(plan, services=(*recorded(plan).services, talker))
+    full = desk.start(plan, report=small_disk.name)
+    neighbour = desk.start(desk.bench.plan(READY + "time.sleep(2)\n" + PASS, slug="test-beside"), report="beside")
+    out, beside = full.communicate(timeout=60)[0], neighbour.communicate(timeout=60)[0]
+    assert neighbour.returncode == 0, beside
+    (told,) = re.findall(r"^ERROR   test-full  (.*) \(set-up", out, re.MULTILINE)
+    assert told.startswith("service 'dodo-recorder' of layer environment ended with exit code 1 after ")
+    assert re.search(r"test.rec ends after \d+ messages: No space left on device\n", out)
+    unwritten = "cannot take the whole report: No space left on device"
+    assert f"\n'{small_disk}' {unwritten}\n" in out
+    assert "Traceback" not in out
+    assert gone(marks(desk))
+    assert list((desk.folder / "leases").glob("*.json")) == []
+    book.record("The disk with the report is full", "process", "error", f"{told}; 'dodo-report' {unwritten}")
+
+
+def test_verdict_without_room_for_a_report_is_told(desk: Desk, small_disk: Path) -> None:
+    process = desk.start(desk.bench.plan(judge=READY + "time.sleep(1)\n" + PASS, application=FLOODS), report="small")
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 3, out
+    assert "PASSED  test  it drove (" in out
+    assert f"'{small_disk}' cannot take the whole report: No space left on device\n" in out
+
+
+@pytest.mark.parametrize("isolation", ["network", "host"])
+def test_killed_runner_leaves_nothing(desk: Desk, isolation: str) -> None:
+    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", isolation)
+    wait_for(process, "running")
+    process.kill()
+    process.communicate(timeout=30)
+    assert gone(marks(desk))
+
+
+def test_next_run_removes_what_a_killed_sandbox_left_on_the_host(desk: Desk, book: Book) -> None:
+    """Runner and sandbox both killed: only the lease's record says what was there."""
+    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", "host")
+    wait_for(process, "running")
+    sandboxes = [pid for pid in processes_with("dodo_dsl.run.sandbox") if parent(pid) == process.pid]
+    assert len(sandboxes) == 1
+    os.kill(int(sandboxes[0]), signal.SIGSTOP)
+    process.kill()
+    os.kill(int(sandboxes[0]), signal.SIGKILL)
+    process.communicate(timeout=30)
+    assert processes_with(marks(desk))
+    second = desk.start(desk.bench.plan(slug="second"), report="second")
+    out, _ = second.communicate(timeout=30)
+    assert second.returncode == 0, out
+    (note,) = [line for line in out.splitlines() if line.startswith("removed what a killed run left: test: 3 proc")]
+    assert gone(marks(desk))
+    assert list((desk.folder / "leases").glob("*.json")) == []
+    book.record("The runner is killed, and run again", "process", str(desk.results("second")[0]["outcome"]), note)
+
+
+def parent(pid: str) -> int:
+    return int(Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()[1])
+
+
+@pytest.mark.parametrize("isolation", ["network", "host"])
+def test_two_runs_at_once(desk: Desk, isolation: str, book: Book) -> None:
+    plans = [desk.bench.plan(slug=f"test-{n}", judge=READY + "time.sleep(1)\n" + PASS) for n in range(2)]
+    processes = [desk.start(p, "--isolation", isolation, report=p.slug) for p in plans]
+    outs = [p.communicate(timeout=40)[0] for p in processes]
+    assert [p.returncode for p in processes] == [0, 0], outs
+    results = [desk.results(p.slug)[0] for p in plans]
+    cids = [result["cid"] for result in results]
+    if isolation == "host":
+        assert len(set(cids)) == 2
+    for result in results:
+        book.record("Two runners at once", "process", str(result["outcome"]), str(result["reason"]))
