@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import json
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
@@ -90,6 +91,8 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
         return result
     try:
         return {**result, **asyncio.run(_moved(options, rig, say))}
+    except asyncio.CancelledError:
+        raise KeyboardInterrupt from None
     except rigs.RigProblem as problem:
         if options.action != "status":
             raise
@@ -97,10 +100,14 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
 
 
 async def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
+    task = asyncio.current_task()
+    assert task is not None
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
     words = [*_flags(rig), options.action, *(f"{number:g}" for number in options.place)]
     what = f"'dodo rig {options.action}'"
-    async with rigs.leased(rig.cid, what, say, options.wait):
-        return await rigs.ask(rigs.HAND, words)
+    async with rigs.leased(rig.cid, what, say, options.wait) as descriptors:
+        return await rigs.ask(rigs.HAND, words, descriptors=descriptors)
 
 
 def _flags(rig: Rig) -> list[str]:

@@ -83,22 +83,24 @@ def clear(rig: str) -> bool:
 @contextlib.asynccontextmanager
 async def leased(
     cid: int | None, what: str, say: Callable[[str], None], patience_s: float = leases.DEFAULT_PATIENCE_S
-) -> AsyncIterator[None]:
+) -> AsyncIterator[tuple[int, ...]]:
     """The lease that tests on the rig take, too: that of its CID. The emulated rig has none, as everyone has their own.
 
-    Raises LeaseTimeout when it does not come free.
+    Gives the descriptors by which a program holds it, too. Raises LeaseTimeout when it does not come free.
     """
     if cid is None:
-        yield
+        yield ()
         return
     lease = await leases.lease_any([f"cid-{cid}"], {"test": what}, say, patience_s=patience_s)
     try:
-        yield
+        yield (lease.descriptor,)
     finally:
         lease.release()
 
 
-async def ask(program: Sequence[str], words: Sequence[str], patience_s: float = PATIENCE_S) -> dict[str, Any]:
+async def ask(
+    program: Sequence[str], words: Sequence[str], patience_s: float = PATIENCE_S, descriptors: tuple[int, ...] = ()
+) -> dict[str, Any]:
     """What a rig's program answers; it is told to end, so that it stops the rig, when the caller is. RigProblem."""
     environment = {**base_environment(), "PYTHONPATH": package_path()}
     process = await asyncio.create_subprocess_exec(
@@ -109,6 +111,7 @@ async def ask(program: Sequence[str], words: Sequence[str], patience_s: float = 
         stderr=asyncio.subprocess.PIPE,
         env=environment,
         start_new_session=True,
+        pass_fds=descriptors,
     )
     try:
         async with asyncio.timeout(patience_s):

@@ -101,7 +101,8 @@ def test_one_user_at_a_time(place: Place) -> None:
     said = place.dodo("rig", "status", "fake", "--wait", "0.3", code=3)
     assert "dodo rig goto" in said and "within 0.3 s" in said
     first.terminate()
-    first.wait(20)
+    assert first.wait(20) == 130
+    assert place.rig.last() == "STOP"
 
 
 def test_a_hil_test_on_a_real_rig(place: Place) -> None:
