@@ -21,6 +21,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Runs of tests are no part of this user's history."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DODO_RIGS", str(tmp_path_factory.mktemp("rigs")))
         patch.setenv("DODO_HISTORY", str(tmp_path_factory.mktemp("state") / "history.jsonl"))
         yield
 
@@ -46,7 +47,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     if result.returncode:
         pytest.skip(f"a small disk cannot be made here: {result.stderr.strip() or 'no mount'}")
     yield folder
-    subprocess.run(["umount", str(folder)], check=True)
+    subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
 @pytest.fixture

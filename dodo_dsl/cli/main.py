@@ -16,6 +16,7 @@ from dodo_dsl.cli import list as list_command
 from dodo_dsl.cli import new as new_command
 from dodo_dsl.cli import rec as rec_command
 from dodo_dsl.cli import report as report_command
+from dodo_dsl.cli import rig as rig_command
 from dodo_dsl.cli import run as run_command
 from dodo_dsl.cli.exits import Exit
 
@@ -28,6 +29,7 @@ COMMANDS: dict[str, ModuleType] = {
     "report": report_command,
     "rec": rec_command,
     "images": images_command,
+    "rig": rig_command,
     "doctor": doctor_command,
 }
 

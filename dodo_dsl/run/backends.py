@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import lanes, leases, projects
+from dodo_dsl.run import lanes, leases, projects, rigs
 from dodo_dsl.run.docker import DockerBackend, other_subnets
 from dodo_dsl.run.events import Backend, BackendError
 from dodo_dsl.run.process import Lane, ProcessBackend
@@ -80,7 +80,11 @@ class Processes:
             lane = Lane(plan.cid, descriptors=self._descriptors)
             yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
             return
-        async with self._turn(plan), lanes.host_lane(plan, self._cids, say, keep) as leased:
+        async with (
+            self._turn(plan),
+            lanes.host_lane(plan, () if rigs.is_real(plan) else self._cids, say, keep) as leased,
+        ):
+            await rigs.examine(plan, say)
             lane = replace(leased, descriptors=(*leased.descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
 
@@ -121,6 +125,7 @@ class Containers:
                 yield backend
             else:
                 async with lanes.host_lane(replace_flags(plan), (plan.cid,), say):
+                    await rigs.examine(plan, say)
                     yield backend
         finally:
             lease.leave() if backend.left_behind else lease.release()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from dodo_dsl.run import lanes, leases, projects
+from dodo_dsl.run import lanes, leases, projects, rigs
 from dodo_dsl.run.backends import connect
 from dodo_dsl.run.events import BackendError
 
@@ -150,6 +150,11 @@ def _orphans(prefix: str) -> Iterator[dict[str, Any]]:
         lease.leave()
 
 
+def _rigs() -> Iterator[Finding]:
+    for rig, reason in rigs.all_quarantined().items():
+        yield Finding(f"rig {rig}", "problem", f"in quarantine: {reason}", f"mend it, then dodo rig clear {rig}")
+
+
 CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
     _namespaces,
     _multicast,
@@ -159,6 +164,7 @@ CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
     _engine,
     _compose,
     _left_behind,
+    _rigs,
 )
 
 

@@ -40,8 +40,10 @@ class Link:
         """Whether the line was opened only now: the rig may have braked in the meantime."""
         return self._now() - self._up_since < GRACE
 
-    def exchange(self, lines: bytes, patience: float) -> tuple[Position | None, Status | None]:
-        """Send commands that ask for position and status, and wait up to ``patience`` s for both answers.
+    def exchange(
+        self, lines: bytes, patience: float, wanted: type | None = None
+    ) -> tuple[Position | None, Status | None]:
+        """Send commands that ask for position and status, and wait up to ``patience`` s for both, or the wanted one.
 
         None stands for an answer that did not come, or for both while the line is lost; it is opened again
         meanwhile. Raises RigError when the rig was away for PATIENCE.
@@ -52,7 +54,7 @@ class Link:
             assert self._port is not None
             self._lines.feed(self._port.read(0.0))  # answers that came too late
             self._port.write(lines)
-            answers = self._answers(self._port, patience)
+            answers = self._answers(self._port, patience, wanted)
             if self._now() - self._heard > SILENCE:
                 self._lose("it does not answer")
         except OSError as error:

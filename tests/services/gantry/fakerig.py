@@ -14,6 +14,7 @@ COMMAND = re.compile(r"\$([A-Z]+):?([-+0-9.,]*)")
 WATCHDOG = 0.5
 TICK = 0.004
 QUICK = (8.0, 8.0, 40.0)
+HOME, HOMING = (-0.9, -0.7, -2.63385), (0.1, 0.1, 0.35)
 
 
 class FakeRig:
@@ -26,10 +27,15 @@ class FakeRig:
         self.status = 0
         self.calibrated = True
         self.silent = False
+        self.homes_slowly = False
+        self.lost = 0.0
+        """m of steps lost on each way home: where its switch x seems to be moves by as much."""
         self.noise = b""
         self.chopped = False
         self.heard: list[tuple[str, tuple[float, ...]]] = []
         self._goal: list[float] | None = None
+        self._home_at = 0.0
+        self._homed = 0
         self._last_run = 0.0
         self._rest = b""
         self._master: int | None = None
@@ -104,13 +110,23 @@ class FakeRig:
         elif word == "GOTO":
             self._goal = list(arguments)
         elif word == "CALIBRATE":
-            self.calibrated, self.at = True, [-0.9, -0.7, -2.6]
+            self._home()
         elif word == "POSITION":
             self._answer(",".join(f"{value:.5f}" for value in self.at))
         elif word == "STATUS":
             self._answer(str(self._said()))
 
+    def _home(self) -> None:
+        ways = [abs(a - h) for a, h in zip(self.at, HOME, strict=True)]
+        self._homed += 1
+        lost = self.lost * self._homed
+        took = max(way / speed for way, speed in zip([ways[0] + lost, *ways[1:]], HOMING, strict=True))
+        self._home_at = time.monotonic() + took * self.homes_slowly
+        self.calibrated, self.at = True, list(HOME)
+
     def _said(self) -> int:
+        if time.monotonic() < self._home_at:
+            return 2
         if self.status or not self.calibrated:
             return self.status or 6
         return int(any(self.velocity) or self._goal is not None)

@@ -1,0 +1,123 @@
+"""Whether a rig is fit for a test: its line answers each time and in time, and its home is where it was before."""
+
+import math
+import statistics
+import time
+from dataclasses import replace
+from typing import Any
+
+from services.gantry import start
+from services.gantry.link import Link, RigError
+from services.gantry.motion import Limits
+from services.gantry.protocol import SENTENCES, Position, Status, Word, command
+
+ROUNDS = 20
+ANSWER = 0.25
+"""s within which position and status have to come, each time."""
+LATENCY = 0.05
+"""s that the middle one of the answers may take; the firmware needs 5 ms and the line as much."""
+WAYS = {"x": 0.04, "y": 0.04, "yaw": 0.15}
+"""How far from home (m, m, rad) each axis looks for home, and from twice as far."""
+SPEEDS = {"x": 0.1, "y": 0.1, "yaw": 0.35}
+"""Of homing (m/s, m/s, rad/s), as firmware/protocol.yml has them."""
+REPEATS = {"x": 0.005, "y": 0.005, "yaw": math.radians(2.5)}
+"""By how much the switch may be elsewhere than before (m, m, rad)."""
+DECIMAL = 1e-4
+TRIES = 3
+"""For each axis, as a busy machine looks at the clock too late at times."""
+_BEGIN = 1.0
+_POLL = 0.005
+
+Check = dict[str, Any]
+
+
+def home(limits: Limits) -> Position:
+    """The place at the switches, as far as the limits reach, that the line's four decimals do not round outside."""
+    return replace(limits.low, yaw=limits.low.yaw + DECIMAL)
+
+
+def asked(link: Link) -> tuple[Position | None, Status]:
+    """Position and status; a rig that is not calibrated has no position. Raises RigError when no answer comes."""
+    for _ in range(ROUNDS):
+        at, status = link.exchange(start.ASKING, ANSWER)
+        if status is not None and (at is not None or status == Status.NOT_CALIBRATED):
+            return at, status
+    raise RigError(f"the rig at {link.name} does not say where it is")
+
+
+def tried(link: Link, limits: Limits, patience: float) -> dict[str, Any]:
+    """``ok``, the ``reason`` when it is not, and the ``checks``; the rig moves, and ends at home."""
+    start.calibrate(link, patience)
+    checks = _answers(link)
+    if all(check["ok"] for check in checks):
+        checks += _homing(link, limits, patience)
+    bad = [check for check in checks if not check["ok"]]
+    return {"ok": not bad, "reason": _reason(bad[0]) if bad else "", "checks": checks}
+
+
+def _reason(check: Check) -> str:
+    (kind, bound), *_ = check["limit"].items()
+    than = "at most" if kind == "max" else "at least"
+    return f"{check['name']} is {check['value']:g} {check['unit']}, expected {than} {bound:g}".replace("  ", " ")
+
+
+def _check(name: str, value: float, unit: str, **limit: float) -> Check:
+    ok = limit.get("min", -math.inf) <= value <= limit.get("max", math.inf)
+    return {"name": name, "value": round(value, 3), "limit": limit, "unit": unit, "ok": ok}
+
+
+def _answers(link: Link) -> list[Check]:
+    took = []
+    for _ in range(ROUNDS):
+        begin = time.monotonic()
+        at, status = link.exchange(start.ASKING, ANSWER)
+        if at is not None and status is not None:
+            took.append(time.monotonic() - begin)
+    middle = statistics.median(took) if took else ANSWER
+    return [
+        _check("answers", len(took), f"of {ROUNDS}", min=ROUNDS),
+        _check("latency", 1000 * middle, "ms", max=1000 * LATENCY),
+    ]
+
+
+def _homing(link: Link, limits: Limits, patience: float) -> list[Check]:
+    """Looks for home from two places of each axis: the times differ by the way between them, unless home has moved.
+
+    Positions say nothing while home is being looked for, and agree with themselves afterwards whatever was lost.
+    """
+    checks = []
+    for axis, unit in (("x", "mm"), ("y", "mm"), ("yaw", "deg")):
+        scale = math.degrees(1) if unit == "deg" else 1000
+        off = math.inf
+        for _ in range(TRIES):
+            if off > REPEATS[axis]:
+                off = min(off, _difference(link, limits, axis, patience))
+        checks.append(_check(f"homing {axis}", scale * off, unit, max=scale * REPEATS[axis]))
+    return checks
+
+
+def _difference(link: Link, limits: Limits, axis: str, patience: float) -> float:
+    """By how much an axis has its switch elsewhere the second time (m or rad)."""
+    low: float = getattr(limits.low, axis)
+    high: float = getattr(limits.high, axis)
+    way = min(WAYS[axis], (high - low) / 2)
+    took = []
+    for times in (1, 2):
+        start.go(link, replace(home(limits), **{axis: low + times * way}), patience)
+        took.append(_way_home(link, patience))
+    return abs((took[1] - took[0]) * SPEEDS[axis] - way)
+
+
+def _way_home(link: Link, patience: float) -> float:
+    """Looks for home; how long that took, in s."""
+    begin, homing = time.monotonic(), False
+    link.exchange(command(Word.CALIBRATE) + command(Word.STATUS), ANSWER, Status)
+    while (took := time.monotonic() - begin) < patience:
+        _, status = link.exchange(command(Word.STATUS), ANSWER, Status)
+        homing |= status == Status.HOMING
+        if status == Status.IDLE and (homing or took > _BEGIN):
+            return took
+        time.sleep(_POLL)
+        if status in SENTENCES and status != Status.NOT_CALIBRATED:
+            raise RigError(f"the rig at {link.name} {SENTENCES[status]} (status {int(status)})")
+    raise RigError(f"the rig at {link.name} has not found its home after {patience:g} s")
