@@ -17,12 +17,13 @@ ROOT = Path(__file__).parents[2]
 
 
 class Desk:
-    """Compiled tests, a report folder and a lease folder of their own."""
+    """Compiled tests, a report folder, a lease folder and a history of their own."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.bench = Bench(folder)
-        self.environment = {**os.environ, "DODO_LEASES": str(folder / "leases")}
+        own = {"DODO_LEASES": str(folder / "leases"), "DODO_HISTORY": str(folder / "history.jsonl")}
+        self.environment = {**os.environ, **own}
 
     def compiled(self, plan: Plan) -> Path:
         target = self.folder / "generated" / plan.slug
