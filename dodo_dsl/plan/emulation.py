@@ -13,6 +13,8 @@ _SAME = (
     "map-path", "width", "height", "freq", "fovy", "x", "y", "z", "yaw", "pitch", "frame-id", "name.argb", "name.i420",
     "cid",
 )  # fmt: skip
+_OTHER = {"exposure": "shutter", "scene.light": "exposure", "scene.clutter": "clutter", "scene.noise": "noise"}
+"""What the virtual camera calls otherwise."""
 _STILL = (Flag("start-x", "0"), Flag("start-y", "0"), Flag("start-yaw", "0"))
 
 
@@ -26,6 +28,6 @@ def hardware(service: Service, manifests: Mapping[str, Manifest], image: str) ->
     if service.uses != CAMERA or given.get("source") != Flag("source", SOURCE):
         return service
     flags = [given[name] for name in _SAME if name in given]
-    shutter = [Flag("shutter", given["exposure"].value)] if "exposure" in given else []
+    renamed = [Flag(new, given[old].value) for old, new in _OTHER.items() if old in given]
     drawn = manifests[DRAWN]
-    return replace(service, uses=DRAWN, image=image, process=drawn.process, flags=(*flags, *shutter, *_STILL))
+    return replace(service, uses=DRAWN, image=image, process=drawn.process, flags=(*flags, *renamed, *_STILL))

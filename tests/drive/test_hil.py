@@ -73,3 +73,9 @@ def test_the_static_rig_sees_its_board(tmp_path: Path) -> None:
     application = kiwi(tmp_path / "app", BLIND)
     test = run(tmp_path / "blind", "hil-camera", "--application", str(application), code=1)
     assert "no detection came" in test["reason"]
+
+
+def test_the_static_rig_in_the_dusk_before_a_background(tmp_path: Path) -> None:
+    test = run(tmp_path, "hil-camera-scenes[light=0.5,clutter=60]", code=0)
+    counts = {check["name"]: check["value"] for check in test["checks"]}
+    assert counts["false-positives"] > 20 < counts["true-positives"], "it is neither dark nor full"
