@@ -24,11 +24,12 @@ TESTS = ("sil-closed-left-curve", "sil-closed-straight")
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
-    """A repository with the shipped simulations, the example application, and the pipeline of `dodo new`."""
+    """A repository with two of the shipped simulations, the example application, and the pipeline of `dodo new`."""
     if not (PROGRAMS / "gitlab-ci-local").exists() or not shutil.which("rsync"):
         pytest.skip("gitlab-ci-local or rsync is not installed; scripts/install-gitlab-ci-local installs them")
-    skipped = shutil.ignore_patterns("__pycache__", "hil-*", "dil-*", "recordings")
-    shutil.copytree(ROOT / "tests_registry", tmp_path / "tests", ignore=skipped)
+    skipped = shutil.ignore_patterns("__pycache__")
+    for name in ("maps", *TESTS):
+        shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name, ignore=skipped)
     shutil.copytree(ROOT / "examples/kiwi", tmp_path / "kiwi", ignore=skipped)
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\n")
     run(tmp_path, sys.executable, "-m", "dodo_dsl", "new", "--deployment")
