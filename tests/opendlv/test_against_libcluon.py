@@ -23,6 +23,8 @@ def some_value(field: Field, rng: random.Random) -> Any:
         return rng.choice(["", "yellow", "h264 äö"])
     if field.type == "bytes":
         return rng.randbytes(rng.randrange(9))
+    if field.type == "bool":
+        return rng.random() < 0.5
     if field.type in ("float", "double"):
         return rng.randrange(-80_000, 80_000) / 8
     bits = int(field.type.removeprefix("u").removeprefix("int"))
