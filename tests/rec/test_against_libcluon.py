@@ -53,7 +53,7 @@ def test_what_libcluon_records_is_read(cid: int, tmp_path: Path) -> None:
     path, sent = tmp_path / "theirs.rec", drive()
     with tool("cluon-OD4toStdout", f"--cid={cid}", output=path) as recorder, Session(cid) as session:
         hello = message("dodo.TestBegin", 1)
-        until(lambda: bool(session.send_envelope(hello)) or path.stat().st_size > 0)
+        until(lambda: bool(session.send_envelope(hello)) and path.stat().st_size > 0)
         for envelope in sent:
             session.send_envelope(envelope)
         until(lambda: (list(read_envelopes(path)) or [hello])[-1].sample_time == sent[-1].sample_time)
