@@ -11,18 +11,23 @@ from dodo_dsl.spec.rig import Rig
 
 RECORDER = "dodo-recorder"
 MANIFEST = "rec-recorder"
-RECORDING = "test.rec"
+RECORDING, SNAPSHOT = "test.rec", "snapshot.png"
 
 _PARAMETER = re.compile(r"\{([a-z0-9.-]+)\}")
 
 
 def recorder(spec: Spec, manifests: Mapping[str, Manifest], rig: Rig | None, image: str, cid: int) -> Service:
-    """The recorder's service; ``record: {frames: ...}`` adds the pictures of each service that makes some."""
+    """The recorder's service; ``record: {frames: ...}`` adds the pictures of each service that makes some.
+
+    A test on a rig has a snapshot of its first camera in any case.
+    """
     manifest = manifests[MANIFEST]
     flags = [Flag("rec", RECORDING, "report")]
-    if spec.frames_hz:
-        memories = ",".join(_memories(spec, manifests, rig))
-        flags += [Flag("frames", f"{spec.frames_hz:g}"), Flag("memories", memories, "memories")] if memories else []
+    wanted = [Flag("frames", f"{spec.frames_hz:g}")] if spec.frames_hz else []
+    wanted += [Flag("snapshot", SNAPSHOT, "report")] if spec.level == "hil" else []
+    memories = ",".join(_memories(spec, manifests, rig)) if wanted else ""
+    if memories:
+        flags += [*wanted, Flag("memories", memories, "memories")]
     return Service("environment", RECORDER, MANIFEST, image, manifest.process, (*flags, Flag("cid", str(cid))))
 
 

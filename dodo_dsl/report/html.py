@@ -1,6 +1,7 @@
 """``index.html``: the run at a glance, in one file without scripts."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import jinja2
 
@@ -9,10 +10,20 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.junit import check_line
 
 
+class Picture(NamedTuple):
+    """A picture of a test: its path relative to the page, and what it shows."""
+
+    path: str
+    text: str
+
+
 def render(
-    outcomes: Sequence[Outcome], pictures: Mapping[str, str], logs: Mapping[str, Sequence[str]], times: str = ""
+    outcomes: Sequence[Outcome],
+    pictures: Mapping[str, Sequence[Picture]],
+    logs: Mapping[str, Sequence[str]],
+    times: str = "",
 ) -> str:
-    """The page; ``pictures`` and ``logs`` are paths relative to it, by slug, ``times`` that of a picture or empty."""
+    """The page; ``pictures``, and ``logs`` as paths relative to it, by slug; ``times`` a picture's path or empty."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
     )

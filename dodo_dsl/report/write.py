@@ -18,6 +18,7 @@ from dodo_dsl.report.times import draw as draw_times
 
 RECORDING = "test.rec"
 TRAJECTORY = "trajectory.png"
+SNAPSHOT = "snapshot.png"
 TIMES = "times.png"
 LOGS, ATTEMPTS = "logs", "attempts"
 SANDBOX_LOG = "sandbox.log"
@@ -46,7 +47,7 @@ def forget(folder: Path, slugs: Sequence[str]) -> None:
 def _forget_test(place: Path) -> None:
     for name in (LOGS, ATTEMPTS):
         shutil.rmtree(place / name, ignore_errors=True)
-    for name in (RECORDING, TRAJECTORY, SANDBOX_LOG):
+    for name in (RECORDING, TRAJECTORY, SNAPSHOT, SANDBOX_LOG):
         (place / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # there is none, or it holds what others put there
         place.rmdir()
@@ -80,13 +81,23 @@ def write_report(
 
 def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
     """The four files that stand for the whole run."""
-    pictures = {o.slug: f"{o.slug}/{TRAJECTORY}" for o in outcomes if (folder / o.slug / TRAJECTORY).is_file()}
-    attachments = {slug: f"{_shown(folder)}/{picture}" for slug, picture in pictures.items()}
+    pictures = {o.slug: _pictures(folder, o) for o in outcomes}
+    attachments = {slug: f"{_shown(folder)}/{found[0].path}" for slug, found in pictures.items() if found}
     times = TIMES if (folder / TIMES).is_file() else ""
     write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     replace_file(folder / "junit.xml", lambda path: junit.write(path, outcomes, attachments))
     write_text(folder / "metrics.txt", metrics.to_text(outcomes))
     write_text(folder / "index.html", html.render(outcomes, pictures, _logs(folder, outcomes), times))
+
+
+def _pictures(folder: Path, outcome: Outcome) -> list[html.Picture]:
+    """Those that a test has, the one that says most first: GitLab shows one beside a test case."""
+    known = (
+        (TRAJECTORY, f"The drive of {outcome.name} from above"),
+        (SNAPSHOT, f"What the camera of {outcome.name} saw"),
+    )
+    place = outcome.slug
+    return [html.Picture(f"{place}/{name}", text) for name, text in known if (folder / place / name).is_file()]
 
 
 def _shown(folder: Path) -> str:

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 from services.base import Context, Service
 from services.base.service import period_of
 from services.rec_recorder.model import Recording
-from services.rec_recorder.source import Source, parse
+from services.rec_recorder.source import Source, Wanted, parse
 
 if TYPE_CHECKING:
     from services.rec_recorder.pictures import Cameras
+    from services.rec_recorder.snapshot import Snapshot
 
-LOOKS_HZ = 200.0
+LOOKS_HZ, SNAPSHOT_LOOKS_HZ = 200.0, 20.0
 COMMAND = "cluon.data.RecorderCommand"
 MEGABYTE = 1_000_000
 
@@ -21,17 +22,27 @@ class Recorder(Service):
 
     period = None
 
-    def __init__(self, recording: Recording, cameras: "Cameras | None", commands: bool) -> None:
+    def __init__(
+        self, recording: Recording, cameras: "Cameras | None", snapshot: "Snapshot | None", commands: bool
+    ) -> None:
         self.observe = recording.write
-        self._recording, self._cameras = recording, cameras
+        self._recording, self._cameras, self._snapshot = recording, cameras, snapshot
         if cameras is not None:
             self.period = period_of(LOOKS_HZ)
+        elif snapshot is not None:
+            self.period = period_of(SNAPSHOT_LOOKS_HZ)
         if commands:
             self.inputs = {(COMMAND, None): self._command}
+
+    def begin(self, now: int) -> None:
+        if self._snapshot is not None:
+            self._snapshot.begin()
 
     def update(self, now: int) -> tuple[()]:
         if self._cameras is not None:
             self._cameras.update(now)
+        if self._snapshot is not None:
+            self._snapshot.update(now)
         return ()
 
     def _command(self, message: Any, _sample_time: int) -> None:
@@ -39,17 +50,28 @@ class Recorder(Service):
 
 
 def build(context: Context) -> Service:
-    """The service from its flags; the recording is closed at the end. PyAV is loaded only for frames."""
+    """The service from its flags; the recording is closed at the end. PyAV and OpenCV are loaded only for pictures."""
     flags = context.flags
     memories = [parse(text) for text in flags["memories"]]
-    if flags["frames"] and not memories:
-        raise ValueError("--frames needs --memories: the names of the shared memories to record")
+    for name in ("frames", "snapshot"):
+        if flags[name] and not memories:
+            raise ValueError(f"--{name} needs --memories: the names of the shared memories to record")
     max_size = flags["max-size"] and round(flags["max-size"] * MEGABYTE)
     recording = context.resources.enter_context(Recording(Path(flags["rec"]), max_size))
     if flags["paused"]:
         recording.is_on = False
     sources = [Source(wanted, period_of(flags["frames"])) for wanted in memories if flags["frames"]]
-    return Recorder(recording, _cameras(context, sources, recording) if sources else None, flags["commands"])
+    cameras = _cameras(context, sources, recording) if sources else None
+    snapshot = _snapshot(context, Path(flags["snapshot"]), memories[0]) if flags["snapshot"] else None
+    return Recorder(recording, cameras, snapshot, flags["commands"])
+
+
+def _snapshot(context: Context, path: Path, memory: Wanted) -> "Snapshot":
+    from services.rec_recorder.snapshot import Snapshot
+
+    snapshot = Snapshot(Source(memory, 1), path)
+    context.resources.callback(snapshot.close)
+    return snapshot
 
 
 def _cameras(context: Context, sources: list[Source], recording: Recording) -> "Cameras":

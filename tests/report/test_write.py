@@ -1,6 +1,7 @@
 """The report is written whatever services said, and its clean-up removes only what reports hold."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,11 +41,28 @@ def test_hostile_reasons_and_frames(tmp_path: Path, reason: str) -> None:
     assert (tmp_path / "report" / "junit.xml").is_file()
 
 
+def test_a_snapshot_is_shown_beside_the_drive(tmp_path: Path) -> None:
+    slugs = ("drive", "look", "nothing")
+    recording(tmp_path / "drive" / "test.rec", frame(0), frame(1))
+    (tmp_path / "look").mkdir()
+    for slug in slugs[:2]:
+        (tmp_path / slug / "snapshot.png").write_bytes(b"a picture")
+    outcomes = [replace(OUTCOME, name=slug, slug=slug) for slug in slugs]
+    write_report(tmp_path, outcomes, {"drive": Drawable(Bench(tmp_path).plan(), tmp_path)})
+    page, junit = ((tmp_path / name).read_text() for name in ("index.html", "junit.xml"))
+    assert re.findall(r'src="(.*?)"', page) == ["drive/trajectory.png", "drive/snapshot.png", "look/snapshot.png"]
+    assert [path.split("/", 1)[1] for path in re.findall(r"ATTACHMENT\|(.*?)]]", junit)] == [
+        "drive/trajectory.png",
+        "look/snapshot.png",
+    ]
+
+
 def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
     report = tmp_path / "project" / "report"
     for slug in ("test", "gone"):
         (report / slug / "logs").mkdir(parents=True)
-        (report / slug / "test.rec").write_bytes(b"")
+        for name in ("test.rec", "snapshot.png"):
+            (report / slug / name).write_bytes(b"")
     (report / "test" / "notes.txt").write_text("mine")
     (tmp_path / "project" / "logs").mkdir()
     document = json.loads(results.to_json([replace(OUTCOME, slug="gone"), replace(OUTCOME, slug="..")]))

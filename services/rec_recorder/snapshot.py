@@ -1,0 +1,51 @@
+"""One picture of a shared memory as a PNG; only recorders with a snapshot load this."""
+
+import logging
+from pathlib import Path
+
+import cv2
+
+from dodo_dsl.opendlv import pixels
+from services.rec_recorder.source import Source
+
+_log = logging.getLogger(__name__)
+
+
+class Snapshot:
+    """The first picture of ``source``, and then the first from a test's begin on, in the file ``path``.
+
+    A picture that cannot be written is told in the log, and ends no recording.
+    """
+
+    def __init__(self, source: Source, path: Path) -> None:
+        self._source, self._path = source, path
+        self._is_wanted = True
+
+    def begin(self) -> None:
+        """The test begins: the next picture replaces what was taken before it."""
+        self._source.skip()
+        self._is_wanted = True
+
+    def update(self, now: int) -> None:
+        """Take what is there at `now`, microseconds, if a picture is still wanted."""
+        taken = self._source.take(now) if self._is_wanted else None
+        if taken is None:
+            return
+        self._is_wanted = False
+        try:
+            self._write(taken[0])
+        except (ValueError, OSError) as error:
+            _log.warning("there is no snapshot: %s", error)
+
+    def close(self) -> None:
+        """Let go of the memory."""
+        self._source.close()
+
+    def _write(self, data: bytes) -> None:
+        layout = self._source.wanted.layout(len(data))
+        done, png = cv2.imencode(".png", pixels.to_bgr(pixels.view(data, *layout), layout[0]))
+        if not done:
+            raise OSError(f"a picture of {layout[1]} x {layout[2]} pixels cannot be encoded")
+        part = self._path.with_name(f".{self._path.name}.part")
+        part.write_bytes(png.tobytes())
+        part.replace(self._path)

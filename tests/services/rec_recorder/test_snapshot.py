@@ -1,0 +1,91 @@
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from dodo_dsl.opendlv import pixels
+from dodo_dsl.opendlv.session import Session
+from services.rec_recorder.snapshot import Snapshot
+from services.rec_recorder.source import Source, Wanted
+from tests.services.process import launch, running, say
+from tests.services.rec_recorder.test_pictures import HEIGHT, PATIENCE, WIDTH, CameraMemory, scene
+
+
+@pytest.fixture
+def camera() -> Iterator[CameraMemory]:
+    camera = CameraMemory("argb")
+    with camera.memory:
+        yield camera
+
+
+def taken(path: Path) -> list[int]:
+    """Which picture the file holds; empty without one."""
+    if not path.exists():
+        return []
+    found = cv2.imread(str(path))
+    return [n for n in range(9) if np.array_equal(found, pixels.to_bgr(scene(n, "argb"), "argb"))]
+
+
+def test_the_first_picture_and_then_that_of_the_begin(camera: CameraMemory, tmp_path: Path) -> None:
+    path, seen = tmp_path / "snapshot.png", []
+    snapshot = Snapshot(Source(Wanted(camera.name, WIDTH, HEIGHT), 1), path)
+    for number in range(6):
+        snapshot.update(number)
+        seen.append(taken(path))
+        if number == 4:
+            snapshot.begin()
+            snapshot.update(number)
+            assert taken(path) == [0], "the picture of before the begin counts no more"
+        camera.show(number)
+    snapshot.update(6)
+    assert [*seen, taken(path)] == [[], [0], [0], [0], [0], [4], [4]]
+    assert [entry.name for entry in tmp_path.iterdir()] == ["snapshot.png"]
+    snapshot.close()
+
+
+@pytest.mark.parametrize(
+    ("width", "place", "words"),
+    [(WIDTH + 2, ".", "which is no picture of 162 x 120"), (WIDTH, "nowhere", "No such file")],
+)
+def test_what_cannot_be_written_is_told(
+    camera: CameraMemory, tmp_path: Path, caplog: pytest.LogCaptureFixture, width: int, place: str, words: str
+) -> None:
+    snapshot = Snapshot(Source(Wanted(camera.name, width, HEIGHT), 1), tmp_path / place / "snapshot.png")
+    snapshot.update(0)
+    camera.show(1)
+    snapshot.update(1)
+    snapshot.close()
+    (record,) = caplog.records
+    assert record.getMessage().startswith("there is no snapshot: ") and words in record.getMessage()
+
+
+def test_the_recorder_takes_one_without_recording_frames(cid: int, camera: CameraMemory, tmp_path: Path) -> None:
+    path = tmp_path / "snapshot.png"
+    memories = f"--memories={camera.name}:{WIDTH}x{HEIGHT}"
+    flags = (f"--cid={cid}", f"--rec={tmp_path / 'drive.rec'}", f"--snapshot={path}", memories)
+    with Session(cid) as session, running("rec_recorder", tmp_path, *flags) as recorder:
+        say(session, "dodo.TestBegin")
+        for number in range(1, 9):
+            if taken(path):
+                break
+            camera.show(number)
+            recorder_had_time(path)
+        recorder.terminate()
+        assert recorder.wait(PATIENCE) == 0
+    assert len(taken(path)) == 1
+
+
+def recorder_had_time(path: Path) -> None:
+    deadline = time.monotonic() + 0.5
+    while not path.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+def test_a_snapshot_needs_a_memory(cid: int, tmp_path: Path) -> None:
+    flags = (f"--cid={cid}", f"--rec={tmp_path / 'drive.rec'}", "--snapshot=x.png")
+    recorder = launch("rec_recorder", tmp_path, *flags)
+    assert "--snapshot needs --memories" in recorder.communicate(timeout=PATIENCE)[1]
+    assert recorder.returncode == 2
