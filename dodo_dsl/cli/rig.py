@@ -1,18 +1,17 @@
-"""dodo rig: a rig by hand: where it is, home, to a place, calibrated, out of quarantine."""
+"""dodo rig: a rig by hand: where it is, home, to a place, calibrated, out of quarantine, and what its camera sees."""
 
 import argparse
-import asyncio
 import json
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
+from dodo_dsl.cli import rig_truth
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.run import leases, rigs
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.deployment import find_deployment, load_deployment
+from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.values import ValueProblem, convert
@@ -24,18 +23,37 @@ EXAMPLES = """examples:
   dodo rig home kiwi-dynamic            to the place at its switches
   dodo rig clear kiwi-dynamic           its fault is mended: tests may run on it again
   dodo rig goto emulated 0 0 0          on any machine with the firmware's emulator
+  dodo rig truth kiwi-static -o truths/desk.json --box yellow 199 329 36 55
+                                        a snapshot and the truth about it, for object-detection
 
 exit codes: 0 done, 1 a rig is in quarantine, 2 usage or a place out of the limits, 3 the rig cannot
 """
-ACTIONS = ("status", "home", "goto", "calibrate", "clear")
+ACTIONS = {
+    "status": "whether a rig is fit, and where it is",
+    "home": "to the place at its switches",
+    "goto": "to a place within its limits",
+    "calibrate": "it finds its home",
+    "clear": "its fault is mended, tests may run on it again",
+}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("action", choices=ACTIONS)
-    parser.add_argument("rig", nargs="?", metavar="RIG", help="a name of dodo.yml, or emulated; status: default all")
-    parser.add_argument("place", nargs="*", type=float, metavar="X Y YAW", help="goto: m, m and degrees, 0 the middle")
-    parser.add_argument("--wait", type=float, default=60.0, metavar="S", help="most time that a busy rig is waited for")
-    parser.add_argument("--json", action="store_true", help="as JSON")
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    for name, text in ACTIONS.items():
+        action = actions.add_parser(name, help=text, description=text)
+        count = "?" if name == "status" else None
+        action.add_argument("rig", nargs=count, metavar="RIG", help="a name of dodo.yml, or emulated")
+        action.set_defaults(place=[])
+        if name == "goto":
+            help_text = "m, m and degrees, 0 the middle"
+            action.add_argument("place", nargs=3, type=float, metavar=("X", "Y", "YAW"), help=help_text)
+        wait = "most time that a busy rig is waited for"
+        action.add_argument("--wait", type=float, default=60.0, metavar="S", help=wait)
+        action.add_argument("--json", action="store_true", help="as JSON")
+    text = "a snapshot of the camera, and the truth about it for object-detection"
+    formatter = argparse.RawDescriptionHelpFormatter
+    epilog = rig_truth.EXAMPLES
+    rig_truth.add(actions.add_parser("truth", help=text, description=text, epilog=epilog, formatter_class=formatter))
 
 
 class _Usage(Exception):
@@ -43,10 +61,16 @@ class _Usage(Exception):
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    def say(text: str) -> None:
+        stderr.write(f"{text}\n")
+
     try:
-        chosen = _chosen(options)
-        results = [_one(options, rig, lambda text: print(text, file=stderr)) for rig in chosen]
-    except _Usage as error:
+        deployment, chosen = _chosen(options)
+        if options.action == "truth":
+            stdout.write(rig_truth.make(options, deployment, chosen[0], say) + "\n")
+            return Exit.OK
+        results = [_one(options, rig, say) for rig in chosen]
+    except (_Usage, *rig_truth.PROBLEMS) as error:
         stderr.write(f"dodo rig: {error}\n")
         return Exit.USAGE
     except (rigs.RigProblem, leases.LeaseTimeout) as problem:
@@ -61,20 +85,16 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return Exit.PROBLEMS if any(result["quarantine"] for result in results) else Exit.OK
 
 
-def _chosen(options: argparse.Namespace) -> list[Rig]:
+def _chosen(options: argparse.Namespace) -> tuple[Deployment, list[Rig]]:
     deployment, problems = load_deployment(find_deployment(Path.cwd()))
     if has_errors(problems):
         raise _Usage(f"dodo.yml has problems:\n{format_text(problems)}")
-    if options.rig is None and options.action == "status":
-        return list(deployment.rigs.values())
     if options.rig is None:
-        raise _Usage(f"{options.action} needs the name of a rig")
-    if len(options.place) != 3 * (options.action == "goto"):
-        raise _Usage("goto takes a rig, X and Y in m and YAW in degrees; other actions take a rig only")
+        return deployment, list(deployment.rigs.values())
     rig = deployment.rig(options.rig)
     if rig is None:
         raise _Usage(f"there is no rig '{options.rig}', expected one of {', '.join([EMULATED, *deployment.rigs])}")
-    return [rig]
+    return deployment, [rig]
 
 
 def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
@@ -90,24 +110,16 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
             raise _Usage(f"rig '{rig.name}' has no serial port: nothing of it moves")
         return result
     try:
-        return {**result, **asyncio.run(_moved(options, rig, say))}
-    except asyncio.CancelledError:
-        raise KeyboardInterrupt from None
+        return {**result, **_moved(options, rig, say)}
     except rigs.RigProblem as problem:
         if options.action != "status":
             raise
         return {**result, "error": str(problem)}
 
 
-async def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
-    task = asyncio.current_task()
-    assert task is not None
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
     words = [*_flags(rig), options.action, *(f"{number:g}" for number in options.place)]
-    what = f"'dodo rig {options.action}'"
-    async with rigs.leased(rig.cid, what, say, options.wait) as descriptors:
-        return await rigs.ask(rigs.HAND, words, descriptors=descriptors)
+    return rigs.ask_alone(rig.cid, f"'dodo rig {options.action}'", (rigs.HAND, words), say, options.wait)
 
 
 def _flags(rig: Rig) -> list[str]:

@@ -130,6 +130,38 @@ async def ask(
     return said
 
 
+def ask_alone(
+    cid: int | None,
+    what: str,
+    question: tuple[Sequence[str], Sequence[str]],
+    say: Callable[[str], None],
+    patience_s: float = leases.DEFAULT_PATIENCE_S,
+) -> dict[str, Any]:
+    """``ask`` a program with its words about a rig that nobody else uses meanwhile; a signal ends both.
+
+    Raises RigProblem and LeaseTimeout.
+    """
+    try:
+        return asyncio.run(_ask_alone(cid, what, question, say, patience_s))
+    except asyncio.CancelledError:
+        raise KeyboardInterrupt from None
+
+
+async def _ask_alone(
+    cid: int | None,
+    what: str,
+    question: tuple[Sequence[str], Sequence[str]],
+    say: Callable[[str], None],
+    patience_s: float,
+) -> dict[str, Any]:
+    task = asyncio.current_task()
+    assert task is not None
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    async with leased(cid, what, say, patience_s) as descriptors:
+        return await ask(*question, descriptors=descriptors)
+
+
 async def _ended(process: asyncio.subprocess.Process) -> None:
     if process.returncode is not None:
         return

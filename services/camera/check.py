@@ -32,7 +32,7 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
     try:
         flags = parse(load_manifest(Path(__file__).parent), [*argv, "--cid=1"])
         with interruptible():
-            said = judged(_picture(flags))
+            said = judged(looked(flags))
     except (ValueError, OSError, CameraError) as error:
         said = {"ok": False, "error": " ".join(str(error).split())}
     stdout.write(json.dumps(said) + "\n")
@@ -54,7 +54,8 @@ def judged(picture: Picture) -> dict[str, Any]:
     return {"ok": not reason, "reason": reason, "brightness": brightness, "contrast": contrast}
 
 
-def _picture(flags: Flags) -> Picture:
+def looked(flags: Flags) -> Picture:
+    """A picture of the camera that the flags name; raises ValueError, OSError and CameraError."""
     camera = open_camera(flags)
     if isinstance(camera, FileCamera):
         with contextlib.closing(camera):

@@ -82,6 +82,27 @@ def publisher(memories: Memories) -> Publish:
     return publish
 
 
+def opened(flags: Flags) -> tuple[Renderer, Optics]:
+    """The scene and the camera of the flags; raises MapError and ValueError."""
+    cv2.setNumThreads(1)
+    scene = _scene(flags)
+    optics = _optics(flags, scene)
+    return Renderer(scene, optics.wide.width, optics.wide.height, optics.wide.fovy), optics
+
+
+def mounted_camera(flags: Flags, renderer: Renderer, optics: Optics, publish: Publish) -> VirtualCamera:
+    """The camera in its place on the vehicle, which stands where the flags say until it moves."""
+    mounted = mount(*(flags[name] for name in ("x", "y", "z", "roll", "pitch", "yaw")))
+    return VirtualCamera(renderer, mounted, publish, optics, _start(flags))
+
+
+def truth_of(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[Truth, dict[str, str]]:
+    """What knows the true boxes, and the classes by model; raises ValueError for a model that the map lacks."""
+    classes = classes_of(flags["truth-classes"], renderer.bodies.names)
+    limits = Limits(flags["truth-min-visible"], flags["truth-min-height"])
+    return Truth(renderer, classes, limits, optics.lens), classes
+
+
 def _scene(flags: Flags) -> Scene:
     light = Light.asked(flags["light.azimuth"], flags["light.elevation"], flags["light.ambient"])
     lines = tuple(flags["lines"])
@@ -107,12 +128,11 @@ def _start(flags: Flags) -> Pose | None:
 
 
 def _teller(context: Context, renderer: Renderer, optics: Optics) -> Teller | None:
-    flags = context.flags
-    if flags["truth-sender"] is None:
+    stamp = context.flags["truth-sender"]
+    if stamp is None:
         return None
-    classes = classes_of(flags["truth-classes"], renderer.bodies.names)
-    truth = Truth(renderer, classes, Limits(flags["truth-min-visible"], flags["truth-min-height"]), optics.lens)
-    return Teller(truth, classes.values(), optics.camera, context.messages, flags["truth-sender"])
+    truth, classes = truth_of(context.flags, renderer, optics)
+    return Teller(truth, classes.values(), optics.camera, context.messages, stamp)
 
 
 def _memories(context: Context, pixels: int) -> Memories:
@@ -124,11 +144,7 @@ def _memories(context: Context, pixels: int) -> Memories:
 def build(context: Context) -> Service:
     """The service from its flags; raises MapError, ValueError and SharedMemoryError."""
     flags = context.flags
-    cv2.setNumThreads(1)
-    scene = _scene(flags)
-    optics = _optics(flags, scene)
-    renderer = Renderer(scene, optics.wide.width, optics.wide.height, optics.wide.fovy)
-    mounted = mount(*(flags[name] for name in ("x", "y", "z", "roll", "pitch", "yaw")))
+    renderer, optics = opened(flags)
     publish = publisher(_memories(context, flags["width"] * flags["height"]))
-    camera = VirtualCamera(renderer, mounted, publish, optics, _start(flags))
+    camera = mounted_camera(flags, renderer, optics, publish)
     return CameraService(camera, flags["freq"], flags["frame-id"], _teller(context, renderer, optics))

@@ -1,0 +1,141 @@
+"""The truth about what a rig's camera sees: of the virtual scene, and marked by hand on a picture."""
+
+import json
+import shutil
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from dodo_dsl.cli.main import main
+from services.object_detection.truth import load
+from tests.drive.applications import ROOT
+
+CONES = "cone_yellow=yellow,cone_blue=blue"
+SIZE = (320, 240)
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A deployment with the static rig's tests and a rig whose camera shows a picture."""
+    for name in ("maps", "truths", "hil-camera", "hil-camera-scenes", "sil-open-straight"):
+        shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name)
+    board = np.kron(np.indices((6, 8)).sum(0) % 2 * 200, np.ones((40, 40))).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "desk.png"), board)
+    camera = {"source": "desk.png", "width": SIZE[0], "height": SIZE[1]}
+    rigs = {"desk": {"kind": "static", "cid": 126, "camera": camera}, "blind": {"kind": "static", "cid": 127}}
+    (tmp_path / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"], "rigs": rigs}))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    return tmp_path
+
+
+def rig(*words: object, code: int = 0) -> str:
+    stdout, stderr = StringIO(), StringIO()
+    assert main(["rig", "truth", *map(str, words)], stdout, stderr) == code, stdout.getvalue() + stderr.getvalue()
+    return stdout.getvalue() + stderr.getvalue()
+
+
+def boxes(path: Path) -> list[tuple[str, list[float]]]:
+    found: dict[str, Any] = json.loads(path.read_text())
+    names = {category["id"]: category["name"] for category in found["categories"]}
+    return [(names[each["category_id"]], each["bbox"]) for each in found["annotations"]]
+
+
+def files(place: Path, stem: str) -> list[str]:
+    return sorted(path.name for path in place.iterdir() if stem in path.name)
+
+
+def test_the_scene_knows_the_shipped_truth(place: Path) -> None:
+    said = rig("emulated", "--test", "hil-camera", "--classes", CONES, "-o", "board.json")
+    assert said.startswith("board.json: 8 boxes (4 blue, 4 yellow) in 640 x 480 pixels")
+    shipped = boxes(place / "tests" / "truths" / "static-rig.json")
+    for (label, box), (true_label, true) in zip(boxes(place / "board.json"), shipped, strict=True):
+        assert label == true_label
+        assert box == pytest.approx(true, abs=0.1)
+    assert load(place / "board.json", "one").labels() == ["blue", "yellow"]
+    picture, marked = (cv2.imread(str(place / name)) for name in ("board.png", "board-boxes.png"))
+    assert picture.shape == (480, 640, 3)
+    changed = (marked[::2, ::2] != picture).any(axis=2)
+    assert 1000 < changed.sum() < 10_000, "boxes and names, and the picture below them"
+    for _, (x, y, width, height) in shipped:
+        inside = changed[round(y) + 3 : round(y + height) - 3, round(x) + 3 : round(x + width) - 3]
+        assert inside.mean() < 0.3, "the object can be seen"
+        assert changed[round(y) : round(y) + 2, round(x) + 5 : round(x + width) - 5].any(axis=0).all()
+
+
+def test_the_scene_has_the_light_of_its_test(place: Path) -> None:
+    means = []
+    for light in ("0.5", "1.6"):
+        words = ("--test", f"hil-camera-scenes[light={light},clutter=0]", "--classes", CONES, "-o", f"{light}.json")
+        rig("emulated", *words)
+        means.append(cv2.imread(str(place / f"{light}.png")).mean())
+    assert means[1] > 1.3 * means[0]
+    assert boxes(place / "0.5.json") == boxes(place / "1.6.json")
+
+
+def test_a_test_whose_truth_is_missing_gets_one(place: Path) -> None:
+    path = place / "tests" / "truths" / "static-rig.json"
+    path.unlink()
+    rig("emulated", "--test", "hil-camera", "--classes", CONES, "-o", path)
+    assert len(boxes(path)) == 8
+
+
+def test_boxes_marked_by_hand_on_a_snapshot(place: Path) -> None:
+    assert "desk-1.png: a snapshot of 320 x 240 pixels; mark boxes with" in rig("desk", "-o", "desk-1.json")
+    assert files(place, "desk-1") == ["desk-1.png"]
+    before = (place / "desk-1.png").read_bytes()
+    words = ("--picture", "desk-1.png", "--box", "color:yellow", 40, 0, 40, 40.5, "--box", "blue", 280, 200, 40, 40)
+    rig("desk", "-o", "desk-1.json", *words)
+    assert boxes(place / "desk-1.json") == [("yellow", [40, 0, 40, 40.5]), ("blue", [280, 200, 40, 40])]
+    assert files(place, "desk-1") == ["desk-1-boxes.png", "desk-1.json", "desk-1.png"]
+    assert (place / "desk-1.png").read_bytes() == before
+    assert "desk-1.json is there already; --force replaces it" in rig("desk", "-o", "desk-1.json", *words, code=2)
+    rig("desk", "-o", "desk-1.json", "--boxes", "desk-1.json", "--box", "blue", 0, 0, 9, 9, "--force")
+    assert [label for label, _ in boxes(place / "desk-1.json")] == ["blue", "yellow", "blue"]
+
+
+BOX = ("--box", "yellow", 10, 20, 30, 40)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("desk", "--box", "yellow", 300, 20, 30, 40), "lies outside of the picture, which has 320 x 240 pixels"),
+        (("desk", "--box", "yellow", -1, 20, 30, 40), "box 1 (yellow -1 20 30 40): lies outside"),
+        (("desk", "--box", "yellow", 10, 20, 0, 40), "has no area, expected a width and a height above 0"),
+        (("desk", "--box", "yellow", 10, 20, "nan", 40), "expected a class and four numbers X Y WIDTH HEIGHT"),
+        (("desk", "--box", "", 10, 20, 30, 40), "the class is empty"),
+        (("desk", *BOX, "--classes", "red,blue"), "there is no class 'yellow', expected one of red, blue"),
+        (("desk", "--box", "red", 1, 2, 3, 4, "--test", "hil-camera"), "no class 'red', expected one of blue, yellow"),
+        (
+            ("desk", "--boxes", "tests/truths/static-rig.json"),
+            "a picture of 640 x 480 pixels, expected one of 320 x 240",
+        ),
+        (("desk", "--boxes", "desk.png"), "desk.png: cannot be read as COCO JSON"),
+        (("desk", *BOX, "--picture", "none.png"), "none.png: cannot be read: No such file"),
+        (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: holds no picture"),
+        (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),
+        (("desk", *BOX, "--test", "sil-open-straight"), "has no service 'camera'"),
+        (("blind", *BOX), "rig 'blind' has no camera in dodo.yml"),
+        (("nobody", *BOX), "there is no rig 'nobody', expected one of emulated, blind, desk"),
+        (("emulated",), "the emulated rig's camera sees the map of a test: name one with --test"),
+        (("emulated", "--test", "hil-camera-scenes"), "means 6 tests, expected one"),
+        (("emulated", "--test", "hil-camera"), "the test judges blue, yellow: write --classes cone_yellow=CLASS"),
+        (("emulated", "--test", "hil-camera", "--classes", "cone_red=red"), "there is no model 'cone_red' in the map"),
+        (("emulated", "--picture", "desk.png"), "--picture has no virtual scene"),
+    ],
+)
+def test_what_is_no_truth(place: Path, words: tuple[object, ...], sentence: str) -> None:
+    assert sentence in rig("-o", "desk-2.json", *words, code=2)
+    assert files(place, "desk-2") == []
+
+
+def test_a_camera_that_gives_nothing_is_an_error(place: Path) -> None:
+    (place / "desk.png").unlink()
+    assert "desk.png" in rig("desk", "-o", "desk-2.json", *BOX, code=3)
+    assert files(place, "desk-2") == []

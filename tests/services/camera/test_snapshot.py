@@ -1,0 +1,46 @@
+"""A snapshot as a process that looks at a picture."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.services.camera.test_check import BOARD
+from tests.services.process import ROOT
+
+
+def snapshot(*words: str) -> tuple[int, dict[str, Any]]:
+    command = [sys.executable, "-m", "services.camera.snapshot", *words]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
+    assert result.stderr == ""
+    return result.returncode, json.loads(result.stdout)
+
+
+@pytest.mark.parametrize(("divisor", "reason"), [(1, ""), (255, "is it lit?")])
+def test_a_snapshot_is_the_cameras_picture(tmp_path: Path, divisor: int, reason: str) -> None:
+    source, output = tmp_path / "board.png", tmp_path / "snapshot.png"
+    cv2.imwrite(str(source), BOARD // divisor)
+    code, said = snapshot(f"--source={source}", "--width=128", "--height=128", f"--output={output}")
+    assert (code, said["ok"], said["width"], said["height"]) == (0, not reason, 128, 128)
+    assert reason in said["reason"]
+    assert np.array_equal(cv2.imread(str(output)), np.dstack([BOARD // divisor] * 3))
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--source=/nowhere.png", "--output=OUT"), "is no camera"),
+        (("--source=/nowhere.png",), "expected --output=FILE once"),
+        (("--source=file", "--fil=x", "--output=OUT"), "did you mean '--file'"),
+    ],
+)
+def test_what_gives_no_snapshot(tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
+    output = tmp_path / "snapshot.png"
+    code, said = snapshot(*(word.replace("OUT", str(output)) for word in words))
+    assert code == 1 and sentence in said["error"]
+    assert not output.exists()
