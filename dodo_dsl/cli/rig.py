@@ -43,10 +43,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         action = actions.add_parser(name, help=text, description=text)
         count = "?" if name == "status" else None
         action.add_argument("rig", nargs=count, metavar="RIG", help="a name of dodo.yml, or emulated")
-        action.set_defaults(place=[])
-        if name == "goto":
-            help_text = "m, m and degrees, 0 the middle"
-            action.add_argument("place", nargs=3, type=float, metavar=("X", "Y", "YAW"), help=help_text)
+        for axis, unit in {"x": "m", "y": "m", "yaw": "degrees"}.items() if name == "goto" else ():
+            action.add_argument(axis, type=float, metavar=axis.upper(), help=f"{unit}, 0 the middle")
         wait = "most time that a busy rig is waited for"
         action.add_argument("--wait", type=float, default=60.0, metavar="S", help=wait)
         action.add_argument("--json", action="store_true", help="as JSON")
@@ -118,7 +116,8 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
 
 
 def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
-    words = [*_flags(rig), options.action, *(f"{number:g}" for number in options.place)]
+    place = (options.x, options.y, options.yaw) if options.action == "goto" else ()
+    words = [*_flags(rig), options.action, *(f"{number:g}" for number in place)]
     return rigs.ask_alone(rig.cid, f"'dodo rig {options.action}'", (rigs.HAND, words), say, options.wait)
 
 

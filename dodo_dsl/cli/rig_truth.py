@@ -4,22 +4,19 @@ import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dodo_dsl.cli import selection
 from dodo_dsl.recordings import truth
-from dodo_dsl.recordings.outputs import OutputExists, new_file, refuse_existing
+from dodo_dsl.recordings.outputs import OutputExists, refuse_existing
 from dodo_dsl.recordings.truth import Mark, TruthError
+from dodo_dsl.recordings.truth_files import TruthFiles, decoded, given
 from dodo_dsl.run import rig_camera, rigs
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.rig import Rig
-
-if TYPE_CHECKING:
-    from dodo_dsl.opendlv.pixels import Picture
 
 EXAMPLES = """examples:
   dodo rig truth emulated --test hil-camera --classes cone_yellow=yellow,cone_blue=blue -o truths/board.json
@@ -36,7 +33,6 @@ It writes FILE.json (COCO, in pixels), FILE.png (the snapshot) and FILE-boxes.pn
 """
 PROBLEMS = (TruthError, OutputExists, selection.NoSuchTest)
 """What is wrong with the command line; one sentence each."""
-_MOST_PICTURE_BYTES = 64_000_000
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -53,30 +49,17 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--wait", type=float, default=60.0, metavar="S", help="most time that a busy rig is waited for")
 
 
-@dataclass(frozen=True)
-class _Files:
-    """What is written: the truth, the snapshot, and the snapshot with boxes."""
-
-    truth: Path
-    picture: Path
-    marked: Path
-
-
 def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Callable[[str], None]) -> str:
     """Writes truth and pictures, and says what became of it; raises one of PROBLEMS, RigProblem and LeaseTimeout."""
-    output: Path = options.output
-    if output.suffix != ".json":
-        raise TruthError(f"--output is '{output}', expected a file that ends in .json")
-    files = _Files(output, output.with_suffix(".png"), output.with_name(f"{output.stem}-boxes.png"))
+    files = TruthFiles.beside(options.output)
     manifests, spec = _test(options.test, deployment)
     is_new = options.picture is None or options.picture.resolve() != files.picture.resolve()
     is_scene = rig.is_emulated and not options.box and not options.boxes
     has_boxes = is_scene or options.box or options.boxes
-    wanted = [*([files.truth, files.marked] if has_boxes else []), *([files.picture] if is_new else [])]
-    refuse_existing(wanted, options.force)
+    refuse_existing(files.wanted(bool(has_boxes), is_new), options.force)
     marks = [truth.mark(words[0], words[1:], f"--box {' '.join(words)}") for words in options.box]
     png, said = _looked(options, rig, manifests, spec, say)
-    picture = _decoded(png, str(options.picture or rig.name))
+    picture = decoded(png, str(options.picture or rig.name))
     height, width = picture.shape[:2]
     marks += truth.read(options.boxes, width, height) if options.boxes else []
     marks += [_of_scene(box) for box in said.get("boxes", ())] if is_scene else []
@@ -87,7 +70,7 @@ def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Cal
     truth.check(marks, width, height, classes)
     if has_boxes and not marks:
         raise TruthError("there is no box: a truth has at least one")
-    _write(files, picture, marks, is_new)
+    files.write(picture, marks, is_new)
     return _sentence(files, marks, width, height)
 
 
@@ -113,7 +96,7 @@ def _looked(
     if options.picture:
         if rig.is_emulated and not (options.box or options.boxes):
             raise TruthError("--picture has no virtual scene: mark its boxes with --box or --boxes")
-        return _given(options.picture), {}
+        return given(options.picture), {}
     look = rig_camera.look(rig, manifests, spec)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "snapshot.png"
@@ -123,25 +106,6 @@ def _looked(
         if said.get("reason"):
             say(f"warning: {said['reason']}")
         return path.read_bytes(), said
-
-
-def _given(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > _MOST_PICTURE_BYTES:
-            raise TruthError(f"{path}: is larger than {_MOST_PICTURE_BYTES} bytes")
-        return path.read_bytes()
-    except OSError as error:
-        raise TruthError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def _decoded(png: bytes, name: str) -> "Picture":
-    import cv2
-    import numpy as np
-
-    picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) if png else None
-    if picture is None:
-        raise TruthError(f"{name}: holds no picture")
-    return np.asarray(picture, np.uint8)
 
 
 def _require_names(marks: Sequence[Mark], classes: Sequence[str]) -> None:
@@ -156,26 +120,7 @@ def _of_scene(box: dict[str, Any]) -> Mark:
     return truth.mark(box["class"], [box[name] for name in ("x", "y", "width", "height")], "the virtual scene")
 
 
-def _write(files: _Files, picture: "Picture", marks: Sequence[Mark], is_new: bool) -> None:
-    """The pictures first: who finds the truth finds them, too."""
-    height, width = picture.shape[:2]
-    if is_new:
-        _write_picture(files.picture, picture)
-    if marks:
-        _write_picture(files.marked, truth.drawn(picture, marks))
-        with new_file(files.truth) as path:
-            path.write_text(truth.text(marks, files.picture.name, width, height), encoding="utf-8")
-
-
-def _write_picture(target: Path, picture: "Picture") -> None:
-    import cv2
-
-    _, png = cv2.imencode(".png", picture)
-    with new_file(target) as path:
-        path.write_bytes(png.tobytes())
-
-
-def _sentence(files: _Files, marks: Sequence[Mark], width: int, height: int) -> str:
+def _sentence(files: TruthFiles, marks: Sequence[Mark], width: int, height: int) -> str:
     if not marks:
         how = f"mark boxes with --picture {files.picture} --box CLASS X Y WIDTH HEIGHT"
         return f"{files.picture}: a snapshot of {width} x {height} pixels; {how}"

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
+from dodo_dsl.cli.main import main
 from tests.drive.applications import KIWI, ROOT, results
 from tests.services.gantry.fakerig import FakeRig
 
@@ -76,6 +77,12 @@ def place(tmp_path: Path, cid: int) -> Iterator[Place]:
     with FakeRig(tmp_path / "port") as rig:
         rig.at, rig.homes_slowly = [-0.88, -0.68, -2.6], True
         yield Place(tmp_path, cid, rig)
+
+
+@pytest.mark.parametrize("action", ["status", "home", "goto", "calibrate", "clear", "truth"])
+def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rig", action, "--help"], sys.stdout, sys.stderr) == 0
+    assert "RIG" in capsys.readouterr().out
 
 
 def test_by_hand(place: Place) -> None:
