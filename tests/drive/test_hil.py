@@ -1,11 +1,13 @@
 """The hil tests on the emulated rig: the firmware's binary, the gantry, a camera at the rig's true place."""
 
+import json
 import math
 import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,6 +16,27 @@ from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from tests.drive.applications import BLIND, ROOT, dodo, kiwi, results
 
+SPEC = """
+dodo: 1
+name: hil-labelled
+extends: ../hil-camera/hil-camera.dodo.yml
+record: {frames: 2 Hz}
+evaluation:
+  cones: {uses: object-detection, with: {min-frames: 20, max-time: 4 s}}
+"""
+
+
+def boxes(path: Path) -> dict[int, list[tuple[str, float, float, float, float]]]:
+    """The boxes of a COCO file, by image."""
+    found = json.loads(path.read_text())
+    names = {category["id"]: category["name"] for category in found["categories"]}
+    images: dict[int, Any] = {image["id"]: [] for image in found["images"]}
+    for each in found["annotations"]:
+        images[each["image_id"]].append((names[each["category_id"]], *each["bbox"]))
+    return images
+
+
+TRUTH = boxes(ROOT / "tests_registry" / "truths" / "static-rig.json")[1]
 MICROSTEP, MICROSTEP_YAW = 2.36e-6, 0.000248
 MEASURED, TRUE = 0, 1
 
@@ -70,6 +93,14 @@ def test_a_reversed_application_hits_the_wall_on_the_rig(tmp_path: Path) -> None
 def test_the_static_rig_sees_its_board(tmp_path: Path) -> None:
     test = run(tmp_path / "good", "hil-camera", code=0)
     assert test["outcome"] == "passed"
+    report = tmp_path / "good"
+    assert 'src="hil-camera/snapshot.png"' in (report / "index.html").read_text()
+    assert "hil-camera/snapshot.png]]" in (report / "junit.xml").read_text()
+    snapshot = cv2.imread(str(report / "hil-camera" / "snapshot.png"))
+    assert snapshot.shape == (480, 640, 3)
+    for label, x, y, width, height in TRUTH:
+        blue, _, red = snapshot[round(y + 0.8 * height), round(x + width / 2)].tolist()
+        assert (blue - red > 80) if label == "blue" else (red - blue > 80), (label, x, y)
     application = kiwi(tmp_path / "app", BLIND)
     test = run(tmp_path / "blind", "hil-camera", "--application", str(application), code=1)
     assert "no detection came" in test["reason"]
@@ -79,3 +110,23 @@ def test_the_static_rig_in_the_dusk_before_a_background(tmp_path: Path) -> None:
     test = run(tmp_path, "hil-camera-scenes[light=0.5,clutter=60]", code=0)
     counts = {check["name"]: check["value"] for check in test["checks"]}
     assert counts["false-positives"] > 20 < counts["true-positives"], "it is neither dark nor full"
+
+
+def test_a_recording_of_the_static_rig_is_a_labelled_data_set(tmp_path: Path) -> None:
+    for name in ("maps", "truths", "hil-camera"):
+        shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name)
+    spec = tmp_path / "tests" / "hil-labelled" / "hil-labelled.dodo.yml"
+    spec.parent.mkdir()
+    spec.write_text(SPEC)
+    application = str(ROOT / "examples" / "kiwi" / "docker-compose.yml")
+    run(tmp_path / "report", str(spec), "--application", application, code=0)
+    recording = tmp_path / "report" / "hil-labelled" / "test.rec"
+    dodo("rec", "export", str(recording), "--coco", "-o", str(tmp_path / "set"), code=0)
+    images = boxes(tmp_path / "set" / "annotations.json")
+    assert len(images) >= 5
+    assert len(list((tmp_path / "set" / "images").glob("*.png"))) == len(images)
+    for found in images.values():
+        assert sorted(label for label, *_ in found) == sorted(label for label, *_ in TRUTH)
+        for label, *true in TRUTH:
+            nearest = min((box for name, *box in found if name == label), key=lambda box: math.dist(box[:2], true[:2]))
+            assert nearest == pytest.approx(true, abs=8), (label, true)

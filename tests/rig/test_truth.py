@@ -1,6 +1,8 @@
 """The truth about what a rig's camera sees: of the virtual scene, and marked by hand on a picture."""
 
 import json
+import re
+import shlex
 import shutil
 from io import StringIO
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 import yaml
 
 from dodo_dsl.cli.main import main
+from dodo_dsl.cli.rig_truth import EXAMPLES
 from services.object_detection.truth import load
 from tests.drive.applications import ROOT
 
@@ -27,7 +30,11 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     board = np.kron(np.indices((6, 8)).sum(0) % 2 * 200, np.ones((40, 40))).astype(np.uint8)
     cv2.imwrite(str(tmp_path / "desk.png"), board)
     camera = {"source": "desk.png", "width": SIZE[0], "height": SIZE[1]}
-    rigs = {"desk": {"kind": "static", "cid": 126, "camera": camera}, "blind": {"kind": "static", "cid": 127}}
+    rigs = {
+        "desk": {"kind": "static", "cid": 126, "camera": camera},
+        "blind": {"kind": "static", "cid": 127},
+        "kiwi-static": {"kind": "static", "cid": 125, "camera": {**camera, "width": 640, "height": 480}},
+    }
     (tmp_path / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"], "rigs": rigs}))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
@@ -122,7 +129,7 @@ BOX = ("--box", "yellow", 10, 20, 30, 40)
         (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),
         (("desk", *BOX, "--test", "sil-open-straight"), "has no service 'camera'"),
         (("blind", *BOX), "rig 'blind' has no camera in dodo.yml"),
-        (("nobody", *BOX), "there is no rig 'nobody', expected one of emulated, blind, desk"),
+        (("nobody", *BOX), "there is no rig 'nobody', expected one of emulated, blind, desk, kiwi-static"),
         (("emulated",), "the emulated rig's camera sees the map of a test: name one with --test"),
         (("emulated", "--test", "hil-camera-scenes"), "means 6 tests, expected one"),
         (("emulated", "--test", "hil-camera"), "the test judges blue, yellow: write --classes cone_yellow=CLASS"),
@@ -139,3 +146,18 @@ def test_a_camera_that_gives_nothing_is_an_error(place: Path) -> None:
     (place / "desk.png").unlink()
     assert "desk.png" in rig("desk", "-o", "desk-2.json", *BOX, code=3)
     assert files(place, "desk-2") == []
+
+
+def test_what_help_and_page_show_works(place: Path) -> None:
+    page = (ROOT / "docs" / "rigs.md").read_text()
+    for words in re.findall(r"dodo rig truth ([^`\n]*)", page.split("## Truth files")[1]):
+        rig(*shlex.split(words))
+    assert files(place / "truths", "") == [
+        f"{n}{end}" for n in ("board", "desk") for end in ("-boxes.png", ".json", ".png")
+    ]
+    shutil.copy("truths/desk.json", "marked.json")
+    shown = re.findall(r"dodo rig truth (.*)", EXAMPLES.replace("\\\n", " "))
+    assert len(shown) == 4
+    for words in shown:
+        rig(*shlex.split(words), *([] if "--force" in words else ["--force"]))
+    assert boxes(place / "truths" / "desk.json") == boxes(place / "marked.json")
