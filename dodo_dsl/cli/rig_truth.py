@@ -126,4 +126,5 @@ def _sentence(files: TruthFiles, marks: Sequence[Mark], width: int, height: int)
         return f"{files.picture}: a snapshot of {width} x {height} pixels; {how}"
     counts = Counter(mark.label for mark in marks)
     told = ", ".join(f"{count} {label}" for label, count in sorted(counts.items()))
-    return f"{files.truth}: {len(marks)} boxes ({told}) in {width} x {height} pixels; look at {files.marked}"
+    boxes = f"{len(marks)} box{'es' * (len(marks) > 1)}"
+    return f"{files.truth}: {boxes} ({told}) in {width} x {height} pixels; look at {files.marked}"

@@ -161,3 +161,10 @@ def test_what_help_and_page_show_works(place: Path) -> None:
     for words in shown:
         rig(*shlex.split(words), *([] if "--force" in words else ["--force"]))
     assert boxes(place / "truths" / "desk.json") == boxes(place / "marked.json")
+
+
+def test_a_dark_picture_is_taken_with_a_warning(place: Path) -> None:
+    cv2.imwrite("desk.png", np.kron(np.eye(8), np.ones((40, 40))).astype(np.uint8))
+    said = rig("desk", "-o", "dusk.json", *BOX)
+    assert "warning: the camera's picture has a brightness of" in said and "is it lit?" in said
+    assert "dusk.json: 1 box (1 yellow)" in said
