@@ -23,6 +23,7 @@ _EXPORT = """examples:
   dodo rec export drive.rec --csv -o tables
   dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
   dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
+  dodo rec export desk.rec --coco -o labelled --truth desk.json
 """
 _INFO = """examples:
   dodo rec info drive.rec
@@ -48,6 +49,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     export.add_argument(
         "--labels", metavar="N", type=int, help="sender stamp of the detections of --coco (default: all)"
+    )
+    export.add_argument(
+        "--truth", metavar="FILE.json", type=Path, help="take the boxes of --coco from a truth file, for every frame"
     )
     export.add_argument("--all", action="store_true", help="with --coco: also frames without a detection")
     for action in (cut, export):
@@ -107,10 +111,11 @@ def _without_traceback(work: Callable[[], int], stderr: TextIO) -> int:
     from dodo_dsl.recordings.coco import LabelError
     from dodo_dsl.recordings.outputs import OutputExists
     from dodo_dsl.recordings.selection import NothingSelected
+    from dodo_dsl.recordings.truth import TruthError
 
     try:
         return work()
-    except (RecordingError, NothingSelected, LabelError, OutputExists, OdvdError) as error:
+    except (RecordingError, NothingSelected, LabelError, OutputExists, OdvdError, TruthError) as error:
         stderr.write(f"dodo rec: {error}\n")
     except (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError) as error:
         stderr.write(f"dodo rec: {error.filename}: {error.strerror}\n")

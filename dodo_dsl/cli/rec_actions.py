@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -14,7 +15,7 @@ from dodo_dsl.cli.rec_messages import messages_for
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.varints import Numbers
-from dodo_dsl.recordings import coco, contents, cut, table
+from dodo_dsl.recordings import coco, contents, cut, labels, table
 from dodo_dsl.recordings.contents_text import contents_text
 from dodo_dsl.recordings.frames import IMAGE
 from dodo_dsl.recordings.outputs import new_file, new_folder, refuse_existing
@@ -109,19 +110,27 @@ def _csv(job: _Job) -> None:
     job.stdout.write(f"{folder}: {len(names)} tables with {len(known) - undecodable.total()} rows\n")
 
 
+def _labels(job: _Job, rows: Numbers, images: Numbers) -> Mapping[int, list[coco.Detection]]:
+    if job.options.truth is None:
+        return coco.detections(job.recording, job.messages, rows, job.options.labels)
+    if job.options.labels is not None:
+        raise NothingSelected("--truth does not go with --labels: boxes come from a file or from a sender")
+    return labels.of_truth(job.recording, images, job.options.truth)
+
+
 def _coco(job: _Job) -> None:
     recording, options, folder = job.recording, job.options, job.folder()
     if options.message:
         raise NothingSelected("--message does not go with --coco; choose senders with --camera and --labels")
     rows = job.rows()
     images = coco.images_of(recording, rows, options.camera)
-    labels = coco.detections(recording, job.messages, rows, options.labels)
-    if not labels and not options.all:
+    boxes = _labels(job, rows, images)
+    if not boxes and not options.all:
         raise NothingSelected(f"{recording.path} holds no detections with a box; --all exports frames without them")
     refuse_existing([folder / coco.ANNOTATIONS], options.force)
     with new_folder(folder) as place, bar(job.stderr, "decoding frames", len(images)) as progress:
         export = coco.Export(place, options.pictures, options.all, progress, job.tell)
-        result = export.write(recording, images, labels)
+        result = export.write(recording, images, boxes)
     if result.lost:
         job.tell(f"{result.lost} of {len(images)} packets gave no frame")
     job.stdout.write(f"{folder}: {len(result.images)} frames with {len(result.boxes)} boxes\n")

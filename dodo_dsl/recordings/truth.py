@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     from dodo_dsl.opendlv.pixels import Picture
 
-MOST_BYTES, MOST_BOXES = 16_000_000, 10_000
+MOST_BYTES, MOST_BOXES, MOST_PIXELS = 16_000_000, 10_000, 100_000
 _SLACK = 0.01
 """px by which a rounded box may reach over the picture's edge."""
 _LEAST_SHOWN = 1000
@@ -65,23 +65,23 @@ def check(marks: Sequence[Mark], width: int, height: int, classes: Collection[st
 
 def read(path: Path, width: int, height: int) -> list[Mark]:
     """The boxes of a COCO file of one picture of this size; raises TruthError."""
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise TruthError(f"{path}: is larger than {MOST_BYTES} bytes")
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        if isinstance(error, TruthError):
-            raise
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise TruthError(f"{path}: cannot be read as COCO JSON: {reason}") from None
-    images = _entries(document, "images", path)
-    sizes = [(image.get("width"), image.get("height")) for image in images]
-    if sizes != [(width, height)]:
-        has = f"a picture of {sizes[0][0]} x {sizes[0][1]} pixels" if len(sizes) == 1 else f"{len(sizes)} pictures"
+    size, marks = load(path)
+    if size != (width, height):
+        has = f"a picture of {size[0]} x {size[1]} pixels"
         raise TruthError(f"{path}: has boxes of {has}, expected one of {width} x {height} pixels")
+    return marks
+
+
+def load(path: Path) -> tuple[tuple[int, int], list[Mark]]:
+    """Width and height of the one picture of a COCO file, and its boxes; raises TruthError."""
+    document = _document(path)
+    images = _entries(document, "images", path)
+    if len(images) != 1:
+        raise TruthError(f"{path}: has {len(images)} images, expected one picture")
+    width, height = (_side(images[0].get(name), name, path) for name in ("width", "height"))
     names = {_key(entry.get("id")): entry.get("name") for entry in _entries(document, "categories", path)}
-    return [_read_one(entry, names, f"{path}: annotations[{index}]") for index, entry in
-            enumerate(_entries(document, "annotations", path))]  # fmt: skip
+    boxes = enumerate(_entries(document, "annotations", path))
+    return (width, height), [_read_one(entry, names, f"{path}: annotations[{index}]") for index, entry in boxes]
 
 
 def text(marks: Sequence[Mark], picture: str, width: int, height: int) -> str:
@@ -113,6 +113,17 @@ _COLOURS = ((255, 80, 255), (255, 255, 60), (80, 255, 120), (255, 255, 255), (60
 """B, G, R; none is that of a cone."""
 
 
+def _document(path: Path) -> Any:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8")) if path.stat().st_size <= MOST_BYTES else None
+    except (OSError, ValueError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise TruthError(f"{path}: cannot be read as COCO JSON: {reason}") from None
+    if document is None:
+        raise TruthError(f"{path}: is empty, or larger than {MOST_BYTES} bytes")
+    return document
+
+
 def _entries(document: Any, name: str, path: Path) -> list[dict[str, Any]]:
     entries = document.get(name) if isinstance(document, dict) else None
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
@@ -120,6 +131,12 @@ def _entries(document: Any, name: str, path: Path) -> list[dict[str, Any]]:
     if len(entries) > MOST_BOXES:
         raise TruthError(f"{path}: has {len(entries)} {name}, expected at most {MOST_BOXES}")
     return entries
+
+
+def _side(pixels: Any, name: str, path: Path) -> int:
+    if not isinstance(pixels, int) or not 0 < pixels <= MOST_PIXELS:
+        raise TruthError(f"{path}: images[0].{name}: expected a whole number of pixels above 0")
+    return pixels
 
 
 def _read_one(entry: dict[str, Any], names: dict[str, Any], place: str) -> Mark:

@@ -130,3 +130,6 @@ def test_a_recording_of_the_static_rig_is_a_labelled_data_set(tmp_path: Path) ->
         for label, *true in TRUTH:
             nearest = min((box for name, *box in found if name == label), key=lambda box: math.dist(box[:2], true[:2]))
             assert nearest == pytest.approx(true, abs=10), (label, true)
+    truth = str(tmp_path / "tests" / "truths" / "static-rig.json")
+    dodo("rec", "export", str(recording), "--coco", "-o", str(tmp_path / "true"), "--truth", truth, code=0)
+    assert all(found == TRUTH for found in boxes(tmp_path / "true" / "annotations.json").values())

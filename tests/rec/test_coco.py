@@ -6,6 +6,7 @@ import cv2
 import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.recordings.truth import Mark, text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 PREFIX = "opendlv.logic.perception.Detection"
@@ -58,6 +59,37 @@ def test_all_frames_as_jpeg(drive: Path, tmp_path: Path) -> None:
     answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", *words)
     assert answer.stdout.endswith("7 frames with 1 boxes\n")
     assert len(list((tmp_path / "set" / "images").glob("0-*.jpg"))) == 7
+
+
+def test_the_boxes_of_a_truth_for_every_frame(drive: Path, tmp_path: Path) -> None:
+    truth = tmp_path / "truth.json"
+    marks = [Mark("yellow", 0, 4, 8, 6), Mark("blue", 20, 10, 4, 4)]
+    truth.write_text(text(marks, "desk.png", 2 * WIDTH, 2 * HEIGHT))
+    answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--truth", truth)
+    assert answer.stdout.endswith("12 frames with 24 boxes\n")
+    found = json.loads((tmp_path / "set" / "annotations.json").read_text())
+    names = {category["id"]: category["name"] for category in found["categories"]}
+    for number in range(1, 13):
+        boxes = [(names[a["category_id"]], a["bbox"]) for a in found["annotations"] if a["image_id"] == number]
+        assert boxes == [("yellow", [0, 2, 4, 3]), ("blue", [10, 5, 2, 2])]
+
+
+@pytest.mark.parametrize(
+    ("content", "words", "sentence"),
+    [
+        ("{", (), "cannot be read as COCO JSON"),
+        (text([Mark("yellow", 0, 4, 8, 6)], "", 7, 7), (), "box 1 (yellow 0 4 8 6): lies outside"),
+        (text([], "", 7, 7).replace("7,", "0,"), (), "images[0].width: expected a whole number of pixels above 0"),
+        ('{"images": []}', (), "has 0 images, expected one picture"),
+        (text([], "", 7, 7), ("--labels", "3"), "--truth does not go with --labels"),
+        (text([], "", 7, 7), (), "truth.json: has no box"),
+    ],
+)
+def test_a_truth_that_is_none(drive: Path, tmp_path: Path, content: str, words: tuple[str, ...], sentence: str) -> None:
+    (tmp_path / "truth.json").write_text(content)
+    answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--truth", tmp_path / "truth.json", *words)
+    assert (answer.code, answer.stdout) == (2, "") and sentence in answer.stderr
+    assert not (tmp_path / "set").exists()
 
 
 def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli import rec
-from tests.rec.conftest import BEGIN, dodo_rec, message, video
+from dodo_dsl.recordings.truth import Mark, text
+from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, video
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text()
 SHOWN = re.findall(r"^ +dodo rec (.*?)(?:  |$)", PAGE + rec.EXAMPLES + rec._CUT + rec._EXPORT + rec._INFO, re.MULTILINE)
@@ -28,8 +29,9 @@ def test_the_lines_shown_run(
         for name, sender_stamp in (("opendlv.proxy.DistanceReading", 0), ("opendlv.proxy.GroundSteeringRequest", 0))
     ]
     box = [message("opendlv.logic.perception.DetectionBoundingBox", BEGIN + 100_000, stamp) for stamp in (0, 3)]
-    for name in ("drive.rec", "old.rec"):
+    for name in ("drive.rec", "old.rec", "desk.rec"):
         record([*video(4), *others, *box], name)
+    (tmp_path / "desk.json").write_text(text([Mark("yellow", 1, 2, 3, 4)], "desk.png", WIDTH, HEIGHT))
     code, stdout, stderr = dodo_rec(*shlex.split(words))
     assert (code, stderr) == (0, "") and stdout
 

@@ -76,7 +76,7 @@ def test_a_file_too_deep_or_too_large(tmp_path: Path) -> None:
         read(path, WIDTH, HEIGHT)
     with path.open("w") as file:
         file.truncate(20_000_000)
-    with pytest.raises(TruthError, match="is larger than"):
+    with pytest.raises(TruthError, match="larger than 16000000 bytes"):
         read(path, WIDTH, HEIGHT)
 
 
