@@ -30,7 +30,7 @@ def clock(context: Context, image: str, watch: Sequence[str], cid: int) -> Servi
     cameras = cameras_of(wiring)
     sense.sort(key=lambda name: name in cameras)
     values = {
-        "freq": f"{step_hz(wiring, rates(context)):g}",
+        "freq": f"{step_hz(wiring, rates(context)):.12g}",
         "advance": ",".join(_ordered(layers["action"], wiring)),
         "sense": ",".join(sense),
         "judge": ",".join(u.name for u in spec.uses if u.layer == "evaluation"),

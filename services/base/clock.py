@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from typing import Protocol
 
 from dodo_dsl.opendlv.envelope import Envelope
@@ -42,11 +43,16 @@ class Clock(Protocol):
 
     relays: bool
 
+    @property
+    def is_showing(self) -> bool:
+        """Whether there is a picture that nobody was told of yet."""
+        ...
+
     def now(self) -> int:
         """The time of the test."""
         ...
 
-    def steps(self, period: int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         """The instants at which a service is due, one each ``period`` microseconds; messages come in between.
 
         Ends soon after ``stopped``, which a message or a signal can make true.
@@ -65,8 +71,8 @@ class Clock(Protocol):
         """New shared memory for pictures that are sampled by this clock; raises SharedMemoryError."""
         ...
 
-    def close(self) -> None:
-        """The service ends."""
+    def close(self, stopped: Callable[[], bool]) -> None:
+        """The service ends; what pictures it leaves behind can be looked at until ``stopped``."""
         ...
 
 
@@ -78,6 +84,7 @@ class RealTimeClock:
     """
 
     relays = False
+    is_showing = False
 
     def __init__(self) -> None:
         self._offset = time.time_ns() // 1000 - time.monotonic_ns() // 1000
@@ -85,15 +92,16 @@ class RealTimeClock:
     def now(self) -> int:
         return time.monotonic_ns() // 1000 + self._offset
 
-    def steps(self, period: int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
-        due = self.now()
+    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+        start, number = self.now(), 0
         while True:
+            due = start + round(number * period)
             self._wait(due, inbox, stopped)
             if stopped():
                 return
             yield due
-            due += period
-            due += self._skipped(due, period)
+            number += 1
+            number += self._skipped(start + round(number * period), period)
 
     def sent(self, frame: bytes) -> None:
         """Time goes on by itself."""
@@ -104,7 +112,7 @@ class RealTimeClock:
     def memory(self, name: str, size: int) -> SharedMemory:
         return SharedMemory.create(name, size)
 
-    def close(self) -> None:
+    def close(self, stopped: Callable[[], bool]) -> None:
         """Nobody waits."""
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
@@ -115,13 +123,13 @@ class RealTimeClock:
             if stopped() or not _deliver(inbox, 0.0):
                 break
 
-    def _skipped(self, due: int, period: int) -> int:
+    def _skipped(self, due: int, period: Fraction | int) -> int:
         late = self.now() - due
         if late <= LATEST:
             return 0
-        steps = late // period
+        steps = int(late // period)
         _log.warning("%.1f s late: %d steps are skipped", late / MICROSECONDS, steps)
-        return steps * period
+        return steps
 
 
 def _deliver(inbox: Inbox, timeout: float) -> bool:

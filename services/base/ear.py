@@ -14,6 +14,7 @@ from services.base.parts import STEP, STEP_DONE, Pieces, Said, frames
 
 Reply = list[Message]
 SLICE_MS = 100
+_BURST = 2
 _MEANWHILE = 0.003
 """For so many seconds after a message one who looks at the bus lets others come, and is woken once for them all."""
 
@@ -88,11 +89,16 @@ class Ear:
 
     def repeat(self) -> None:
         """Send the last answer again."""
-        for message in self._last:
+        for message in self._turned():
             if self._on_the_bus:
                 self._session.send(message)
             else:
                 self._channel.send(message, self._clock)
+
+    def _turned(self) -> Reply:
+        """The last answer's pieces, beginning with others each time, as a receive buffer may hold but a few."""
+        pieces, self._last = self._last, [*self._last[_BURST:], *self._last[:_BURST]]
+        return pieces
 
     def is_acknowledged(self) -> bool:
         """Whether the clock says within a while that it has the last answer; repeats that where it asks."""
@@ -123,7 +129,7 @@ class Ear:
             self._clock = address
             if step.number == self._number:
                 self._acknowledged = not step.parts
-                if step.parts:
+                if step.parts and not step.part:
                     self.repeat()
                 return None
             data = self._pieces.take(step.number, step.part, step.parts, step.frames)

@@ -4,8 +4,10 @@ What a service hears comes inside the step message and nowhere else, and what it
 that no lost or late datagram can change a result (``docs/lockstep.md``).
 """
 
+import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from fractions import Fraction
 from typing import NamedTuple
 
 from dodo_dsl.opendlv.envelope import Envelope
@@ -14,12 +16,13 @@ from dodo_dsl.opendlv.session import Session
 from services.base.announced import AnnouncedMemory, Screen
 from services.base.clock import Inbox
 from services.base.ear import Ear, Reply
-from services.base.observed import EPOCH, Observed
+from services.base.observed import EPOCH, LONGEST, Observed
 from services.base.parts import STEP_DONE, cut
 
 __all__ = ["EPOCH", "LockstepClock"]
 
 _GOODBYES = 10
+_LINGER_S = 0.05
 
 
 class Order(NamedTuple):
@@ -51,23 +54,33 @@ class LockstepClock:
     def now(self) -> int:
         return self._now
 
-    def steps(self, period: int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+    @property
+    def is_showing(self) -> bool:
+        return bool(self._screen.new)
+
+    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
-        due = EPOCH
+        yield from self._steps(period, inbox, stopped)
+        if inbox.observes:
+            self._observed.rest(inbox)
+
+    def _steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+        number, due = 0, EPOCH
         while (order := self._next_order(inbox, stopped)) is not None:
             if inbox.observes:
                 self._observed.look(inbox, order.time, order.heard)
-            heard = deque(sorted(order.heard, key=lambda envelope: envelope.sample_time))
+            heard = in_order(order.heard)
             while due <= order.time:
-                while heard and heard[0].sample_time <= due:
-                    inbox.handle(heard.popleft())
+                while heard and heard[0][0] <= due:
+                    inbox.handle(heard.popleft()[1])
                 if stopped():
                     return
                 self._now = due
                 yield due
-                due += period
+                number += 1
+                due = EPOCH + round(number * period)
             self._now = order.time
-            for envelope in heard:
+            for _, envelope in heard:
                 inbox.handle(envelope)
             if stopped() or (order.show and not self._screen.await_readers(stopped)):
                 return
@@ -87,8 +100,11 @@ class LockstepClock:
         self._screen.memories.append(memory)
         return memory
 
-    def close(self) -> None:
-        """The service ends: the step that it is in is answered, and its answer has arrived."""
+    def close(self, stopped: Callable[[], bool]) -> None:
+        """The service ends: the step that it is in is answered, and its answer has arrived.
+
+        Its memories stay until the test is over, as removing them would show the last picture once more.
+        """
         if self._open:
             self._open = False
             self._ear.answer(self._reply(ended=True))
@@ -97,6 +113,8 @@ class LockstepClock:
                     break
                 self._ear.repeat()
         self._ear.close()
+        while self._screen.memories and not stopped():
+            time.sleep(_LINGER_S)
 
     def _next_order(self, inbox: Inbox, stopped: Callable[[], bool]) -> Order | None:
         """The next step that is for this service; None when it is to stop."""
@@ -129,3 +147,13 @@ class LockstepClock:
             "port": self._session.port,
         }
         return [self._done(part=part, frames=data, **facts) for part, data in enumerate(pieces)]
+
+
+def in_order(heard: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:
+    """Messages by when they are due: at their sample time, or, if that is none of the test's, behind those before."""
+    due, timed = EPOCH, []
+    for envelope in heard:
+        if EPOCH <= envelope.sample_time <= EPOCH + LONGEST:
+            due = envelope.sample_time
+        timed.append((due, envelope))
+    return deque(sorted(timed, key=lambda each: each[0]))

@@ -55,11 +55,11 @@ class Loop:
                     self._send(output, now)
             if now >= self._tell_after:
                 self._tell_losses(now)
-            if service.finished:
+            if service.finished and not self.clock.is_showing:
                 break
         if service.finished and service.verdict is None:
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
-        self.clock.close()
+        self.clock.close(stopped)
         self._tell_losses(self.clock.now())
         if self.session.lost:
             _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)

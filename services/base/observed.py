@@ -32,20 +32,30 @@ class Observed:
         self._overheard.append(envelope)
 
     def look(self, inbox: Inbox, until: int, told: Iterable[Envelope]) -> None:
-        """Let the service look at all of a step; what belongs to a later one waits for that."""
+        """Let the service look at all of a step, after what the application answered to the one before.
+
+        Its answers to this one, and what belongs to later ones, wait: whether they are there already is chance.
+        """
         own = [envelope for envelope in told if not envelope.received]
         keys = {_key(envelope) for envelope in own}
         if len(self._first) < len(keys) and until <= EPOCH:
             self._first = keys  # the clock says these again to applications that start late
         self._told.append(keys)
-        for envelope in own:
-            inbox.overhear(envelope)
         overheard, self._overheard = self._overheard, []
         for envelope in overheard:
-            if until < envelope.sample_time <= EPOCH + LONGEST:
+            if until <= envelope.sample_time <= EPOCH + LONGEST:
                 self._overheard.append(envelope)
             elif not self._is_known(_key(envelope)):
                 inbox.overhear(envelope)
+        for envelope in own:
+            inbox.overhear(envelope)
+
+    def rest(self, inbox: Inbox) -> None:
+        """The test is over: let the service look at what waits for a step that will not come."""
+        for envelope in self._overheard:
+            if not self._is_known(_key(envelope)):
+                inbox.overhear(envelope)
+        self._overheard = []
 
     def _is_known(self, key: Envelope) -> bool:
         return key in self._first or any(key in keys for keys in self._told)

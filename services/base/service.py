@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 from google.protobuf.message import Message
@@ -38,7 +39,7 @@ class Service:
     Nothing in a model reads a clock, sleeps or touches the bus.
     """
 
-    period: int | None = IDLE_PERIOD
+    period: Fraction | int | None = IDLE_PERIOD
     inputs: Mapping[tuple[str, int | None], Handler] = {}
     observe: Callable[[Envelope], None] | None = None
     verdict: Verdict | None = None
@@ -82,6 +83,6 @@ class Context:
 Build = Callable[[Context], Service]
 
 
-def period_of(freq: float) -> int:
-    """The period in microseconds of a rate in Hz."""
-    return max(1, round(MICROSECONDS / freq))
+def period_of(freq: float) -> Fraction:
+    """The period in microseconds of a rate in Hz, exactly: steps at 60 and at 30 Hz meet for ever."""
+    return max(Fraction(1), MICROSECONDS / Fraction(freq).limit_denominator(MICROSECONDS))

@@ -31,18 +31,23 @@ class Answers:
     heard: tuple[Kind, ...] = ()
     done: Kind | None = None
     surplus: int = 0
-    _time: int | None = None
     _times: set[int] = field(default_factory=set)
+    _all_times: set[int] = field(default_factory=set)
     _chosen: dict[Kind, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
+    _is_seen: bool = False
     _is_done: bool = False
     _is_collected: bool = False
 
-    def open(self, time: int) -> None:
-        """The frame of this sample time (us) is about to be seen: answers before this were not to it."""
-        self._time = time
-        self._times.add(time)
-        self._chosen, self._is_done, self._is_collected = {}, False, False
+    def expect(self, times: Iterable[int]) -> None:
+        """The frame will be seen from now on: its pictures' sample times (us), by which answers count at once."""
+        self._times = set(times)
+        self._all_times |= self._times
+        self._chosen, self._is_seen, self._is_done, self._is_collected = {}, False, False, False
+
+    def seen(self) -> None:
+        """All that is taken from now on was said after the frame was seen."""
+        self._is_seen = True
 
     def take(self, envelope: Envelope) -> None:
         """Something came on the bus.
@@ -50,10 +55,11 @@ class Answers:
         An answer counts by the frame's sample time, or as the first after it where the application does not copy
         sample times, so that its own are those of no frame; it then gets the frame's.
         """
-        if self._time is None:
+        if not self._times:
             return
-        stale = envelope.sample_time != self._time and envelope.sample_time in self._times
-        known = envelope if envelope.sample_time in self._times else envelope._replace(sample_time=self._time)
+        copies = envelope.sample_time in self._all_times
+        stale = envelope.sample_time not in self._times if copies else not self._is_seen
+        known = envelope if copies else envelope._replace(sample_time=max(self._times))
         if self.done is not None and self.done.is_of(envelope) and not stale:
             self._is_done = True
         for kind in self.wanted:

@@ -14,6 +14,7 @@ from services.base.parts import STEP, STEP_DONE, Pieces, Said, cut, frames
 
 REPEAT_S = 0.2
 _SLICE = 0.05
+_BURST = 2
 
 
 class Order(NamedTuple):
@@ -113,12 +114,14 @@ class Exchange:
         return True
 
     def _repeat(self) -> None:
+        """Each time the pieces begin with others, as a receive buffer may hold a few of them only."""
         now = time.monotonic()
         for name, asked in self._asked.items():
             if now >= asked.repeat:
                 asked.repeat = now + REPEAT_S
                 for message in asked.messages:
                     self._channel.send(message, self._addresses.get(name))
+                asked.messages = [*asked.messages[_BURST:], *asked.messages[:_BURST]]
 
     def _messages(self, order: Order) -> list[Any]:
         pieces = cut(said.frame for said in order.heard)

@@ -4,6 +4,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Protocol
 
 from dodo_dsl.opendlv.envelope import Envelope
@@ -68,7 +69,7 @@ class Stepper:
     """Steps a test; ``period`` and ``timeout`` in us of test time."""
 
     roles: Roles
-    period: int
+    period: Fraction | int
     timeout: int
     patience: Patience
     answers: Answers
@@ -79,7 +80,10 @@ class Stepper:
     _backlog: dict[str, list[Said]] = field(default_factory=dict)
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
+    _exact: Fraction = Fraction(EPOCH)
     _memories: int = 0
+    _reading: set[str] = field(default_factory=set)
+    """Cameras whose readers do not wait for the next picture yet, where nothing else tells of an answer."""
     _first: list[Said] = field(default_factory=list)
     spent: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     """Wall time in s by whom it was waited for."""
@@ -95,20 +99,21 @@ class Stepper:
         """Until all evaluators have ended; raises Unanswered, Stuck and TimedOut."""
         self._spread([say(begin)], "")
         while not self.stopped():
+            if not self._memories:
+                self._hear_from_now_on()
             shown = [
                 done
                 for name in (*self.roles.advance, *self.roles.sense)
                 for done in self._go((name,), self.now)
                 if done.pictures
             ]
-            self.talk.drain()
             self._see(shown) if shown or not self._memories else self._look()
             if self._is_judged:
                 return
             if self.now - EPOCH >= self.timeout:
                 raise TimedOut
             self._spread([say(envelope) for envelope in self.answers.collect()], "")
-            self.now = self._following()
+            self._go_on()
 
     @property
     def _is_judged(self) -> bool:
@@ -125,7 +130,7 @@ class Stepper:
         """As ``_go``, with something else to do in between; raises Stuck."""
         wanted = [name for name in names if name not in self._ended]
         began = time.monotonic()
-        self.talk.ask([Order(name, until, self._heard(name, until)) for name in wanted])
+        self.talk.ask([Order(name, until, self._heard(name)) for name in wanted])
         for name in wanted:
             while (done := self.talk.answer(name)) is None:
                 if self.stopped():
@@ -154,11 +159,10 @@ class Stepper:
         for _ in self._looking():
             self.talk.pump(_SLICE)
 
-    def _heard(self, name: str, until: int) -> tuple[Said, ...]:
-        """What a service has not heard yet, up to the time that it goes on to."""
-        backlog = self._backlog[name]
-        self._backlog[name] = [said for said in backlog if until < said.envelope.sample_time <= self.now]
-        return tuple(said for said in backlog if not until < said.envelope.sample_time <= self.now)
+    def _heard(self, name: str) -> tuple[Said, ...]:
+        """What a service has not heard yet."""
+        heard, self._backlog[name] = self._backlog[name], []
+        return tuple(heard)
 
     def _spread(self, said: Sequence[Said], sender: str) -> None:
         """What one said, all others will hear with their next step."""
@@ -166,24 +170,25 @@ class Stepper:
             if name != sender and name not in self._ended:
                 backlog.extend(said)
 
+    def _hear_from_now_on(self) -> None:
+        """An application that sees no pictures answers what the services of this step are about to say."""
+        self.talk.drain()
+        self.answers.expect([self.now])
+        self.answers.seen()
+
     def _see(self, shown: Sequence[Done]) -> None:
         """The application sees the new pictures, and answers, while watchers and judges look at the same step."""
         self.frames += 1
         began = time.monotonic()
         patience = self.patience.first if self.frames == 1 else self.patience.others
-        self._show(shown, began, patience)
-        if any(done.ended for done in shown):  # the judges hear of its end when the last answer has come
-            self._await_answer(iter(()), began, patience)
-            self._spread([say(envelope) for envelope in self.answers.collect()], "")
-            self._look()
-        else:
-            self._await_answer(self._looking(), began, patience)
+        if shown:
+            self._show(shown, began, patience)
+        self._await_answer(began, patience)
 
     def _show(self, shown: Sequence[Done], began: float, patience: float) -> None:
         """Readers are told of pictures as soon as they wait for them."""
         again = began + _AGAIN
-        if not shown:
-            self.answers.open(self.now)
+        self.answers.expect(camera.sampled for camera in shown)
         for camera in shown:
             self.talk.ask([Order(camera.service, self.now, (), show=True)])
             while self.talk.answer(camera.service) is None:
@@ -194,7 +199,10 @@ class Stepper:
                     raise Unanswered(self._sentence(patience, f"nobody waited for a picture of '{camera.service}'"))
                 self.talk.pump(_SLICE)
                 again = self._say_again(again)
-            self.answers.open(camera.sampled)
+            self.answers.seen()
+        if not self.answers.asked:
+            self._reading = {camera.service for camera in shown}
+            self.talk.ask([Order(camera.service, self.now, (), show=True) for camera in shown])
 
     def _say_again(self, again: float) -> float:
         """An application that starts late hears what was said before its first picture, as it would in real time."""
@@ -203,23 +211,39 @@ class Stepper:
         self.talk.tell(self._first)
         return time.monotonic() + _AGAIN
 
-    def _await_answer(self, looking: Iterator[None], began: float, patience: float) -> None:
+    def _await_answer(self, began: float, patience: float) -> None:
+        looking = self._looking()
         is_looking = True
         while not self.stopped():
             is_looking = is_looking and next(looking, self) is None
-            if self._is_judged or (self.answers.complete and not is_looking):
+            is_answered = self._is_answered
+            if self._is_judged or (is_answered and not is_looking):
                 break
             left = began + patience - time.monotonic()
-            if left <= 0 and not self.answers.complete:
-                missing = " and ".join(name.rpartition(".")[2] for name in self.answers.missing)
-                raise Unanswered(self._sentence(patience, f"{missing} missing"))
+            if left <= 0 and not is_answered:
+                raise Unanswered(self._sentence(patience, self._missing))
             self.talk.pump(max(left, 0.0))
         self.spent["the first answer" if self.frames == 1 else "the application"] += time.monotonic() - began
+
+    @property
+    def _is_answered(self) -> bool:
+        """Whether all answers came; where none are known, whether the readers wait for the next picture."""
+        if self.answers.asked:
+            return self.answers.complete
+        self._reading = {name for name in self._reading if self.talk.answer(name) is None}
+        return not self._reading
+
+    @property
+    def _missing(self) -> str:
+        if self.answers.asked:
+            return " and ".join(name.rpartition(".")[2] for name in self.answers.missing) + " missing"
+        return f"nobody waited for the next picture of '{min(self._reading)}'"
 
     def _sentence(self, patience: float, what: str) -> str:
         return f"the application did not answer frame {self.frames} within {patience:g} s ({what})"
 
-    def _following(self) -> int:
-        """The time of the next step: a period on, or when a source says that it goes on."""
+    def _go_on(self) -> None:
+        """To the time of the next step: a period on, or when a source says that it goes on."""
         told = [time for name, time in self._next.items() if time > self.now and name not in self._ended]
-        return min(told) if told else self.now + self.period
+        self._exact = Fraction(min(told)) if told else self._exact + self.period
+        self.now = round(self._exact)

@@ -4,6 +4,7 @@ import json
 import logging
 import time
 from collections.abc import Callable
+from fractions import Fraction
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
@@ -31,7 +32,7 @@ class ClockService(Service):
         channel: Channel,
         roles: Roles,
         answers: Answers,
-        period: int,
+        period: Fraction | int,
         timeout: int,
         patience: Patience,
     ) -> None:

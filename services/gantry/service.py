@@ -33,7 +33,7 @@ class Gantry(Service):
     def __init__(self, context: Context, link: Link, emulated: EmulatedRig | None = None) -> None:
         flags = context.flags
         self._log = context.log
-        self._turn = period_of(flags["freq"])
+        self._turn = round(period_of(flags["freq"]))
         self._emulated = emulated
         self.period = min(self._turn, TRUTH_PERIOD) if emulated else self._turn
         self._due = 0

@@ -60,7 +60,7 @@ def build(context: Context) -> Service:
     recording = context.resources.enter_context(Recording(Path(flags["rec"]), max_size))
     if flags["paused"]:
         recording.is_on = False
-    sources = [Source(wanted, period_of(flags["frames"])) for wanted in memories if flags["frames"]]
+    sources = [Source(wanted, round(period_of(flags["frames"]))) for wanted in memories if flags["frames"]]
     cameras = _cameras(context, sources, recording) if sources else None
     snapshot = _snapshot(context, Path(flags["snapshot"]), memories[0]) if flags["snapshot"] else None
     return Recorder(recording, cameras, snapshot, flags["commands"])

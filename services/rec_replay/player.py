@@ -20,7 +20,7 @@ class Player:
         self.playing = False
         self.jumped = False
         self._due = due.tolist()
-        self._rewinds = rewinds
+        self.rewinds = rewinds
         self._elapsed = 0
         self._now: int | None = None
         self._steps = 0
@@ -59,14 +59,14 @@ class Player:
             self._elapsed += now - self._now
         self._now = now
 
-    def when(self, position: int) -> int:
+    def when(self, position: int, in_next_round: bool = False) -> int:
         """The test time at which an entry is due when nothing holds the player up."""
-        due: int = self._due[position]
+        due: int = self._due[position] + (self._due[-1] if in_next_round else 0)
         return (self._now or 0) + due - self._elapsed
 
     def take(self) -> tuple[int, int] | None:
         """The next entry that is due, by number, and the test time at which it was; None when there is none."""
-        if self.ended and self._rewinds and self.playing:
+        if self.ended and self.rewinds and self.playing:
             self._elapsed = self._elapsed - self._due[-1] if self._due[-1] else 0
             self.position, self.jumped = 0, True
             return None  # a round an update at most: a part may last no time at all

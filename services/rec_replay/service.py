@@ -1,6 +1,7 @@
 """The player on the bus."""
 
 import logging
+import math
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -81,10 +82,12 @@ class Replay(Service):
     def _next_picture(self, now: int) -> int:
         """The update that shows the next picture, 0 when there is none or nobody knows when that will be."""
         number = int(np.searchsorted(self._pictures, self._player.position))
-        if not self._player.playing or number == len(self._pictures):
+        is_over = number == len(self._pictures)
+        if not self._player.playing or not len(self._pictures) or (is_over and not self._player.rewinds):
             return 0
-        looks = -(-(self._player.when(int(self._pictures[number])) - now) // self.period)
-        return now + looks * self.period
+        due = self._player.when(int(self._pictures[0 if is_over else number]), in_next_round=is_over)
+        looks = math.ceil((due - now) / self.period)
+        return now + round(looks * self.period)
 
     def close(self) -> None:
         """Say what was not played as it should."""
@@ -105,6 +108,7 @@ class Replay(Service):
     def _play(self, due: int) -> Envelope | None:
         """Show an entry's picture and give what is to be sent."""
         envelope, is_sent, picture = self._stream.take()
+        envelope = envelope._replace(received=0)  # it has not been received yet
         if self._shifts:
             envelope = envelope._replace(sent=due, sample_time=due)
         if picture is not None and self._screen is not None:

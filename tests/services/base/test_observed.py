@@ -56,7 +56,34 @@ def test_a_later_step_s_message_waits_for_that() -> None:
     observed.look(inbox, EPOCH, [])
     assert inbox.seen == []
     observed.look(inbox, EPOCH + STEP, [])
+    assert inbox.seen == []
+    observed.look(inbox, EPOCH + 2 * STEP, [])
     assert inbox.seen == [(b"early", EPOCH + STEP)]
+
+
+def test_an_answer_stands_before_the_next_step_whenever_it_came() -> None:
+    ways = []
+    for is_swift in (True, False):
+        observed, inbox = Observed(), Seen()
+        answer = said(b"answer", EPOCH, 9)
+        if is_swift:
+            observed.overhear(answer)
+        observed.look(inbox, EPOCH, [said(b"0", EPOCH)])
+        if not is_swift:
+            observed.overhear(answer)
+        observed.look(inbox, EPOCH + STEP, [said(b"1", EPOCH + STEP)])
+        ways.append([payload for payload, _ in inbox.seen])
+    assert ways == [[b"0", b"answer", b"1"]] * 2
+
+
+def test_the_last_answer_is_seen_at_the_end_of_the_test() -> None:
+    observed, inbox = Observed(), Seen()
+    observed.look(inbox, EPOCH, [said(b"own", EPOCH)])
+    for payload in (b"own", b"answer"):
+        observed.overhear(said(payload, EPOCH, 9))
+    observed.rest(inbox)
+    observed.rest(inbox)
+    assert [payload for payload, _ in inbox.seen] == [b"own", b"answer"]
 
 
 def test_the_first_messages_said_again_much_later() -> None:

@@ -14,9 +14,14 @@ def said(kind: int, time: int, payload: bytes = b"", stamp: int = 0) -> Envelope
     return Envelope(kind, payload, 0, 0, time, stamp)
 
 
+def show(answers: Answers, *times: int) -> None:
+    answers.expect(times)
+    answers.seen()
+
+
 def answering(*envelopes: Envelope, **about: object) -> Answers:
     answers = Answers(WANTED, **about)  # type: ignore[arg-type]
-    answers.open(FRAME)
+    show(answers, FRAME)
     for envelope in envelopes:
         answers.take(envelope)
     return answers
@@ -41,17 +46,38 @@ def test_the_first_after_the_frame_counts_where_sample_times_are_not_copied() ->
 def test_what_was_said_before_the_frame_was_seen_is_no_answer_to_it() -> None:
     answers = answering(said(STEER, FRAME), said(PEDAL, FRAME), said(STEER, ELSEWHEN, b"late"))
     answers.collect()
-    answers.open(NEXT)
+    show(answers, NEXT)
     answers.take(said(PEDAL, FRAME, b"late, too"))
     assert answers.missing == ["steer", "pedal"]
     assert answers.surplus == 2
+
+
+def test_an_answer_with_its_frames_sample_time_counts_however_early_it_is_heard() -> None:
+    answers = answering()
+    answers.expect([NEXT])
+    answers.take(said(STEER, NEXT, b"swift"))
+    answers.take(said(PEDAL, ELSEWHEN, b"maybe to the frame before"))
+    answers.seen()
+    assert answers.missing == ["pedal"]
+    answers.take(said(PEDAL, ELSEWHEN, b"to this one"))
+    assert [e.payload for e in answers.collect()] == [b"swift", b"to this one"]
+    assert answers.surplus == 1
+
+
+def test_each_of_two_cameras_may_be_answered() -> None:
+    answers = Answers(WANTED)
+    show(answers, FRAME, FRAME + 7)
+    answers.take(said(STEER, FRAME))
+    answers.take(said(PEDAL, FRAME + 7))
+    assert answers.complete
+    assert answers.surplus == 0
 
 
 def test_nothing_counts_before_the_first_frame() -> None:
     answers = Answers(WANTED, (Kind("box", BOX),))
     answers.take(said(STEER, ELSEWHEN))
     answers.take(said(BOX, ELSEWHEN))
-    answers.open(FRAME)
+    show(answers, FRAME)
     assert answers.missing == ["steer", "pedal"]
     assert answers.collect() == []
 
@@ -63,7 +89,7 @@ def test_done_ends_the_answer_whatever_came() -> None:
     answers.take(said(READY, FRAME, stamp=2))
     assert answers.complete
     assert [e.data_type for e in answers.collect()] == [STEER]
-    answers.open(NEXT)
+    show(answers, NEXT)
     answers.take(said(READY, FRAME, stamp=2))
     assert not answers.complete, "a late word about the frame before"
 
