@@ -1,23 +1,36 @@
 """Shared memory in lockstep: a picture is told of when the clock says so, and when its readers wait for it."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
-from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.memory import LOCK_PATIENCE, SharedMemory
+from dodo_dsl.opendlv.posix_segment import PosixSegment
+from dodo_dsl.opendlv.segment import Segment
 
 _LOOK = 0.0002
 _LONGEST_LOOK = 0.002
 
 
 class AnnouncedMemory(SharedMemory):
-    """Shared memory that keeps the news of a picture until it is told to announce it."""
+    """Shared memory whose next picture waits aside until it is announced, so that nobody reads it in place of the last.
 
-    is_new = False
-    sampled = 0
-    """When the picture was sampled, in microseconds since the epoch."""
+    ``sampled`` is when that picture was sampled, in microseconds since the epoch.
+    """
+
+    def __init__(self, segment: Segment | PosixSegment, name: str, owner: bool) -> None:
+        super().__init__(segment, name, owner)
+        self._shown = self.buffer
+        self.buffer = memoryview(bytearray(self.size))
+        self.is_new = False
+        self.sampled = 0
+
+    @contextmanager
+    def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
+        """Nobody else sees the next picture."""
+        yield
 
     def stamp(self, time_us: int) -> None:
-        super().stamp(time_us)
         self.sampled = time_us
 
     def notify_all(self) -> None:
@@ -25,9 +38,16 @@ class AnnouncedMemory(SharedMemory):
         self.is_new = True
 
     def announce(self) -> None:
-        """Tell the readers."""
+        """Show the picture and tell the readers."""
         self.is_new = False
-        super().notify_all()
+        with super().lock():
+            self._shown[:] = self.buffer
+            super().stamp(self.sampled)
+            super().notify_all()
+
+    def close(self) -> None:
+        self._shown = memoryview(b"")
+        super().close()
 
 
 class Screen:

@@ -101,21 +101,27 @@ def test_no_answer_is_the_application_s_fault(manner: str, reason: str, tmp_path
     assert reason in test["reason"]
 
 
+def run_with_clock(tmp_path: Path, manner: str, code: int, flag: str, value: str) -> dict[str, Any]:
+    """The curve compiled, a flag of its clock changed, and run."""
+    path, out, report = application(tmp_path, "manners.py", f"--manner={manner}"), tmp_path / "out", tmp_path / "report"
+    command = [sys.executable, "-m", "dodo_dsl", "compile", CURVE, "--application", str(path), "-o", str(out)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    plan = json.loads((out / CURVE / "test.json").read_text())
+    (clock,) = (service for service in plan["services"] if service["name"] == "dodo-clock")
+    kept = [each for each in clock["flags"] if each["name"] != flag]
+    clock["flags"] = [*kept, {"name": flag, "value": value, "kind": "text"}]
+    (out / CURVE / "test.json").write_text(json.dumps(plan))
+    dodo("--compiled", str(out / CURVE), "--report", str(report), code=code)
+    return results(report)[CURVE]
+
+
 @pytest.mark.parametrize(
     ("manner", "missing"),
     [("forgets", "PedalPositionRequest missing"), ("silent", "nobody waited for a picture of 'camera'")],
 )
 def test_the_first_picture_has_a_patience_of_its_own(manner: str, missing: str, tmp_path: Path) -> None:
     """The 30 s are shortened in what was compiled."""
-    path, out, report = application(tmp_path, "manners.py", f"--manner={manner}"), tmp_path / "out", tmp_path / "report"
-    command = [sys.executable, "-m", "dodo_dsl", "compile", CURVE, "--application", str(path), "-o", str(out)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    plan = json.loads((out / CURVE / "test.json").read_text())
-    (clock,) = (service for service in plan["services"] if service["name"] == "dodo-clock")
-    clock["flags"].append({"name": "first-patience", "value": "3", "kind": "text"})
-    (out / CURVE / "test.json").write_text(json.dumps(plan))
-    dodo("--compiled", str(out / CURVE), "--report", str(report), code=1)
-    test = results(report)[CURVE]
+    test = run_with_clock(tmp_path, manner, 1, "first-patience", "3")
     assert test["reason"] == f"the application did not answer frame 1 within 3 s ({missing})"
     assert test["sim_s"] == 0.0
 
@@ -156,7 +162,13 @@ def test_wall_time_has_a_limit_of_its_own(tmp_path: Path) -> None:
     assert test["reason"].startswith("the test took more than 0.5 s of wall time")
 
 
-def test_test_time_has_a_limit(tmp_path: Path) -> None:
+def test_without_a_verdict_test_time_ends_with_the_timeout(tmp_path: Path) -> None:
+    test = run_with_clock(tmp_path, "copies", 3, "timeout", "0.5")
+    assert (test["outcome"], test["sim_s"]) == ("error", 0.5)
+    assert "no verdict" in test["reason"]
+
+
+def test_the_judge_counts_test_time(tmp_path: Path) -> None:
     spec = tmp_path / "tests" / "sil-short" / "sil-short.dodo.yml"
     spec.parent.mkdir(parents=True)
     shutil.copytree(ROOT / "tests_registry" / "maps", tmp_path / "tests" / "maps")
@@ -177,9 +189,10 @@ def test_the_other_clock_for_one_run(tmp_path: Path) -> None:
     assert test["execution_s"] > 1.0
 
 
-def test_repeated_under_load_it_is_the_same(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [CURVE, "dil-static-rig"])
+def test_repeated_under_load_it_is_the_same(name: str, tmp_path: Path) -> None:
     """Verdict, way and pictures of three runs beside processes that take all of the processor."""
-    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), CURVE, "3", "5"]
+    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), name, "3", "5"]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=240)
     assert result.returncode == 0, result.stdout + result.stderr
-    assert f"{CURVE}: 3 of 3 runs gave " in result.stdout
+    assert f"{name}: 3 of 3 runs gave " in result.stdout

@@ -6,8 +6,11 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
-from services.base import Context, Inbox, RealTimeClock, Service, run
+from services.base import Context, Inbox, RealTimeClock, Service, period_of, run
+from services.base.lockstep import in_order
+from services.base.observed import EPOCH, LONGEST
 
 STEP = 2950
 MANIFEST = "{name: stepped, process: [stepped], description: Steps.}"
@@ -42,6 +45,23 @@ class Counting(Service):
         self.seen.append(now)
         self.finished = now == 3
         return ()
+
+
+def test_messages_are_due_by_test_time_and_others_behind_what_came_before_them() -> None:
+    """The test's begin stays first, however old a recording is whose own times are kept."""
+    old, new = EPOCH - 7_000_000, EPOCH + LONGEST + 1
+    times = (EPOCH, old, EPOCH + 20, new, EPOCH + 10)
+    heard = in_order(Envelope(1, str(number).encode(), 0, 0, time, 0) for number, time in enumerate(times))
+    assert [(due - EPOCH, envelope.payload) for due, envelope in heard] == [
+        (0, b"0"), (0, b"1"), (10, b"4"), (20, b"2"), (20, b"3"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("slow", "fast"), [(30.0, 60.0), (15.0, 60.0), (12.0, 24.0), (29.97, 59.94), (0.3, 0.9)])
+def test_multiples_of_a_rate_meet_for_ever(slow: float, fast: float) -> None:
+    one, other = period_of(slow), period_of(fast)
+    times = round(fast / slow)
+    assert all(round(n * one) == round(n * times * other) for n in range(0, 100_000, 7))
 
 
 def test_a_clock_driven_by_messages(

@@ -1,6 +1,8 @@
 """The same way whatever the application's manners, its speed and the losses on the way."""
 
 import random
+import threading
+import time
 from fractions import Fraction
 from typing import Any
 
@@ -8,9 +10,10 @@ import pytest
 
 from dodo_dsl.opendlv.session import Session
 from services.base import channel, ear
-from services.clock import exchange
-from services.clock.model import Patience, Stepper, Unanswered
-from tests.services.clock.toys import STEP, Toys
+from services.base.lockstep import EPOCH
+from services.clock import exchange, model
+from services.clock.model import Patience, Stepper, Stuck, TimedOut, Unanswered
+from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Judge, Mover, Toys
 
 Way = list[tuple[int, float]]
 
@@ -104,6 +107,93 @@ def test_an_application_without_an_answer_of_its_own_is_awaited_by_its_readers(t
     _, stepper = toys.run(application)
     assert stepper.frames == 21
     assert len(application.seen) == 21
+
+
+def test_all_that_such_an_application_says_of_a_picture_is_heard_with_the_next_step(toys: Toys) -> None:
+    toys.answers, toys.heard = (), (BOX,)
+    toys.run(toys.application(boxes=2, pause=lambda frame: 0.02 * (frame % 3)))
+    steps = [step for step, _ in toys.judge.boxes]
+    assert steps == [step for step in range(20) for _ in range(2)]
+
+
+def test_an_application_without_a_camera_may_answer_at_once(toys: Toys) -> None:
+    toys.cast = {"mover": lambda session, _: Mover(session)}
+    way, stepper = toys.run(Filter(toys.cid))
+    assert len(way) == 201
+    assert stepper.frames == 21
+
+
+def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
+    """One answers at once and long before the other is even seen."""
+    toys.cast = {**DRIVE, "other": lambda _, memory: Eye(memory())}
+    slow = toys.application("other", times=0, boxes=1, pause=lambda _: 0.02)
+    way, stepper = toys.run(toys.application(), slow)
+    assert close(way, expected(21))
+    assert stepper.answers.surplus == 0
+    assert len(slow.seen) in (20, 21)
+
+
+def test_a_slow_reader_beside_the_one_that_answers_sees_each_picture_once(toys: Toys) -> None:
+    """It is told of a picture, and gets to it when the next one is drawn already."""
+    toys.readers = 2
+    slow = toys.application(times=0, delay=0.02)
+    toys.run(toys.application(), slow)
+    assert close([(0, place) for place in slow.seen], [(0, place) for _, place in expected(21)[::10][: len(slow.seen)]])
+    assert len(slow.seen) in (20, 21)
+
+
+@pytest.mark.parametrize("manner", [{}, {"pause": lambda _: 0.02}])
+def test_a_film_is_seen_to_its_last_picture_and_no_picture_twice(toys: Toys, manner: dict[str, Any]) -> None:
+    toys.cast = {"film": lambda _, memory: Film(memory(), 5)}
+    toys.heard = (BOX,)
+    application = toys.application("film", boxes=1, **manner)
+    _, stepper = toys.run(application)
+    assert application.seen == [1, 2, 3, 4, 5]
+    assert [number for _, number in toys.judge.boxes] == [1, 2, 3, 4, 5]
+    assert stepper.frames == 5
+
+
+def test_the_test_time_is_limited(toys: Toys) -> None:
+    toys.timeout = 5 * STEP
+    application = toys.application()
+    with pytest.raises(TimedOut):
+        toys.run(application)
+    assert len(application.seen) in (5, 6)
+
+
+def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.3)
+    gone = threading.Event()
+
+    class Hangs(Mover):
+        def update(self, now: int) -> Any:
+            gone.wait(0.01 if now < EPOCH + STEP else 1.0)
+            return ()
+
+    toys.cast = {**DRIVE, "mover": lambda session, _: Hangs(session)}
+    with pytest.raises(Stuck, match=r"^service 'mover' did not answer the clock within 0\.3 s$"):
+        toys.run(toys.application())
+
+
+def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each burst the first three get through only, as where the receive buffer is small."""
+    plain, sent = channel.Channel.send, dict[int, tuple[float, int]]()
+
+    def send(self: channel.Channel, message: Any, to: Any) -> None:
+        began, count = sent.get(id(self), (0.0, 0))
+        now = time.monotonic()
+        began, count = (began, count + 1) if now - began < 0.003 else (now, 1)
+        sent[id(self)] = began, count
+        if count <= 3:
+            plain(self, message, to)
+
+    monkeypatch.setattr("services.base.parts.PART_BYTES", 150)
+    monkeypatch.setattr(channel.Channel, "send", send)
+    monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
+    monkeypatch.setattr(exchange, "_SLICE", 0.01)
+    toys.judge = Judge(0.5)
+    way, _ = toys.run(toys.application())
+    assert close(way, expected(6))
 
 
 def test_silence_is_named_with_frame_and_message(toys: Toys) -> None:

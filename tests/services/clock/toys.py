@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
@@ -22,6 +22,7 @@ from services.clock.model import Patience, Roles, Stepper
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
+BOX = "opendlv.logic.perception.DetectionBoundingBox"
 
 
 class Mover(Service):
@@ -61,15 +62,41 @@ class Eye(Service):
         return ()
 
 
+class Film(Service):
+    """Shows some numbers, one a step, and ends with the last of them."""
+
+    period = STEP
+
+    def __init__(self, memory: SharedMemory, length: int) -> None:
+        self._memory, self._length, self._number = memory, length, 0
+
+    def update(self, now: int) -> Iterable[Any]:
+        if self._number < self._length:
+            self._number += 1
+            with self._memory.lock():
+                self._memory.buffer[:8] = struct.pack("<d", self._number)
+                self._memory.stamp(now)
+            self._memory.notify_all()
+            self.finished = self._number == self._length
+        return ()
+
+
 class Judge(Service):
-    """Remembers the way, and has seen enough after some seconds."""
+    """Remembers the way and what was said of pictures, and has seen enough after some seconds or at the end."""
 
     period = STEP // 20
 
     def __init__(self, seconds: float) -> None:
-        self.inputs = {(PLACE, 0): lambda message, time: self.way.append((time - EPOCH, message.x))}
+        self.inputs = {
+            (PLACE, 0): lambda message, time: self.way.append((time - EPOCH, message.x)),
+            (BOX, None): lambda message, time: self.boxes.append(((time - EPOCH) // STEP, message.x)),
+        }
         self.way: list[tuple[int, float]] = []
+        self.boxes: list[tuple[int, float]] = []
         self._end = EPOCH + round(seconds * 1_000_000)
+
+    def end_of_input(self, now: int) -> None:
+        self.verdict = Verdict("passed", "all was shown")
 
     def update(self, now: int) -> Iterable[Any]:
         self.verdict = Verdict("passed", "enough") if now >= self._end else None
@@ -78,7 +105,11 @@ class Judge(Service):
 
 @dataclass
 class Application:
-    """Steers by what it sees. ``copies`` its sample time, says it ``times`` often, ``pause`` waits before it does."""
+    """Steers by what it sees. ``copies`` its sample time, says it ``times`` often, ``pause`` waits before it does.
+
+    ``boxes`` are said of each picture before that, each after another pause. ``delay`` is how many seconds pass from
+    being told of a picture to looking at it.
+    """
 
     cid: int
     name: str
@@ -86,20 +117,26 @@ class Application:
     times: int = 1
     pause: Callable[[int], float] = lambda _: 0.0
     most: int = 1_000_000
+    boxes: int = 0
+    delay: float = 0.0
     seen: list[float] = field(default_factory=list)
 
     def run(self, stopped: Callable[[], bool]) -> None:
         with Session(self.cid) as session:
-            request = session.messages.type(STEER)
+            request, box = session.messages.type(STEER), session.messages.type(BOX)
             memory = SharedMemory.attach(self.name)
             try:
                 while not stopped() and len(self.seen) < self.most:
                     if not memory.wait(0.05):
                         continue
+                    time.sleep(self.delay)
                     with memory.lock():
                         (place,), sampled = struct.unpack("<d", memory.buffer[:8]), memory.sample_time()
                     self.seen.append(place)
                     time.sleep(self.pause(len(self.seen)))
+                    for _ in range(self.boxes):
+                        session.send(box(x=place), sampled)
+                        time.sleep(self.pause(len(self.seen)))
                     for n in range(self.times):
                         message = request(groundSteering=1.5 - place + n)
                         session.send(message, sampled if self.copies else None)
@@ -110,54 +147,85 @@ class Application:
 
 
 @dataclass
+class Filter:
+    """An application without a camera: answers each place as soon as it hears it."""
+
+    cid: int
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        with Session(self.cid) as session:
+            place, request = session.messages.id(PLACE), session.messages.type(STEER)
+            while not stopped():
+                envelope = session.receive(0.05)
+                if envelope is not None and envelope.data_type == place:
+                    message = session.messages.decode(place, envelope.payload)
+                    session.send(request(groundSteering=1.5 - message.x), envelope.sample_time)
+
+
+class Runs(Protocol):
+    """A program, in a thread."""
+
+    def run(self, stopped: Callable[[], bool]) -> None: ...
+
+
+Memory = Callable[[], SharedMemory]
+Maker = Callable[[Session, Memory], Service]
+"""Makes a service of its session and what gives it its memory."""
+
+DRIVE: dict[str, Maker] = {"mover": lambda s, _: Mover(s), "eye": lambda _, memory: Eye(memory())}
+
+
+@dataclass
 class Toys:
-    """Runs the test; ``way`` is what the judge saw."""
+    """Runs the test: a mover goes on, others sense; ``judge`` looks."""
 
     cid: int
     seconds: float = 2.0
     patience: Patience = field(default_factory=lambda: Patience(5.0, 2.0))
     answers: tuple[str, ...] = (STEER,)
+    heard: tuple[str, ...] = ()
+    timeout: int = 60_000_000
+    readers: int = 1
+    cast: dict[str, Maker] = field(default_factory=lambda: DRIVE)
 
-    @property
-    def memory_name(self) -> str:
-        return f"dodo-toy-{os.getpid()}-{self.cid}"
+    def __post_init__(self) -> None:
+        self.judge = Judge(self.seconds)
 
-    def application(self, **about: Any) -> Application:
-        return Application(self.cid, self.memory_name, **about)
+    def memory_name(self, service: str = "eye") -> str:
+        return f"dodo-toy-{os.getpid()}-{self.cid}-{service}"
 
-    def run(self, application: Application) -> tuple[list[tuple[int, float]], Stepper]:
+    def application(self, service: str = "eye", **about: Any) -> Application:
+        return Application(self.cid, self.memory_name(service), **about)
+
+    def run(self, *applications: Runs) -> tuple[list[tuple[int, float]], Stepper]:
         """Raises what the Stepper raises."""
-        judge = Judge(self.seconds)
         stop = threading.Event()
-        with self._services(judge, stop), Session(self.cid) as session:
-            app = threading.Thread(target=application.run, args=(stop.is_set,))
-            app.start()
+        with self._services(stop), Session(self.cid) as session:
+            apps = [threading.Thread(target=each.run, args=(stop.is_set,)) for each in applications]
+            for app in apps:
+                app.start()
             channel = Channel(self.cid, session.messages)
             ids = {name: session.messages.id(name) for name in session.messages.names()}
-            answers = Answers(kinds(self.answers, ids))
+            answers = Answers(kinds(self.answers, ids), kinds(self.heard, ids))
             exchange = Exchange(session, channel, answers.take)
-            roles = Roles(("mover",), ("eye",), ("judge",))
-            stepper = Stepper(roles, STEP, 60_000_000, self.patience, answers, exchange, stop.is_set)
+            advance = tuple(name for name in self.cast if name == "mover")
+            roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
+            stepper = Stepper(roles, STEP, self.timeout, self.patience, answers, exchange, stop.is_set)
             try:
                 stepper.meet()
                 stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
             finally:
                 stop.set()
-                app.join()
+                for app in apps:
+                    app.join()
                 channel.close()
-        return judge.way, stepper
+        return self.judge.way, stepper
 
     @contextmanager
-    def _services(self, judge: Judge, stop: threading.Event) -> Iterator[None]:
-        sessions = [Session(self.cid) for _ in range(3)]
-        clocks = [LockstepClock(s, name, 1) for s, name in zip(sessions, ("mover", "eye", "judge"), strict=True)]
+    def _services(self, stop: threading.Event) -> Iterator[None]:
+        makers: dict[str, Maker] = {**self.cast, "judge": lambda _session, _memory: self.judge}
         with ExitStack() as resources:
-            for session in sessions:
-                resources.enter_context(session)
-            memory = resources.enter_context(clocks[1].memory(self.memory_name, 8))
-            services: list[Service] = [Mover(sessions[0]), Eye(memory), judge]
-            parts = zip(services, sessions, clocks, strict=True)
-            loops = [Loop("toy", service, session, clock, 0) for service, session, clock in parts]
+            loops = [self._loop(name, maker, resources) for name, maker in makers.items()]
             threads = [threading.Thread(target=loop.run, args=(stop.is_set,)) for loop in loops]
             for thread in threads:
                 thread.start()
@@ -167,3 +235,9 @@ class Toys:
                 stop.set()
                 for thread in threads:
                     thread.join()
+
+    def _loop(self, name: str, maker: Maker, resources: ExitStack) -> Loop:
+        session = resources.enter_context(Session(self.cid))
+        clock = LockstepClock(session, name, self.readers)
+        service = maker(session, lambda: resources.enter_context(clock.memory(self.memory_name(name), 8)))
+        return Loop(name, service, session, clock, 0)
