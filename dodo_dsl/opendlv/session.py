@@ -6,11 +6,13 @@ import select
 import socket
 import struct
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Self
 
 from google.protobuf.message import Message
 
+from dodo_dsl.opendlv import kernel_filter
 from dodo_dsl.opendlv.envelope import Envelope, FrameError, decode_frame, encode_frame
 from dodo_dsl.opendlv.messages import MessageSet
 
@@ -51,8 +53,7 @@ class Session:
         self.garbage = 0
         self.lost = 0
         self.is_member = True
-        self.only: frozenset[int] | None = None
-        """Ids of messages; datagrams of others are left undecoded where they are as libcluon writes them."""
+        self._only: frozenset[int] | None = None
         self.source: Address = ("", 0)
         """Host and port from which the last datagram came."""
         group = (f"225.0.0.{cid}", PORT)
@@ -114,6 +115,14 @@ class Session:
         """The file descriptor to select on for reading."""
         return self._receiver.fileno()
 
+    def hear_only(self, ids: Iterable[int]) -> None:
+        """Receive messages with these ids from now on; where the kernel can, this process is not woken for others.
+
+        Losses are not counted any more, as the kernel counts the others with them.
+        """
+        self._only = frozenset(ids)
+        kernel_filter.attach(self._receiver, self._only)
+
     def deafen(self) -> None:
         """Hear nothing from now on, so that this process is not woken for it; sending goes on."""
         if self.is_member:
@@ -142,11 +151,11 @@ class Session:
 
     def _next(self) -> Envelope | None:
         size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES)
-        if len(ancillary) > 1:
+        if len(ancillary) > 1 and self._only is None:
             self.lost = _lost(ancillary)
         if address == self._own_address:
             return None
-        if self.only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self.only:
+        if self._only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self._only:
             return None
         self.source = address
         try:

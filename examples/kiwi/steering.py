@@ -149,10 +149,10 @@ def main() -> int:
 
     frames, driver = Frames(), Driver(flags.reverse)
     with Session(flags.cid) as session:
-        heard = {session.messages.id(name) for name in HEARD}
+        session.hear_only(session.messages.id(name) for name in HEARD)
         while True:
             envelope = session.receive(None)
-            if envelope and envelope.data_type in heard:
+            if envelope:
                 handle(session, envelope, frames, driver, flags.verbose)
 
 

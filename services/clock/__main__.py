@@ -19,7 +19,7 @@ def build(context: Context) -> Service:
     answers = Answers(kinds(flags["answers"], ids), kinds(flags["hears"], ids), done[0] if done else None)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"
-    context.session.only = frozenset(kind.data_type for kind in answers.kinds) | {ids[name] for name in HEARD}
+    context.session.hear_only([*(kind.data_type for kind in answers.kinds), *(ids[name] for name in HEARD)])
     channel = Channel(context.session.cid, context.messages)
     context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)

@@ -2,7 +2,7 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Protocol
@@ -44,7 +44,7 @@ class Talk(Protocol):
 
 @dataclass(frozen=True)
 class Roles:
-    """The services of a test: ``advance`` and ``sense`` go one after the other, ``judge`` and ``watch`` all at once."""
+    """The services of a test: ``advance`` and ``sense`` go one after the other, ``judge`` and ``watch`` beside them."""
 
     advance: tuple[str, ...]
     sense: tuple[str, ...]
@@ -77,6 +77,10 @@ class Stepper:
     stopped: Callable[[], bool]
     frames: int = 0
     now: int = EPOCH
+    reached: int = EPOCH
+    """The last step that the evaluators looked at."""
+    _looking: list[str] = field(default_factory=list)
+    _looked_at: int = EPOCH
     _backlog: dict[str, list[Said]] = field(default_factory=dict)
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
@@ -107,40 +111,51 @@ class Stepper:
                 for done in self._go((name,), self.now)
                 if done.pictures
             ]
-            self._see(shown) if shown or not self._memories else self._look()
-            if self._is_judged:
+            if self._judged():
                 return
-            if self.now - EPOCH >= self.timeout:
+            self._see(shown) if shown or not self._memories else self._look()
+            if self.now - EPOCH >= self.timeout and not self._judged():
                 raise TimedOut
             self._spread([say(envelope) for envelope in self.answers.collect()], "")
             self._go_on()
 
-    @property
-    def _is_judged(self) -> bool:
+    def _look(self) -> None:
+        """Watchers and judges look at this step, while others go on already."""
+        self._looking = [name for name in (*self.roles.watch, *self.roles.judge) if name not in self._ended]
+        self._looked_at = self.now
+        self._ask(self._looking, self.now)
+
+    def _judged(self) -> bool:
+        """Whether all evaluators have ended with the last step that they looked at; waits for them."""
+        looking, self._looking = self._looking, []
+        if looking:
+            self._await(looking)
+            self.reached = self._looked_at
         return set(self.roles.judge) <= self._ended
 
     def _go(self, names: Sequence[str], until: int) -> list[Done]:
-        """All of them go on to a time."""
-        dones: list[Done] = []
-        for _ in self._going(names, until, dones):
-            self.talk.pump(_SLICE, bus=False)
-        return dones
-
-    def _going(self, names: Sequence[str], until: int, dones: list[Done]) -> Iterator[None]:
-        """As ``_go``, with something else to do in between; raises Stuck."""
+        """All of them go on to a time; raises Stuck."""
         wanted = [name for name in names if name not in self._ended]
+        self._ask(wanted, until)
+        return self._await(wanted)
+
+    def _ask(self, names: Sequence[str], until: int) -> None:
+        self.talk.ask([Order(name, until, self._heard(name)) for name in names])
+
+    def _await(self, names: Sequence[str]) -> list[Done]:
+        dones: list[Done] = []
         began = time.monotonic()
-        self.talk.ask([Order(name, until, self._heard(name)) for name in wanted])
-        for name in wanted:
+        for name in names:
             while (done := self.talk.answer(name)) is None:
                 if self.stopped():
-                    return
+                    return dones
                 if time.monotonic() - began > SERVICE_PATIENCE:
                     raise Stuck(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
-                yield
+                self.talk.pump(_SLICE, bus=False)
             self._take(done)
             dones.append(done)
-        self.spent[" and ".join(wanted)] += time.monotonic() - began
+        self.spent[" and ".join(names)] += time.monotonic() - began
+        return dones
 
     def _take(self, done: Done) -> None:
         if not self.frames:
@@ -149,15 +164,6 @@ class Stepper:
         self._next[done.service] = done.next
         if done.ended:
             self._ended.add(done.service)
-
-    def _looking(self) -> Iterator[None]:
-        """The watchers look, and then the judges, as the last of these ends the test."""
-        yield from self._going(self.roles.watch, self.now, [])
-        yield from self._going(self.roles.judge, self.now, [])
-
-    def _look(self) -> None:
-        for _ in self._looking():
-            self.talk.pump(_SLICE)
 
     def _heard(self, name: str) -> tuple[Said, ...]:
         """What a service has not heard yet."""
@@ -177,12 +183,13 @@ class Stepper:
         self.answers.seen()
 
     def _see(self, shown: Sequence[Done]) -> None:
-        """The application sees the new pictures, and answers, while watchers and judges look at the same step."""
+        """The application sees the new pictures and answers."""
         self.frames += 1
         began = time.monotonic()
         patience = self.patience.first if self.frames == 1 else self.patience.others
         if shown:
             self._show(shown, began, patience)
+        self._look()
         self._await_answer(began, patience)
 
     def _show(self, shown: Sequence[Done], began: float, patience: float) -> None:
@@ -212,17 +219,13 @@ class Stepper:
         return time.monotonic() + _AGAIN
 
     def _await_answer(self, began: float, patience: float) -> None:
-        looking = self._looking()
-        is_looking = True
-        while not self.stopped():
-            is_looking = is_looking and next(looking, self) is None
-            is_answered = self._is_answered
-            if self._is_judged or (is_answered and not is_looking):
-                break
+        while not (self.stopped() or self._is_answered):
             left = began + patience - time.monotonic()
-            if left <= 0 and not is_answered:
+            if left <= 0:
+                if self._judged():
+                    return
                 raise Unanswered(self._sentence(patience, self._missing))
-            self.talk.pump(max(left, 0.0))
+            self.talk.pump(left)
         self.spent["the first answer" if self.frames == 1 else "the application"] += time.monotonic() - began
 
     @property

@@ -76,7 +76,7 @@ class ClockService(Service):
 
     def _tell_time(self, last: bool = False) -> None:
         self._told = time.monotonic()
-        seconds = (self._stepper.now - EPOCH) / 1e6
+        seconds = (self._stepper.reached - EPOCH) / 1e6
         self._say("time", s=seconds, frames=self._stepper.frames, surplus=self._answers.surplus, last=last)
 
     @staticmethod

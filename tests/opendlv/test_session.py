@@ -1,3 +1,4 @@
+import select
 import shutil
 import socket
 import subprocess
@@ -118,6 +119,34 @@ def test_messages_without_room_in_the_buffer_are_counted(cid: int, monkeypatch: 
             sender.send(STEERING(), sender_stamp=200)
             assert session.receive(5.0) is not None
             assert session.lost == 200 - len(heard) > 0
+
+
+IDS = [0, 5, 63, 64, 1090, 8191, 8192, 1_048_575, 1_048_576, 2**31 - 1, -1, -64, -65, -(2**31)]
+
+
+@pytest.mark.parametrize("is_kernel_able", [True, False])
+def test_only_some_messages_are_heard(cid: int, is_kernel_able: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not is_kernel_able:
+        monkeypatch.setattr(sessions.kernel_filter, "attach", lambda *_: False)
+    for chosen in ([], [1090], IDS[::2], IDS[1::2], range(300)):
+        with Session(cid) as session, Session(cid) as other:
+            session.hear_only(chosen)
+            for id_ in IDS:
+                other.send_envelope(Envelope(id_, b"x", 0, 0, 0, 0))
+            heard = []
+            while (envelope := session.receive(0.05)) is not None:
+                heard.append(envelope.data_type)
+            assert heard == [id_ for id_ in IDS if id_ in chosen]
+            assert session.lost == 0
+
+
+def test_nobody_is_woken_for_what_is_not_heard(cid: int) -> None:
+    with Session(cid) as session, Session(cid) as other:
+        session.hear_only([1090])
+        other.send_envelope(Envelope(1091, b"x", 0, 0, 0, 0))
+        assert select.select([session], [], [], 0.05)[0] == []
+        other.send_envelope(Envelope(1090, b"x", 0, 0, 0, 0))
+        assert select.select([session], [], [], 1.0)[0] == [session]
 
 
 def test_the_largest_datagram_passes_and_a_larger_one_is_refused(cid: int) -> None:
