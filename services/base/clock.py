@@ -33,6 +33,11 @@ class Inbox(Protocol):
         """Whether the service looks at all that is on the bus."""
         ...
 
+    @property
+    def hears(self) -> frozenset[int]:
+        """Ids of the messages that it is to see at least."""
+        ...
+
     def overhear(self, envelope: Envelope) -> None:
         """It is on the bus, but the service is not to act upon it."""
         ...

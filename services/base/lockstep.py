@@ -50,6 +50,7 @@ class LockstepClock:
         self._screen = Screen(readers)
         self._observed = Observed()
         self._next = 0
+        self._hears = ""
 
     def now(self) -> int:
         return self._now
@@ -60,6 +61,7 @@ class LockstepClock:
 
     def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
+        self._hears = "" if inbox.observes else ",".join(map(str, sorted(inbox.hears)))
         yield from self._steps(period, inbox, stopped)
         if inbox.observes:
             self._observed.rest(inbox)
@@ -145,7 +147,9 @@ class LockstepClock:
             "ended": ended,
             "next": self._next,
             "port": self._session.port,
+            "hears": self._hears,
         }
+        self._hears = ""
         return [self._done(part=part, frames=data, **facts) for part, data in enumerate(pieces)]
 
 

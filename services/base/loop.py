@@ -75,6 +75,11 @@ class Loop:
         """For the clock: whether the service looks at all that is on the bus."""
         return self.service.observe is not None
 
+    @property
+    def hears(self) -> frozenset[int]:
+        """For the clock: ids of the messages that change something here."""
+        return frozenset([*self._handlers, self._begin, self._end])
+
     def overhear(self, envelope: Envelope) -> None:
         """For the clock: an envelope that the service may only look at."""
         if self.service.observe is not None:

@@ -36,6 +36,8 @@ class Done(NamedTuple):
     sampled: int = 0
     ended: bool = False
     next: int = 0
+    hears: frozenset[int] = frozenset()
+    """Ids of the messages that it hears; none where it does not say."""
 
 
 @dataclass
@@ -144,7 +146,8 @@ class Exchange:
                 self._own.add((address[0], done.port))
             data = self._pieces.setdefault(done.service, Pieces()).take(done.number, done.part, done.parts, done.frames)
             if data is not None:
-                facts = (done.memories, done.pictures, done.sampled, done.ended, done.next)
+                hears = frozenset(int(word) for word in done.hears.split(",") if word.isdecimal())
+                facts = (done.memories, done.pictures, done.sampled, done.ended, done.next, hears)
                 self._done[done.service] = Done(done.service, tuple(frames(data)), *facts)
                 del self._asked[done.service]
         except (FrameError, MessageError):

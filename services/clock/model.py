@@ -82,6 +82,7 @@ class Stepper:
     _looking: list[str] = field(default_factory=list)
     _looked_at: int = EPOCH
     _backlog: dict[str, list[Said]] = field(default_factory=dict)
+    _hears: dict[str, frozenset[int]] = field(default_factory=dict)
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
     _exact: Fraction = Fraction(EPOCH)
@@ -96,8 +97,10 @@ class Stepper:
         self._backlog = {name: [] for name in self.roles.all}
 
     def meet(self) -> None:
-        """Find all services, before time begins; raises Stuck."""
-        self._memories = sum(done.memories for done in self._go(self.roles.all, EPOCH - 1))
+        """Find all services and what they hear, before time begins; raises Stuck."""
+        dones = self._go(self.roles.all, EPOCH - 1)
+        self._memories = sum(done.memories for done in dones)
+        self._hears = {done.service: done.hears for done in dones if done.hears}
 
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises Unanswered, Stuck and TimedOut."""
@@ -171,10 +174,11 @@ class Stepper:
         return tuple(heard)
 
     def _spread(self, said: Sequence[Said], sender: str) -> None:
-        """What one said, all others will hear with their next step."""
+        """What one said, others will hear with their next step."""
         for name, backlog in self._backlog.items():
             if name != sender and name not in self._ended:
-                backlog.extend(said)
+                hears = self._hears.get(name)
+                backlog.extend(s for s in said if hears is None or s.envelope.data_type in hears)
 
     def _hear_from_now_on(self) -> None:
         """An application that sees no pictures answers what the services of this step are about to say."""

@@ -32,7 +32,7 @@ def fill_fixed(image: Canvas, points: Fixed, colour: Colour) -> None:
 
 def inset(polygon: Array, amount: float = HALF_PIXEL) -> Array:
     """A convex polygon (k, 2) with every edge moved inwards, by less where it is too thin for that."""
-    following = np.roll(polygon, -1, axis=0)
+    following = np.concatenate([polygon[1:], polygon[:1]])
     edges = following - polygon
     lengths = np.hypot(edges[:, 0], edges[:, 1])
     doubled = float(np.sum(polygon[:, 0] * following[:, 1] - following[:, 0] * polygon[:, 1]))

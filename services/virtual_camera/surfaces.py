@@ -87,19 +87,23 @@ def _draw_texture(image: Image, view: View, visible: Array, paint: TextureMap) -
 
 def _window(image: Image, polygon: Array) -> tuple[int, int, int, int]:
     """The first and last-but-one columns and rows of the pixels whose centres a polygon may cover."""
-    low = np.maximum(np.ceil(polygon.min(axis=0) - 1e-6), 0).astype(int)
-    high = np.minimum(np.floor(polygon.max(axis=0) + 1e-6) + 1, [image.shape[1], image.shape[0]]).astype(int)
-    return int(low[0]), int(high[0]), int(low[1]), int(high[1])
+    columns, rows = polygon.T.tolist()
+    left, right = math.ceil(min(columns) - 1e-6), math.floor(max(columns) + 1e-6) + 1
+    top, bottom = math.ceil(min(rows) - 1e-6), math.floor(max(rows) + 1e-6) + 1
+    return max(left, 0), min(right, image.shape[1]), max(top, 0), min(bottom, image.shape[0])
 
 
 def _fills_window(polygon: Array, left: int, right: int, top: int, bottom: int) -> bool:
     """Whether all pixel centres of the window lie in the polygon (within a hundredth of a pixel)."""
-    corners = np.array([[left, top], [right - 1, top], [right - 1, bottom - 1], [left, bottom - 1]], float)
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    to_corner = corners[None] - polygon[:, None]
-    side = edges[:, None, 0] * to_corner[..., 1] - edges[:, None, 1] * to_corner[..., 0]
-    reach = 0.01 * np.hypot(edges[:, 0], edges[:, 1])[:, None]
-    return bool((side >= -reach).all() or (side <= reach).all())
+    corners = ((left, top), (right - 1, top), (right - 1, bottom - 1), (left, bottom - 1))
+    points: list[list[float]] = polygon.tolist()
+    is_left = is_right = True
+    for (x, y), (next_x, next_y) in pairwise([*points, points[0]]):
+        along, up = next_x - x, next_y - y
+        reach = 0.01 * math.hypot(along, up)
+        sides = [along * (row - y) - up * (column - x) for column, row in corners]
+        is_left, is_right = is_left and min(sides) >= -reach, is_right and max(sides) <= reach
+    return is_left or is_right
 
 
 def _draw_band(image: Image, polygon: Array, inverse: Array, paint: TextureMap, level: int) -> None:

@@ -10,6 +10,7 @@ class Seen:
     """An inbox that remembers."""
 
     observes = True
+    hears: frozenset[int] = frozenset()
 
     def __init__(self) -> None:
         self.seen: list[tuple[bytes, int]] = []
