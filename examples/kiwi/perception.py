@@ -33,7 +33,7 @@ SMALLEST = 1 / 14_000  # of the image; less than this is noise: 22 pixels of 640
 SLENDER = (0.8, 3.5)  # height of a cone's box to its width
 FILLED = 0.35  # share of its box that a cone covers
 ASKS, LISTENS = 1, 2  # sender stamps of perception's question to steering and of the answer
-PATIENCE = 0.1  # seconds between questions and between looks for the camera
+PATIENCE = 0.02  # seconds between questions and between looks for the camera
 
 
 class Cone(NamedTuple):
