@@ -1,10 +1,12 @@
 """The same tests in containers of a real engine: isolated from each other, and gone afterwards."""
 
+import grp
 import json
 import os
 import shutil
 import signal
 import socket
+import stat
 import subprocess
 import sys
 import time
@@ -69,6 +71,48 @@ def test_both_pass_at_once_with_the_unedited_compose_file(tmp_path: Path) -> Non
         assert (report / slug / "test.rec").stat().st_size > 10_000
         assert (report / slug / "trajectory.png").is_file()
         assert "frame 1:" in (report / slug / "logs" / "application.perception.log").read_text()
+
+
+def test_the_emulated_rig_in_containers(tmp_path: Path) -> None:
+    """A machine that is too busy for the emulated rig gets two more tries."""
+    if not (ROOT / "build" / "firmware" / "rig-emulator").exists():
+        pytest.skip("the emulated rig is not built: make firmware")
+    report = tmp_path / "report"
+    process = start(tmp_path, "hil-camera", "hil-dynamic", "--retry-errors", "2", "--report", str(report))
+    out, _ = process.communicate(timeout=400)
+    assert process.returncode == 0, out
+    assert {test["outcome"] for test in results(report).values()} == {"passed"}
+    assert (report / "hil-camera" / "snapshot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_rig_s_device_is_open_to_the_service(tmp_path: Path) -> None:
+    """As a serial port is on Debian: for its group alone."""
+    device = Path(f"/dev/dodo-test-{os.getpid()}")
+    for name in ("tests_registry", "examples"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    deployment = yaml.safe_load((ROOT / "dodo.yml").read_text())
+    deployment["rigs"] = {
+        "bench": {"kind": "dynamic", "cid": 120, "serial": str(device), "camera": {"source": "rpicam"}}
+    }
+    (tmp_path / "dodo.yml").write_text(yaml.safe_dump(deployment))
+    spec = tmp_path / "tests_registry" / "hil-dynamic" / "hil-dynamic.dodo.yml"
+    spec.write_text(spec.read_text().replace("rig: emulated", "rig: bench"))
+    subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", str(spec)], cwd=tmp_path, check=True)
+    try:
+        os.mknod(device, stat.S_IFCHR, os.makedev(1, 3))
+    except PermissionError:
+        pytest.skip("this user may not make device files")
+    folder = tmp_path / "generated" / "hil-dynamic"
+    command = ["docker", "compose", "run", "--rm", "--no-deps", "--entrypoint", "sh", "pose"]
+    words = [*command, "-c", f"test -w {device} && id -u"]
+    try:
+        os.chown(device, 0, grp.getgrnam("dialout").gr_gid)
+        device.chmod(0o660)
+        result = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    finally:
+        device.unlink()
+        subprocess.run(["docker", "compose", "down", "-v"], cwd=folder, capture_output=True, check=False)
+    assert (result.stdout.strip(), result.returncode) == ("10001", 0), result.stderr
 
 
 def hostile_test(folder: Path, harm: str) -> tuple[Path, Path]:
