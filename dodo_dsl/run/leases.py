@@ -22,6 +22,8 @@ RUN, PROJECT = "run-", "docker-"
 ONCE = (RUN, PROJECT)
 """Leases of random names: nobody ever waits for one, so their lock files need not stay."""
 _RETRY_S = 0.2
+_NO_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
+"""What reading a record raises that is damaged, or that somebody else wrote."""
 
 
 class LeaseTimeout(Exception):
@@ -51,10 +53,12 @@ class Lease:
 
     def release(self) -> None:
         """Gives up this process's hold and the record; the lock file goes too where its name never comes again."""
-        self.record.unlink(missing_ok=True)
-        if self.name.startswith(ONCE):
-            _lock_file(self.name).unlink(missing_ok=True)
-        os.close(self.descriptor)
+        try:
+            self.record.unlink(missing_ok=True)
+            if self.name.startswith(ONCE):
+                _lock_file(self.name).unlink(missing_ok=True)
+        finally:
+            os.close(self.descriptor)
 
     def leave(self) -> None:
         """Gives up this process's hold and leaves record and lock to those who inherited it."""
@@ -89,18 +93,32 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
             return None
         raise
     record = folder() / f"{name}.{os.getpid()}.json"
-    record.write_text(json.dumps({"pid": os.getpid(), **about}))
+    try:
+        record.write_text(json.dumps({"pid": os.getpid(), **about}))
+    except OSError:
+        os.close(descriptor)
+        raise
     return Lease(name, descriptor, record)
 
 
 def holder(name: str) -> str:
-    """Who holds a lease, for a sentence."""
+    """Who holds a lease, for a sentence; its record may be another user's."""
     for record in sorted(folder().glob(f"{name}.*.json")):
-        with contextlib.suppress(ProcessLookupError, FileNotFoundError, ValueError, KeyError):
+        with contextlib.suppress(OSError, *_NO_RECORD):
             about = json.loads(record.read_text())
-            os.kill(int(about["pid"]), 0)
-            return f"test {about.get('test', '?')} of process {about.get('pid', '?')}"
+            if _is_alive(int(about["pid"])):
+                return f"test {about.get('test', '?')} of process {about['pid']}"
     return "another process"
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True  # it is another user's
+    return True
 
 
 async def lease_any(
@@ -133,10 +151,10 @@ def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
     """This user's leases that nobody holds any more but whose record is still there; each is yielded held."""
     for record in sorted(folder().glob(f"{prefix}*.json")):
         name = record.name.split(".")[0]
-        with contextlib.suppress(OSError, ValueError):
+        with contextlib.suppress(OSError):
             if record.stat().st_uid != os.getuid():
                 continue
-            about = json.loads(record.read_text())
+            about = _about(record)
             descriptor = _open(name)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -146,9 +164,17 @@ def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
             yield Lease(name, descriptor, record), about
 
 
+def _about(record: Path) -> dict[str, Any]:
+    """What a record says; nothing when its writer was killed before it was whole."""
+    with contextlib.suppress(*_NO_RECORD):
+        about = json.loads(record.read_text())
+        return about if isinstance(about, dict) else {}
+    return {}
+
+
 def forget_dead() -> None:
     """Removes the records of machine leases whose process has gone; their locks went with it."""
     for record in folder().glob("machine.*.json"):
-        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        with contextlib.suppress(OSError, *_NO_RECORD):
             if not Path("/proc", str(int(json.loads(record.read_text())["pid"]))).exists():
                 record.unlink(missing_ok=True)
