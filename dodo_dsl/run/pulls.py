@@ -36,10 +36,19 @@ class Pulls:
             raise
 
     async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str]]) -> str:
-        """Does a piece of work once for all tests of the run; those that come later wait for the first."""
-        if key not in self._tasks:
-            self._tasks[key] = asyncio.ensure_future(work())
-        return await asyncio.shield(self._tasks[key])
+        """Does a piece of work once for all tests of the run; those that come later wait for the first.
+
+        What failed is forgotten, so that a test that is tried again tries it again.
+        """
+        task = self._tasks.get(key)
+        if task is None:
+            task = self._tasks[key] = asyncio.ensure_future(work())
+            task.add_done_callback(lambda done: self._forget_failed(key, done))
+        return await asyncio.shield(task)
+
+    def _forget_failed(self, key: str, task: "asyncio.Task[str]") -> None:
+        if task.cancelled() or task.exception() is not None:
+            del self._tasks[key]
 
     def _own(self, image: str, say: Say) -> str:
         if not self._is_local(image):
@@ -62,7 +71,7 @@ class Pulls:
             self._client.api.inspect_image(image)
         except ImageNotFound:
             return False
-        except DockerException as error:
+        except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine does not answer about image {image}: {error}") from error
         return True
 
@@ -75,7 +84,7 @@ class Pulls:
                 if self._over.is_set():
                     return
                 progress.take(line)
-        except DockerException as error:
+        except (DockerException, OSError) as error:
             raise BackendError(f"image {image} cannot be pulled: {_reason(_said(error))}") from error
 
 

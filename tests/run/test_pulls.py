@@ -1,0 +1,47 @@
+"""Work that tests of a run share: once while it succeeds, again when it failed."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+
+import pytest
+
+from dodo_dsl.run.events import BackendError
+from dodo_dsl.run.pulls import Pulls
+
+
+def failing(times: int) -> tuple[list[int], Callable[[], Coroutine[None, None, str]]]:
+    """A piece of work that fails at first, and what it notes of each try."""
+    tries: list[int] = []
+
+    async def work() -> str:
+        tries.append(len(tries))
+        await asyncio.sleep(0)
+        if len(tries) <= times:
+            raise BackendError("the registry is away")
+        return "pulled"
+
+    return tries, work
+
+
+def test_tests_at_once_share_one_try_and_its_failure() -> None:
+    tries, work = failing(1)
+
+    async def scene() -> list[str | BaseException]:
+        pulls = Pulls(None)
+        return await asyncio.gather(*(pulls.once("image", work) for _ in range(3)), return_exceptions=True)
+
+    assert [str(answer) for answer in asyncio.run(scene())] == ["the registry is away"] * 3
+    assert len(tries) == 1
+
+
+def test_what_failed_is_tried_again_and_then_kept() -> None:
+    tries, work = failing(1)
+
+    async def scene() -> list[str]:
+        pulls = Pulls(None)
+        with pytest.raises(BackendError):
+            await pulls.once("image", work)
+        return [await pulls.once("image", work) for _ in range(2)]
+
+    assert asyncio.run(scene()) == ["pulled", "pulled"]
+    assert len(tries) == 2
