@@ -6,6 +6,7 @@ import json
 from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.diagnostics import printable
 from dodo_dsl.run import health
 from dodo_dsl.run.runner import reap_folders
 
@@ -25,8 +26,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.clean:
         reap_folders()
-        for line in health.clean():
-            stderr.write(f"removed: {line}\n")
+        reaped = health.clean()
+        stderr.writelines(f"removed: {printable(line)}\n" for line in reaped.removed)
+        stderr.writelines(f"cannot be removed: {printable(line)}\n" for line in reaped.left)
     findings = health.examine()
     if options.json:
         stdout.write(json.dumps([dataclasses.asdict(f) for f in findings], indent=2) + "\n")

@@ -11,13 +11,13 @@ from typing import Any, Protocol
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import lanes, leases, projects, rigs
+from dodo_dsl.run.client import connect
 from dodo_dsl.run.docker import DockerBackend, other_subnets
 from dodo_dsl.run.events import Backend, BackendError
 from dodo_dsl.run.process import Lane, ProcessBackend
 from dodo_dsl.run.pulls import Pulls
 
 Say = Callable[[str], None]
-_CONNECTIONS = 200
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,11 @@ class Containers:
             self._problem = str(error)
             return
         self._pulls = Pulls(self._client)
-        for left in await asyncio.to_thread(projects.reap_projects, self._client):
-            note(f"removed what a killed run left: {left}")
+        reaped = await asyncio.to_thread(projects.reap_projects, self._client)
+        for removed in reaped.removed:
+            note(f"removed what a killed run left: {removed}")
+        for left in reaped.left:
+            note(f"what a killed run left cannot be removed: {left}")
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
@@ -135,16 +138,3 @@ def replace_flags(plan: Plan) -> Plan:
     """The plan as one whose application takes no flags: compiled files on the host are fixed, so they run alone."""
     services = tuple(replace(s, takes_cid=False, takes_memory=False) for s in plan.application.services)
     return replace(plan, application=replace(plan.application, services=services))
-
-
-def connect() -> Any:
-    """A client of the engine; raises BackendError with what to do when none answers."""
-    import docker
-    from docker.errors import DockerException
-
-    try:
-        client = docker.from_env(max_pool_size=_CONNECTIONS)
-        client.ping()
-    except (DockerException, OSError) as error:
-        raise BackendError(f"no Docker engine answers ({error}); start one, or use --backend process") from error
-    return client

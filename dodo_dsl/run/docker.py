@@ -15,9 +15,11 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.trace import traced
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
-from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Ready, Unstartable
+from dodo_dsl.run.client import said
+from dodo_dsl.run.copies import copy_out
+from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.output import Output
-from dodo_dsl.run.projects import PROJECT_LABEL, SERVICE_LABEL, copy_out, remove_project, stop_project
+from dodo_dsl.run.projects import PROJECT_LABEL, SERVICE_LABEL, remove_project, stop_project
 from dodo_dsl.run.pulls import Pulls, Say
 
 _PORT = 12175
@@ -227,7 +229,7 @@ class DockerBackend:
             await asyncio.to_thread(container.start)
         except DockerException as error:
             output.release_writer()
-            why = str(getattr(error, "explanation", "") or error)
+            why = said(error)
             self._queue.put_nowait(Unstartable(name, why))
             return
         threading.Thread(target=self._follow, args=(container, output.writer), daemon=True).start()
@@ -292,7 +294,7 @@ class DockerBackend:
             remove_project(self._client, self.project)
         except (DockerException, OSError):
             self.left_behind = True
-            self._say("the engine does not take it down: the next run does, or dodo doctor --clean")
+            self._note("the engine does not take it down: the next run does, or dodo doctor --clean")
 
     def _copy_report(self, container: Any) -> None:
         from docker.errors import DockerException
@@ -300,8 +302,13 @@ class DockerBackend:
         try:
             copy_out(container, f"{_REPORT}/.", self.report)
         except (DockerException, OSError) as error:
-            why = getattr(error, "strerror", None) or error
-            self._say(f"the report misses files of {container.labels[SERVICE_LABEL]}: {why}")
+            why = said(error)
+            self._note(f"the report misses files of {container.labels[SERVICE_LABEL]}: {why}")
+
+    def _note(self, text: str) -> None:
+        """Said at once, and with the outcome."""
+        self._say(text)
+        self._tell(self._queue.put_nowait, Noted(text))
 
     def _records(self, container: Any) -> bool:
         name = container.labels[SERVICE_LABEL]

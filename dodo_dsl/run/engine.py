@@ -17,6 +17,7 @@ from dodo_dsl.run.events import (
     Exited,
     Lost,
     Malformed,
+    Noted,
     Overrun,
     Ready,
     Stopped,
@@ -48,6 +49,7 @@ class Engine:
     exits: dict[str, int] = field(default_factory=dict)
     ready: set[str] = field(default_factory=set)
     lost: dict[str, int] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
     began: float | None = None
     finished: float | None = None
     setup_s: float | None = None
@@ -91,9 +93,9 @@ class Engine:
         return closing.result()
 
     async def _hear_losses(self) -> None:
-        """What services said of losses while they ended; what else they said then no longer counts."""
+        """What was said of losses while services ended; what else they said then no longer counts."""
         while (event := await self._next(0.0)) is not None:
-            if isinstance(event, Overrun):
+            if isinstance(event, Overrun | Noted):
                 self._take(event)
 
     async def _set_up(self, start: float) -> None:
@@ -187,21 +189,25 @@ class Engine:
                 self._end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Overrun(service, messages):
                 self.lost[service] = messages
+            case Noted(text):
+                self.notes.append(text)
             case Unstartable(service, why):
                 self._end("error", f"service '{service}' could not be started: {why}", service)
             case Lost(why):
                 self._end("error", why)
             case Time():
                 self.time = event
-            case Stopped("unanswered", reason):
-                self._end("failed", reason, self._who_answers())
-            case Stopped("timedout"):
-                self._time_out()
-            case Stopped(_, reason):
-                self._end("error", reason, CLOCK)
+            case Stopped(kind, reason):
+                self._take_stop(kind, reason)
             case Exited(service, code, out_of_memory):
                 self.exits[service] = code
                 self._take_exit(service, code, out_of_memory)
+
+    def _take_stop(self, kind: str, reason: str) -> None:
+        if kind == "timedout":
+            self._time_out()
+        is_silent = kind == "unanswered"
+        self._end("failed" if is_silent else "error", reason, self._who_answers() if is_silent else CLOCK)
 
     def _take_exit(self, service: str, code: int, out_of_memory: bool) -> None:
         layer, when = self.layer_of.get(service, "application"), self._when()
@@ -258,7 +264,7 @@ class Engine:
             services=tuple(self._service_rows()),
             checks=tuple(checks),
             last_lines=tuple(self.backend.tail(finding.service)) if finding.result != "passed" else (),
-            notes=tuple(lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost),
+            notes=(*self.notes, *(lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)),
         )
 
     def _service_rows(self) -> list[dict[str, Any]]:

@@ -45,6 +45,13 @@ class Overrun:
 
 
 @dataclass(frozen=True)
+class Noted:
+    """A sentence of the backend's to know of the test beside its outcome."""
+
+    text: str
+
+
+@dataclass(frozen=True)
 class Unstartable:
     service: str
     why: str
@@ -73,7 +80,7 @@ class Stopped:
     reason: str
 
 
-Event = Ready | Verdict | Malformed | Overrun | Exited | Unstartable | Lost | Time | Stopped
+Event = Ready | Verdict | Malformed | Overrun | Noted | Exited | Unstartable | Lost | Time | Stopped
 
 
 class Backend(Protocol):

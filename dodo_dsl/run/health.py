@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from dodo_dsl.run import lanes, leases, projects, rigs
-from dodo_dsl.run.backends import connect
+from dodo_dsl.run.client import connect
 from dodo_dsl.run.events import BackendError
 
 State = Literal["ok", "warning", "problem"]
@@ -168,11 +168,13 @@ CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
 )
 
 
-def clean() -> list[str]:
-    """Removes what killed runs left, as the next run would; says what it removed."""
-    removed = lanes.reap()
-    with contextlib.suppress(BackendError):
+def clean() -> projects.Reaped:
+    """Removes what killed runs left, as the next run would; says what it removed, and what it could not."""
+    on_host = lanes.reap()
+    try:
         client = connect()
-        with contextlib.closing(client):
-            removed.extend(projects.reap_projects(client))
-    return removed
+    except BackendError:
+        return projects.Reaped(on_host)
+    with contextlib.closing(client):
+        reaped = projects.reap_projects(client)
+    return projects.Reaped([*on_host, *reaped.removed], reaped.left)

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
+from dodo_dsl.run.client import said
 from dodo_dsl.run.events import BackendError
 
 Say = Callable[[str], None]
@@ -85,7 +86,7 @@ class Pulls:
                     return
                 progress.take(line)
         except (DockerException, OSError) as error:
-            raise BackendError(f"image {image} cannot be pulled: {_reason(_said(error))}") from error
+            raise BackendError(f"image {image} cannot be pulled: {_reason(said(error))}") from error
 
 
 def split_reference(image: str) -> tuple[str, str]:
@@ -95,11 +96,6 @@ def split_reference(image: str) -> tuple[str, str]:
         return repository, digest
     repository, sign, tag = image.rpartition(":")
     return (repository, tag) if sign and "/" not in tag else (image, "latest")
-
-
-def _said(error: Exception) -> str:
-    """The engine's own words, without those of the client around them."""
-    return str(getattr(error, "explanation", None) or error)
 
 
 def _reason(text: str) -> str:

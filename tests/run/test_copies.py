@@ -1,0 +1,78 @@
+"""Files out of a container: streamed, whole or not there, and only plain ones with plain names."""
+
+import io
+import tarfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run.copies import copy_out
+
+
+def archive(*members: tuple[str, bytes | str]) -> bytes:
+    """A tar of files, or of links where the content is a text."""
+    target = io.BytesIO()
+    with tarfile.open(fileobj=target, mode="w") as tar:
+        for name, content in members:
+            info = tarfile.TarInfo(name)
+            if isinstance(content, str):
+                info.type, info.linkname = tarfile.SYMTYPE, content
+                tar.addfile(info)
+            else:
+                info.size = len(content)
+                tar.addfile(info, io.BytesIO(content))
+    return target.getvalue()
+
+
+class Container:
+    """What an engine sends of a container's folder, in pieces of a size; ``sent`` counts them."""
+
+    def __init__(self, data: bytes, piece: int = 1000) -> None:
+        self.pieces = [data[i : i + piece] for i in range(0, len(data), piece)]
+        self.sent = 0
+
+    def get_archive(self, _folder: str) -> tuple[Iterator[bytes], dict[str, str]]:
+        return self._stream(), {}
+
+    def _stream(self) -> Iterator[bytes]:
+        for piece in self.pieces:
+            self.sent += 1
+            yield piece
+
+
+@pytest.mark.parametrize("piece", [1, 511, 512, 100_000])
+def test_files_come_whole_in_pieces_of_any_size(tmp_path: Path, piece: int) -> None:
+    data = bytes(range(256)) * 41
+    copy_out(Container(archive(("./test.rec", data), ("empty", b"")), piece), "/dodo/report/.", tmp_path)
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == {"test.rec": data, "empty": b""}
+
+
+def test_names_that_leave_the_folder_and_links_are_passed_over(tmp_path: Path) -> None:
+    target = tmp_path / "report"
+    hostile = archive(("../above", b"x"), ("/abs/olute", b"y"), ("..", b"z"), ("link", "/etc/passwd"), ("a/../b", b"b"))
+    copy_out(Container(hostile), "/dodo/report/.", target)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["report"]
+    assert {p.name: p.read_bytes() for p in target.iterdir()} == {"above": b"x", "olute": b"y", "b": b"b"}
+
+
+def test_more_than_there_may_be_is_said_and_no_part_of_a_file_stays(tmp_path: Path) -> None:
+    """The file before the limit is there, the one at it is not, and what comes after it is never asked for."""
+    container = Container(archive(("small", b"s"), ("large", bytes(100_000)), ("late", b"l")))
+    with pytest.raises(OSError, match="they are more than 50,000 bytes"):
+        copy_out(container, "/dodo/report/.", tmp_path, most=50_000)
+    assert [p.name for p in tmp_path.iterdir()] == ["small"]
+    assert container.sent < len(container.pieces) / 2 + 20
+
+
+@pytest.mark.parametrize("damage", [b"no archive at all" * 100, archive(("test.rec", bytes(5000)))[:3000]])
+def test_damaged_streams_are_errors_of_the_system(tmp_path: Path, damage: bytes) -> None:
+    with pytest.raises(OSError, match="what the engine sends of it is damaged"):
+        copy_out(Container(damage), "/dodo/report/.", tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_room_leaves_no_part_of_a_file(small_disk: Path) -> None:
+    with pytest.raises(OSError, match="No space left on device"):
+        copy_out(Container(archive(("test.rec", bytes(200_000)))), "/dodo/report/.", small_disk)
+    assert list(small_disk.iterdir()) == []
