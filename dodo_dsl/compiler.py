@@ -1,6 +1,6 @@
 """The compiler from end to end: from paths to checked specs, and on to Plans."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -59,8 +59,21 @@ def load(paths: Sequence[Path], application: Sequence[Path] = (), start: Path | 
 
 def with_clock(checked: Checked, clock: str) -> Checked:
     """The same by another clock, with what is wrong then; hardware keeps the one that it has."""
-    specs = tuple(spec if spec.level == "hil" else replace(spec, clock=clock) for spec in checked.specs)
-    declared = checked.application.declared if checked.application else None
+    return _with(checked, (spec if spec.level == "hil" else replace(spec, clock=clock) for spec in checked.specs))
+
+
+def with_isolation(checked: Checked, isolation: str) -> Checked:
+    """The same isolated otherwise, with what is wrong then, whatever the specs write about it."""
+    return _with(checked, (_isolated(spec, isolation) for spec in checked.specs))
+
+
+def _isolated(spec: Spec, isolation: str) -> Spec:
+    return replace(spec, isolation=isolation, spans={k: v for k, v in spec.spans.items() if k != "isolation"})
+
+
+def _with(checked: Checked, changed: Iterable[Spec]) -> Checked:
+    """The same with other specs, checked once more."""
+    specs, declared = tuple(changed), checked.application.declared if checked.application else None
     known = {_key(d) for d in checked.diagnostics}
     more = [d for d in check(specs, checked.manifests, checked.deployment, declared) if _key(d) not in known]
     return replace(checked, specs=specs, diagnostics=tuple(ordered([*checked.diagnostics, *more])))

@@ -14,13 +14,14 @@ from typing import Any, TextIO, cast
 
 from dodo_dsl.cli import progress, selection, summary
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.compiler import NoApplication, plan, with_clock
+from dodo_dsl.compiler import NoApplication, plan, with_clock, with_isolation
 from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.write import PLAN_FILE, write
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan, PlanError, from_json
 from dodo_dsl.report.write import Drawable, forget, write_report
+from dodo_dsl.run import rigs
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
 from dodo_dsl.run.history import History
 from dodo_dsl.run.runner import Policy, Runner, default_backend, reap_folders, work_folder
@@ -127,6 +128,8 @@ def _prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
         folders = [options.compiled.resolve()]
         if options.clock not in (None, plans[0].clock):
             raise _Usage(f"this test is compiled for clock {plans[0].clock}; compile it again for another")
+        if options.isolation == "network" and rigs.is_real(plans[0]):
+            raise _Usage(f"rig '{plans[0].rig}' is reached through the host, not with --isolation network")
     else:
         plans, deployment = _compile(options, folder, stdout)
         folders = [folder / p.slug for p in plans]
@@ -184,7 +187,7 @@ def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
     if options.clock:
         checked = with_clock(checked, options.clock)
     if options.isolation:
-        checked = replace(checked, specs=tuple(replace(s, isolation=options.isolation) for s in checked.specs))
+        checked = with_isolation(checked, options.isolation)
     problems = checked.diagnostics
     if checked.ok:
         try:

@@ -49,7 +49,7 @@ class Backends(Protocol):
 
 
 class Processes:
-    """Local processes, each test in namespaces of its own, or on the host in a leased lane."""
+    """Local processes, each test in namespaces of its own, or on the host in a leased lane, as a real rig always is."""
 
     name = "process"
 
@@ -75,7 +75,7 @@ class Processes:
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
         plan = job.plan
-        isolation = self._isolation or plan.isolation
+        isolation = "host" if rigs.is_real(plan) else self._isolation or plan.isolation
         if isolation == "network":
             lane = Lane(plan.cid, descriptors=self._descriptors)
             yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
@@ -124,7 +124,7 @@ class Containers:
         subnets = other_subnets(plan.subnet, self._subnets)
         backend = DockerBackend(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say)
         try:
-            if plan.isolation == "network":
+            if plan.isolation == "network" and not rigs.is_real(plan):
                 yield backend
             else:
                 async with lanes.host_lane(replace_flags(plan), (plan.cid,), say):

@@ -26,4 +26,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
         yield Diagnostic(spec.span("rig"), "unknown-rig", f"there is no rig '{spec.rig}'", hint)
     elif not rig.is_emulated and spec.isolation == "network":
         message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have a network of its own"
-        yield Diagnostic(spec.span("isolation"), "rig-isolation", message, "remove 'isolation'")
+        hint = "remove 'isolation'" if "isolation" in spec.spans else "run it without --isolation"
+        yield Diagnostic(spec.span("isolation"), "rig-isolation", message, hint)

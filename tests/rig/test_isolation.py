@@ -1,0 +1,36 @@
+"""No isolation of its own leads a test on a real rig around lease, health check and quarantine."""
+
+import json
+
+import pytest
+
+from tests.drive.applications import KIWI, results
+from tests.images.conftest import engine_answers
+from tests.rig.test_rig import Place, place  # noqa: F401
+
+APPLICATION = ("--application", str(KIWI / "docker-compose.yml"))
+
+
+def test_no_isolation_leads_around_a_rigs_checks(place: Place) -> None:  # noqa: F811
+    words = ("--isolation", "network")
+    said = place.dodo("run", "hil-fake", *APPLICATION, *words, code=2)
+    assert "error[rig-isolation]: rig 'fake' is reached through the host" in said
+    assert "hint: run it without --isolation\n" in said
+    place.dodo("compile", "tests/hil-fake", *APPLICATION, "-o", "generated", code=0)
+    assert "'fake' is reached through the host" in place.dodo("run", "--compiled", "generated/hil-fake", *words, code=2)
+    assert place.rig.heard == []
+
+
+@pytest.mark.parametrize("backend", ["process", "docker"])
+def test_a_plan_with_a_network_of_its_own_is_examined_all_the_same(place: Place, backend: str) -> None:  # noqa: F811
+    if backend == "docker" and not engine_answers():
+        pytest.skip("no Docker engine answers (scripts/start-engine starts one)")
+    place.dodo("compile", "tests/hil-fake", *APPLICATION, "-o", "generated", code=0)
+    file = place.folder / "generated" / "hil-fake" / "test.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "isolation": "network"}))
+    place.rig.unplug()
+    place.dodo("run", "--compiled", str(file.parent), "--backend", backend, code=3)
+    (test,) = results(place.folder / "dodo-report").values()
+    assert "rig fake is in quarantine: " in test["reason"]
+    assert list((place.folder / "state").glob("*")) != []
+    assert list((place.folder / "leases").glob("*.json")) == []
