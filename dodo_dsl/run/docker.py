@@ -73,11 +73,19 @@ class DockerBackend:
         self._config = json.loads(out)["services"]
         await self._provide_images()
         await self._create()
-        self._containers = await asyncio.to_thread(self._find_containers)
-        self._events = await asyncio.to_thread(self._client.events, decode=True, filters=self._filters())
-        threading.Thread(target=self._watch, daemon=True).start()
-        if SANDBOX in self._containers:
-            await asyncio.to_thread(self._containers[SANDBOX].start)
+        await self._begin_to_watch()
+
+    async def _begin_to_watch(self) -> None:
+        from docker.errors import DockerException
+
+        try:
+            self._containers = await asyncio.to_thread(self._find_containers)
+            self._events = await asyncio.to_thread(self._client.events, decode=True, filters=self._filters())
+            threading.Thread(target=self._watch, daemon=True).start()
+            if SANDBOX in self._containers:
+                await asyncio.to_thread(self._containers[SANDBOX].start)
+        except (DockerException, OSError) as error:
+            raise BackendError(f"the Docker engine cannot start the test: {said(error)}") from error
 
     def _filters(self) -> dict[str, Any]:
         return {"label": f"{PROJECT_LABEL}={self.project}"}
@@ -227,7 +235,7 @@ class DockerBackend:
         container, output = self._containers[name], self._outputs[name]
         try:
             await asyncio.to_thread(container.start)
-        except DockerException as error:
+        except (DockerException, OSError) as error:
             output.release_writer()
             why = said(error)
             self._queue.put_nowait(Unstartable(name, why))

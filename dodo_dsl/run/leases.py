@@ -53,12 +53,11 @@ class Lease:
 
     def release(self) -> None:
         """Gives up this process's hold and the record; the lock file goes too where its name never comes again."""
-        try:
+        with contextlib.suppress(OSError):  # what cannot be removed is the next run's to remove
             self.record.unlink(missing_ok=True)
             if self.name.startswith(ONCE):
                 _lock_file(self.name).unlink(missing_ok=True)
-        finally:
-            os.close(self.descriptor)
+        os.close(self.descriptor)
 
     def leave(self) -> None:
         """Gives up this process's hold and leaves record and lock to those who inherited it."""

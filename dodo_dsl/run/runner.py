@@ -6,6 +6,7 @@ import shutil
 import signal
 import tempfile
 import time
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from dodo_dsl.run.schedule import Places, Schedule
 
 BackendName = Literal["process", "docker"]
 FOLDER_PREFIX = "dodo-run-"
+LOG = "logs/runner.log"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -145,6 +147,8 @@ class Runner:
                 outcome = await self._tried(job)
         except asyncio.CancelledError:
             outcome = self._without_answer(job.plan, "the run was interrupted before this test began")
+        except Exception as error:  # noqa: BLE001  (no job takes the results of the others with it)
+            outcome = self._without_answer(job.plan, _reason(job, error))
         self._began.pop(job.plan.slug, None)
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
@@ -165,8 +169,12 @@ class Runner:
             if outcome.outcome != "error" or self.interrupted or attempt > self.policy.retries:
                 break
             notes = (*notes, f"attempt {attempt} ended in error: {outcome.reason}")
+            try:
+                set_aside(job.report, attempt)
+            except OSError as error:
+                notes = (*notes, f"not tried again, as its report cannot be set aside: {_without_number(error)}")
+                break
             self.progress.phase(job.plan.slug, f"error, once more: {outcome.reason}")
-            set_aside(job.report, attempt)
         return replace(outcome, notes=(*notes, *outcome.notes))
 
     async def _attempt(self, job: Job) -> Outcome:
@@ -175,14 +183,15 @@ class Runner:
         def say(text: str) -> None:
             self.progress.phase(slug, text)
 
+        outcome = None
         try:
             async with self.backends.open(job, say, self.keep) as backend:
                 outcome, kept = await Engine(job.plan, backend, say).run(self.keep)
                 self.kept.extend(kept)
-        except BackendError as error:
-            return self._without_answer(job.plan, str(error))
-        except OSError as error:
-            return self._without_answer(job.plan, f"this machine cannot run the test: {_without_number(error)}")
+        except Exception as error:  # noqa: BLE001  (whatever it was, it is about this test alone)
+            if outcome is None:
+                return self._without_answer(job.plan, _reason(job, error))
+            return replace(outcome, notes=(*outcome.notes, f"not all of the test was taken down: {_cause(job, error)}"))
         return outcome
 
     def _without_answer(self, plan: Plan, reason: str) -> Outcome:
@@ -200,6 +209,29 @@ class Runner:
             clock=plan.clock,
             backend=self.backends.name,
         )
+
+
+def _reason(job: Job, error: Exception) -> str:
+    """Why a test has no answer, in a sentence."""
+    why = _cause(job, error)
+    return f"this machine cannot run the test: {why}" if isinstance(error, OSError) else why
+
+
+def _cause(job: Job, error: Exception) -> str:
+    """What an error says; where a fault of DoDo's lies stands in a log beside the test's own."""
+    if isinstance(error, BackendError):
+        return str(error)
+    if isinstance(error, OSError):
+        return _without_number(error)
+    log = job.report / LOG
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("a", encoding="utf-8", errors="replace") as file:
+            traceback.print_exception(error, file=file)
+        more = f" ({LOG} has more)"
+    except OSError:
+        more = ""
+    return f"a fault of DoDo itself: {type(error).__name__}: {error}{more}"
 
 
 def _without_number(error: OSError) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, Service
-from dodo_dsl.run.backends import Job, Processes
+from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 
@@ -112,8 +112,10 @@ class Bench:
         (self.folder / "compiled").mkdir(exist_ok=True)
         return [Job(plan, self.folder / "compiled", self.folder / "report" / plan.slug) for plan in plans]
 
-    def run(self, *plans: Plan, parallel: int = 4, policy: Policy | None = None) -> list[Outcome]:
-        backends = Processes(CIDS, self.isolation, ())
+    def run(
+        self, *plans: Plan, parallel: int = 4, policy: Policy | None = None, backends: Backends | None = None
+    ) -> list[Outcome]:
+        backends = backends or Processes(CIDS, self.isolation, ())
         self.runner = Runner(self.progress, backends, schedule(parallel, self.expected), policy or Policy())
         return asyncio.run(self.runner.run(self.jobs(*plans)))
 
