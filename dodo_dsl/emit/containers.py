@@ -1,22 +1,28 @@
 """A planned service as a container sees it: command, volumes and what it waits for."""
 
+import math
 from dataclasses import dataclass
 
-from dodo_dsl.plan.model import Flag, Plan, Service
+from dodo_dsl.plan.model import READY_S, Flag, Plan, Service
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
+_TRIES_A_SECOND = 2
 
 
 @dataclass(frozen=True)
 class Container:
-    """What the layer template needs of a service; ``after`` holds names with compose's condition."""
+    """What the layer template needs of a service; ``after`` holds names with compose's condition.
+
+    ``ready_tries`` says how often its ready file is looked for, twice a second.
+    """
 
     name: str
     image: str
     command: tuple[str, ...]
     volumes: tuple[str, ...]
     ready_file: str
+    ready_tries: int
     after: tuple[tuple[str, str], ...]
     environment: tuple[tuple[str, str], ...]
     devices: tuple[str, ...]
@@ -35,6 +41,7 @@ def containers(plan: Plan, layer: str) -> list[Container]:
             tuple(_word(flag) for flag in service.flags),
             _volumes(plan, service),
             f"/tmp/dodo-ready-{service.name}",
+            math.ceil(_TRIES_A_SECOND * (READY_S + service.setup_s)),
             tuple(after),
             _environment(plan, service),
             service.devices,

@@ -75,7 +75,7 @@ def _job(plan: Plan, gate: bool, folder: str) -> Job:
         tag=plan.tag,
         gated=gate and plan.level == "hil",
         rig=rig if real else "",
-        minutes=math.ceil(plan.timeout_s / 60) + _SPARE_MINUTES,
+        minutes=math.ceil((plan.timeout_s + sum(s.setup_s for s in plan.services)) / 60) + _SPARE_MINUTES,
         interruptible=not real,
         script=f"dodo run --compiled {shlex.quote(f'{folder}/{plan.slug}')} --report dodo-report $DODO_RUN_OPTIONS",
     )

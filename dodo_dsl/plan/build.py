@@ -198,6 +198,7 @@ class _Builder:
             tuple(flags),
             judge=use.layer == "evaluation",
             devices=self._devices(use, manifest),
+            setup_s=_setup_s(flags, manifest),
         )
         return hardware(service, self.manifests, self._image(self.manifests[DRAWN].image))
 
@@ -227,3 +228,9 @@ class _Builder:
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         return Flag(parameter.name, path.relative_to(root).as_posix(), "path")
+
+
+def _setup_s(flags: Sequence[Flag], manifest: Manifest) -> float:
+    """How much longer than others a service may take to get ready, by the durations that its manifest marks."""
+    times = {name: parameter.setup_times for name, parameter in manifest.parameters.items()}
+    return sum((times[flag.name] * float(flag.value) for flag in flags if times.get(flag.name)), 0.0)

@@ -12,6 +12,8 @@ FORMAT = 1
 _SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
+READY_S = 60.0
+"""How long every service may take to get ready."""
 LAYERS = ("environment", "action", "evaluation", "application")
 
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
@@ -30,7 +32,8 @@ class Flag:
 class Service:
     """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts.
 
-    ``devices`` are device files of the machine that it needs.
+    ``devices`` are device files of the machine that it needs, ``setup_s`` the seconds that it may take to get ready
+    beyond those that every service has.
     """
 
     layer: str
@@ -41,6 +44,7 @@ class Service:
     flags: tuple[Flag, ...] = ()
     judge: bool = False
     devices: tuple[str, ...] = ()
+    setup_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -183,6 +187,7 @@ def _problem(plan: Plan) -> str:
         "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "a service's layer": all(s.layer in LAYERS for s in plan.services),
         "a flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
+        "a set-up": all(isinstance(s.setup_s, int | float) and 0 <= s.setup_s <= 86_400 for s in plan.services),
         "a device": all(is_device(d) for s in plan.services for d in s.devices),
         "a word": all(isinstance(w, str) for s in services for w in s.process or ())
         and all(isinstance(w, str) for s in plan.application.services for w in s.command),

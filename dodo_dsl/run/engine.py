@@ -9,7 +9,7 @@ from typing import Any
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.lockstep import CLOCK
-from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run.events import (
     Backend,
     BackendError,
@@ -28,7 +28,7 @@ from dodo_dsl.run.events import (
 from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended, lost_messages
 
 ORDER = ("environment", "action", "evaluation", "application")
-READY_PATIENCE_S = 60.0
+READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
 BEGIN_PATIENCE_S = 2.0
 
@@ -110,12 +110,14 @@ class Engine:
 
     async def _until_ready(self, waits: set[str]) -> None:
         """Waits for those that say when they are ready; the others are when they run."""
-        deadline = time.monotonic() + READY_PATIENCE_S
-        while waits - self.ready:
-            event = await self._next(deadline)
+        begin = time.monotonic()
+        patience = dict.fromkeys(waits, READY_PATIENCE_S)
+        patience |= {s.name: READY_PATIENCE_S + s.setup_s for s in self.plan.services if s.name in waits}
+        while left := waits - self.ready:
+            late = min(left, key=lambda name: (patience[name], name))
+            event = await self._next(begin + patience[late])
             if event is None:
-                late = min(waits - self.ready)
-                self._end("error", f"service '{late}' was not ready within {READY_PATIENCE_S:g} s", late)
+                self._end("error", f"service '{late}' was not ready within {patience[late]:g} s", late)
             else:
                 self._take(event)
 

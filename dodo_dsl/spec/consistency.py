@@ -57,8 +57,9 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
             yield _misplaced(node, key, f"'{key}' is for numbers, but '{name}' is of type {kind}")
     if "choices" in raw and kind not in ("string", "list"):
         yield _misplaced(node, "choices", f"'choices' are for strings and lists, but '{name}' is of type {kind}")
-    if raw.get("within-timeout") and raw.get("unit") != "s":
-        yield _misplaced(node, "within-timeout", f"'{name}' is no duration", "give it 'unit: s'")
+    for key in ("within-timeout", "setup-times"):
+        if raw.get(key) and raw.get("unit") != "s":
+            yield _misplaced(node, key, f"'{name}' is no duration", "give it 'unit: s'")
     if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
         yield _misplaced(node, "minimum", f"the minimum of '{name}' is larger than its maximum")
     source = str(raw.get("among", "")).partition(".")[0]

@@ -19,7 +19,8 @@ class Parameter:
 
     ``rig`` is the dotted key of what the test's rig gives when nothing is written; ``among`` names the parameter and
     the list of a JSON file (``map-path.obstacles``) whose entries' names are the values that can stand here;
-    ``within_timeout`` marks a duration that the test's timeout must leave room for.
+    ``within_timeout`` marks a duration that the test's timeout must leave room for; one with ``setup_times`` may pass
+    so often before the service is ready.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Parameter:
     rig: str = ""
     among: str = ""
     within_timeout: bool = False
+    setup_times: int = 0
     example: Value = None
 
 
@@ -84,8 +86,9 @@ def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
         name: Parameter(
             name,
             within_timeout=p.get("within-timeout", False),
+            setup_times=p.get("setup-times", 0),
             choices=tuple(p.get("choices", ())),
-            **{k: v for k, v in p.items() if k not in ("within-timeout", "choices")},
+            **{k: v for k, v in p.items() if k not in ("within-timeout", "setup-times", "choices")},
         )
         for name, p in (raw.get("parameters") or {}).items()
     }

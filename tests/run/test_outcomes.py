@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
+from dodo_dsl.run import engine
 from dodo_dsl.run.lanes import namespaces_refusal
 from tests.run.helpers import FAIL, PASS, READY, WAIT, Bench
 
@@ -141,3 +142,16 @@ def test_set_up_and_execution_are_measured_apart(bench: Bench) -> None:
     assert outcome.execution_s is not None
     assert outcome.setup_s >= 0.5
     assert outcome.execution_s > 0.3
+
+
+def test_a_service_that_may_take_longer_to_get_ready_is_waited_for(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two that need two seconds, with one for all services: one of them has more by its manifest."""
+    monkeypatch.setattr(engine, "READY_PATIENCE_S", 1.0)
+    slow = bench.plan(environment="time.sleep(2)\n" + READY + WAIT, slug="slow")
+    camera, judge = slow.services
+    patient = replace(slow, name="patient", slug="patient", services=(replace(camera, setup_s=30.0), judge))
+    outcomes = bench.run(slow, patient)
+    assert [o.outcome for o in outcomes] == ["error", "passed"]
+    assert outcomes[0].reason == "service 'camera' was not ready within 1 s"
