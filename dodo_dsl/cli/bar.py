@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
+from dodo_dsl.diagnostics import printable
+
 
 @contextmanager
 def bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[int], None]]:
@@ -12,8 +14,9 @@ def bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[int], None]
         yield lambda _: None
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress, TextColumn
 
-    with Progress(console=Console(file=stream), transient=True) as progress:
-        task = progress.add_task(text, total=total)
+    columns = (TextColumn("{task.description}", markup=False), *Progress.get_default_columns()[1:])
+    with Progress(*columns, console=Console(file=stream), transient=True) as progress:
+        task = progress.add_task(printable(text), total=total)
         yield lambda done: progress.update(task, completed=done)

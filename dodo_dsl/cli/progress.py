@@ -33,7 +33,7 @@ class PlainProgress:
         self.stream.flush()
 
     def note(self, text: str) -> None:
-        self.stream.write(f"{text}\n")
+        self.stream.write(f"{printable(text)}\n")
         self.stream.flush()
 
     def phase(self, slug: str, text: str) -> None:
@@ -47,16 +47,20 @@ class PlainProgress:
 
 
 class LiveProgress:
-    """A line a test that moves while it runs."""
+    """A line a test that moves while it runs. What others said is never read as markup, of which rich has its own."""
 
     def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
         from rich.console import Console
         from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[state]}"))
-        self._progress: Any = Progress(*columns, TimeElapsedColumn(), console=Console(file=stream))
+        fields = ("description", "fields[outcome]", "fields[state]")
+        columns = [TextColumn(f"{{task.{name}}}", markup=name == "fields[outcome]") for name in fields]
+        self._progress: Any = Progress(SpinnerColumn(), *columns, TimeElapsedColumn(), console=Console(file=stream))
         self._rest: Any = None
-        self._tasks = {s: self._progress.add_task(s, total=None, start=False, state="waiting") for s in slugs}
+        self._tasks = {s: self._add(s, "waiting") for s in slugs}
+
+    def _add(self, description: str, state: str) -> Any:
+        return self._progress.add_task(description, total=None, start=not description, outcome="", state=state)
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -66,19 +70,20 @@ class LiveProgress:
         self._progress.stop()
 
     def note(self, text: str) -> None:
-        self._progress.console.print(text, markup=False)
+        self._progress.console.print(printable(text), markup=False, emoji=False)
 
     def phase(self, slug: str, text: str) -> None:
         self._progress.start_task(self._tasks[slug])
-        self._progress.update(self._tasks[slug], state=text)
+        self._progress.update(self._tasks[slug], state=printable(text))
 
     def done(self, outcome: Outcome) -> None:
         style = _STYLES[outcome.outcome]
-        self._progress.update(self._tasks[outcome.slug], state=f"[{style}]{outcome.outcome}[/]", total=1, completed=1)
+        said = f"[{style}]{outcome.outcome}[/]"
+        self._progress.update(self._tasks[outcome.slug], outcome=said, state="", total=1, completed=1)
 
     def rest(self, seconds: float, tests: int) -> None:
         if self._rest is None:
-            self._rest = self._progress.add_task("", total=None)
+            self._rest = self._add("", "")
         self._progress.update(self._rest, state=f"{count(tests)} to go, {about(seconds)}")
 
 
