@@ -15,7 +15,7 @@ from typing import Any, TextIO, cast
 from dodo_dsl.cli import progress, selection, summary
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import NoApplication, plan, with_clock, with_isolation
-from dodo_dsl.diagnostics import format_text, has_errors, ordered
+from dodo_dsl.diagnostics import format_text, has_errors, ordered, printable
 from dodo_dsl.emit.write import PLAN_FILE, write
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
@@ -271,9 +271,11 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> t
         problems, unwritten = [], ""
         try:
             problems = write_report(report, outcomes, drawables, times)
-        except OSError as error:
-            unwritten = f"'{report}' cannot take the whole report: {error.strerror or error}"
-    stdout.writelines(f"{problem}\n" for problem in problems)
+        except Exception as error:  # noqa: BLE001  (the outcomes are told all the same)
+            why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
+            unwritten = f"'{report}' cannot take the whole report: {why}"
+        history.save()
+    stdout.writelines(f"{printable(problem)}\n" for problem in problems)
     summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
     stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}\n")
     return outcomes, not unwritten

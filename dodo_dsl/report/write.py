@@ -63,6 +63,7 @@ def write_report(
 
     ``times`` are those of all runs of these tests on this machine; they are drawn as well.
     """
+    outcomes = [results.writable(outcome) for outcome in outcomes]
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     problems = []
@@ -74,7 +75,10 @@ def write_report(
                 problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
     (folder / TIMES).unlink(missing_ok=True)
     if times:
-        replace_file(folder / TIMES, lambda path: draw_times(times, platform.node() or "this machine", path))
+        try:
+            replace_file(folder / TIMES, lambda path: draw_times(times, platform.node() or "this machine", path))
+        except Exception as error:  # noqa: BLE001  (as above)
+            problems.append(f"the times of these tests cannot be drawn: {error}")
     write_summaries(folder, outcomes)
     return problems
 

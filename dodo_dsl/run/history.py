@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import os
 import statistics
 import time
@@ -31,9 +32,14 @@ class Run:
 
 
 def default_path() -> Path:
-    """``DODO_HISTORY``, else a file of this user's state (XDG base directories)."""
-    state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
-    return Path(os.environ.get("DODO_HISTORY") or Path(state).expanduser() / "dodo" / "history.jsonl")
+    """``DODO_HISTORY``, else a file of this user's state (XDG base directories); none for a user without a home."""
+    if named := os.environ.get("DODO_HISTORY"):
+        return Path(named)
+    try:
+        state = Path(os.environ.get("XDG_STATE_HOME") or "~/.local/state").expanduser()
+    except RuntimeError:
+        return Path(os.devnull)
+    return state / "dodo" / "history.jsonl"
 
 
 class History:
@@ -42,6 +48,7 @@ class History:
     def __init__(self, path: Path | None = None) -> None:
         self.path = path or default_path()
         self.runs = list(_read(self.path))
+        self._saved = len(self.runs)
 
     def seconds(self, spec: str, test: str, backend: str, clock: str) -> float | None:
         """What the test took lately, from the begin of its set-up to its end; None when it never ran."""
@@ -60,14 +67,17 @@ class History:
         return found
 
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
-        """Keep outcomes beside the name of their test; those that ended in error tell nothing about its time."""
-        new = [
+        """Remember outcomes beside the name of their test; those that ended in error tell nothing about its time."""
+        self.runs += [
             Run(int(time.time()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s)
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
         ]
-        self.runs += new
-        text = "".join(json.dumps(asdict(run)) + "\n" for run in new)
+
+    def save(self) -> None:
+        """Add to the file what was remembered since it was read."""
+        text = "".join(json.dumps(asdict(run)) + "\n" for run in self.runs[self._saved :])
+        self._saved = len(self.runs)
         with contextlib.suppress(OSError):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if self.path.is_file() and self.path.stat().st_size > _MOST_BYTES:
@@ -76,7 +86,7 @@ class History:
                 file.write(text)
 
     def _shorten(self) -> None:
-        lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
+        lines = self.path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
         part = self.path.with_suffix(f".{os.getpid()}.part")
         part.write_text("".join(lines[len(lines) // 2 :]), encoding="utf-8")
         part.replace(self.path)
@@ -89,7 +99,9 @@ def _read(path: Path) -> Iterator[Run]:
     except OSError:
         return
     for line in text.splitlines():
-        with contextlib.suppress(ValueError, TypeError):
+        with contextlib.suppress(ValueError, TypeError, RecursionError):
             run = Run(**json.loads(line))
-            if run.setup_s >= 0 and run.execution_s >= 0:
+            texts = (run.spec, run.test, run.level, run.backend, run.clock, run.outcome)
+            times = (run.setup_s, run.execution_s)
+            if all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):
                 yield run

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -129,7 +130,10 @@ def test_a_place_is_free_again_after_an_interrupt() -> None:
 def test_history_is_kept_and_survives_damage(bench: Bench, tmp_path: Path) -> None:
     path = tmp_path / "state" / "history.jsonl"
     outcomes = bench.run(bench.plan(slug="a"), bench.plan(slug="b", judge=BROKEN))
-    History(path).add([(o.slug, o) for o in outcomes])
+    added = History(path)
+    added.add([(o.slug, o) for o in outcomes])
+    assert not path.exists()
+    added.save()
     with path.open("a") as file:
         file.write('{"when": 1, "spec"')
     history = History(path)
@@ -142,4 +146,40 @@ def test_history_is_kept_and_survives_damage(bench: Bench, tmp_path: Path) -> No
 
 def test_no_place_for_history_is_no_problem(tmp_path: Path, bench: Bench) -> None:
     (tmp_path / "file").touch()
-    History(tmp_path / "file" / "history.jsonl").add([(o.slug, o) for o in bench.run(bench.plan())])
+    history = History(tmp_path / "file" / "history.jsonl")
+    history.add([(o.slug, o) for o in bench.run(bench.plan())])
+    history.save()
+    assert len(history.runs) == 1
+
+
+LINE = {
+    "when": 1, "spec": "s", "test": "t", "level": "sil", "backend": "process", "clock": "realtime",
+    "outcome": "passed", "setup_s": 1.0, "execution_s": 2.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", [{"spec": ["s"]}, {"setup_s": math.inf}, {"setup_s": math.nan}, {"execution_s": -1}])
+def test_lines_of_history_that_no_run_wrote_are_left_out(tmp_path: Path, change: dict[str, object]) -> None:
+    path = tmp_path / "history.jsonl"
+    path.write_text("".join(f"{line}\n" for line in (json.dumps(LINE), json.dumps({**LINE, **change}), "[" * 100_000)))
+    history = History(path)
+    assert history.times([("s", "t")], "process") == {"t": [(1.0, 2.0)]}
+
+
+def test_a_long_history_with_bytes_that_are_no_text_is_shortened(bench: Bench, tmp_path: Path) -> None:
+    path = tmp_path / "history.jsonl"
+    path.write_bytes((json.dumps(LINE).encode() + b"\n") * 30_000 + b"\xff\xfe\n")
+    history = History(path)
+    history.add([(o.slug, o) for o in bench.run(bench.plan(slug="t"))])
+    history.save()
+    assert 15_000 < len(path.read_bytes().splitlines()) < 15_010
+    assert len(History(path).runs) > 15_000
+
+
+def test_a_user_without_a_home_has_no_history(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "DODO_HISTORY", "XDG_STATE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
+    history = History()
+    history.save()
+    assert history.runs == []
