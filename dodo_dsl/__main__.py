@@ -1,5 +1,6 @@
 """``python -m dodo_dsl`` and ``dodo``: the process exit, and nothing else."""
 
+import io
 import sys
 
 
@@ -7,6 +8,8 @@ def run() -> None:
     try:
         from dodo_dsl.cli.main import main
 
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(errors="replace")  # a terminal without a letter costs no test its verdict
         code = main(sys.argv[1:], sys.stdout, sys.stderr)
     except KeyboardInterrupt:
         code = 130

@@ -27,8 +27,8 @@ def write(path: Path, outcomes: Sequence[Outcome], attachments: dict[str, str]) 
 def _case(outcome: Outcome, attachment: str | None) -> Any:
     from junitparser import Error, Failure, TestCase
 
-    case = TestCase(outcome.name, classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
-    case._elem.set("file", outcome.spec)
+    case = TestCase(_xml_text(outcome.name), classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
+    case._elem.set("file", _xml_text(outcome.spec))
     if outcome.outcome != "passed":
         kind = Failure if outcome.outcome == "failed" else Error
         result = kind(_xml_text(outcome.reason), outcome.outcome)

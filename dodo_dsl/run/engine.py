@@ -81,16 +81,17 @@ class Engine:
         return self._outcome(), kept
 
     async def _closed(self, keep: bool) -> list[str]:
-        """Teardown to its end, however often the run is interrupted meanwhile."""
+        """Teardown to its end, however often the run is interrupted meanwhile; its faults are no verdict."""
         closing = asyncio.ensure_future(self.backend.close(keep))
         while not closing.done():
             try:
-                await asyncio.shield(closing)
+                await asyncio.wait([closing])
             except asyncio.CancelledError:
-                if closing.cancelled():
-                    raise
                 asyncio.current_task().uncancel()  # type: ignore[union-attr]
-        return closing.result()
+        if (error := closing.exception()) is None:
+            return closing.result()
+        self.notes.append(f"not all of the test was taken down: {type(error).__name__}: {error}")
+        return []
 
     async def _hear_losses(self) -> None:
         """What was said of losses while services ended; what else they said then no longer counts."""

@@ -7,6 +7,7 @@ import socket
 import struct
 import subprocess
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ State = Literal["ok", "warning", "problem"]
 _PORT = 12175
 _RECEIVE_BUFFER = 26_214_400
 _COMPOSE = (2, 20)
+_HEARD_S = 1.0
 _FREE_BYTES = 2 << 30
 _SEGMENTS = 64
 _SEGMENT_BYTES = 64 << 20
@@ -38,7 +40,16 @@ class Finding:
 
 def examine() -> list[Finding]:
     """All findings, in the order in which a run would need things."""
-    return [finding for check in CHECKS for finding in check()]
+    return [finding for check in CHECKS for finding in _looked(check)]
+
+
+def _looked(check: Callable[[], Iterator[Finding]]) -> Iterator[Finding]:
+    """What a check finds; one that cannot be made is a finding, too."""
+    try:
+        yield from check()
+    except Exception as error:  # noqa: BLE001  (a machine that lacks something is what this command is for)
+        name = check.__name__.strip("_").replace("_", " ")
+        yield Finding(name, "problem", f"cannot be looked at: {error}")
 
 
 def _namespaces() -> Iterator[Finding]:
@@ -59,11 +70,13 @@ def _multicast() -> Iterator[Finding]:
             receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             receiver.bind((group, _PORT))
             receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-            receiver.settimeout(1.0)
+            receiver.settimeout(_HEARD_S)
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
                 sender.sendto(mark, (group, _PORT))
+            deadline = time.monotonic() + _HEARD_S
             while receiver.recv(65_535) != mark:
-                pass
+                if time.monotonic() > deadline:
+                    raise TimeoutError("only others are heard")
     except OSError as error:
         advice = "sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo"
         yield Finding("multicast", "problem", f"the host carries none ({error}); isolation: host needs it", advice)

@@ -2,12 +2,14 @@
 
 import asyncio
 import contextlib
+import errno
 import json
 import os
 import select
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,12 +137,16 @@ class ProcessBackend:
 
     @staticmethod
     def _send_patiently(channel: socket.socket, data: bytes, descriptors: tuple[int, ...]) -> None:
-        """Sends one message; a sandbox that is busy starting processes is waited for."""
+        """Sends one message; a sandbox that is busy starting processes is waited for, one that hangs is not."""
+        deadline = time.monotonic() + _CLOSE_S
         while True:
             try:
                 socket.send_fds(channel, [data], list(descriptors))
             except BlockingIOError:
-                select.select([], [channel], [], _CLOSE_S)
+                left = deadline - time.monotonic()
+                if left <= 0:
+                    raise OSError(errno.ETIMEDOUT, f"it has read nothing for {_CLOSE_S:g} s") from None
+                select.select([], [channel], [], left)
             else:
                 return
 

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import heapq
+import math
 import os
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
@@ -35,7 +36,7 @@ def _pixels_a_second(plan: Plan) -> list[float]:
         flags = {flag.name: flag.value for flag in service.flags}
         with contextlib.suppress(KeyError, ValueError):
             rates.append(float(flags["width"]) * float(flags["height"]) * float(flags["freq"]))
-    return rates
+    return [rate for rate in rates if math.isfinite(rate)]
 
 
 def schedule(jobs: int | None, expected: Callable[[Job], float]) -> "Schedule":

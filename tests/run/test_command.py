@@ -48,6 +48,14 @@ def test_fails_with_exit_code_1_and_a_junit_failure(desk: Desk) -> None:
     assert "hit wall left" in (desk.folder / "report" / "index.html").read_text()
 
 
+def test_letters_that_the_terminal_lacks_cost_no_verdict(desk: Desk) -> None:
+    desk.environment["PYTHONIOENCODING"] = "ascii"
+    process = desk.start(desk.bench.plan(judge=READY + PASS.replace("it drove", "it turned 5\\\\u00b0 and")))
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, out
+    assert "PASSED  test  it turned 5? and" in out
+
+
 def test_losses_of_messages_are_noted_below_the_test(desk: Desk) -> None:
     lost = 'print(\'{"dodo": "lost", "messages": 5}\', flush=True)\n'
     process = desk.start(desk.bench.plan(judge=READY + lost + "time.sleep(0.3)\n" + PASS))

@@ -62,6 +62,22 @@ class Leaky(Processes):
         raise self.error
 
 
+class Stuck(Leaky):
+    """Backends that cannot be closed for a reason, though they are."""
+
+    @contextlib.asynccontextmanager
+    async def open(self, job: Job, say: Callable[[str], None], keep: bool) -> AsyncIterator[Backend]:
+        async with Processes.open(self, job, say, keep) as backend:
+            close = backend.close
+
+            async def breaks(keep: bool) -> list[str]:
+                await close(keep)
+                raise self.error
+
+            backend.close = breaks  # type: ignore[method-assign]
+            yield backend
+
+
 @pytest.mark.parametrize(
     ("error", "note"),
     [
@@ -74,3 +90,9 @@ def test_a_verdict_outlives_what_breaks_after_it(bench: Bench, error: Exception,
     (outcome,) = bench.run(bench.plan(), backends=Leaky(error))
     assert (outcome.outcome, outcome.reason) == ("passed", "it drove")
     assert [text[: len(note)] for text in outcome.notes] == [note]
+
+
+def test_a_verdict_outlives_a_backend_that_cannot_be_closed(bench: Bench) -> None:
+    (outcome,) = bench.run(bench.plan(), backends=Stuck(ValueError("odd")))
+    assert (outcome.outcome, outcome.reason) == ("passed", "it drove")
+    assert outcome.notes == ("not all of the test was taken down: ValueError: odd",)

@@ -70,6 +70,8 @@ def test_larger_pictures_need_more_cores(bench: Bench) -> None:
     large = replace(plan, services=(camera(width="1280", height="720", freq="30"),))
     assert cores_needed(plan) < cores_needed(small) < 0.5 < 1 < cores_needed(large)
     assert cores_needed(replace(small, clock="lockstep")) == 1.0
+    endless = replace(plan, services=(camera(width="nan", height="240", freq="inf"),))
+    assert cores_needed(endless) == cores_needed(plan)
 
 
 @given(
