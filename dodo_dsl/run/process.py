@@ -10,45 +10,20 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import data
-from dodo_dsl.plan.argv import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
-from dodo_dsl.plan.model import ApplicationService, Flag, Plan, Service
+from dodo_dsl.plan.model import ApplicationService, Plan, Service
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
-from dodo_dsl.run.environment import MissingVariable, base_environment, dotenv, interpolate
+from dodo_dsl.run.commands import Command, Commands, Lane, changes, package_path
+from dodo_dsl.run.environment import MissingVariable
 from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Unstartable
 from dodo_dsl.run.output import Output
 
+__all__ = ["Lane", "ProcessBackend", "package_path"]
+
 _CLOSE_S = 10.0
-OWN_VARIABLES = ("PYTHONPATH", "DODO_LANE")
-"""What the sandbox has otherwise than the runner, so it is always said."""
-
-
-@dataclass(frozen=True)
-class Lane:
-    """What keeps tests apart: a CID, a name, a prefix of shared memory, and the descriptors of the leases."""
-
-    cid: int
-    name: str = ""
-    memory_prefix: str = ""
-    descriptors: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Command:
-    """A process to start."""
-
-    name: str
-    layer: str
-    argv: tuple[str, ...]
-    environment: Mapping[str, str]
-    folder: Path
-    judge: bool = False
 
 
 class ProcessBackend:
@@ -58,10 +33,10 @@ class ProcessBackend:
 
     def __init__(self, plan: Plan, folder: Path, report: Path, isolation: str, lane: Lane) -> None:
         self.plan = plan
-        self.folder = folder
         self.report = report
         self.isolation = isolation
         self.lane = lane
+        self._commands = Commands(plan, folder, report, lane)
         self.cid = lane.cid
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._outputs: dict[str, Output] = {}
@@ -154,7 +129,7 @@ class ProcessBackend:
         commands = []
         for service in self._services(layer):
             try:
-                commands.append(self._command(service))
+                commands.append(self._commands.of(service))
             except MissingVariable as error:
                 self._events.put_nowait(Unstartable(service.name, str(error)))
         for command in commands:
@@ -178,52 +153,6 @@ class ProcessBackend:
         order = {"do": "start", "id": command.name, "argv": command.argv, "cwd": str(command.folder)}
         self._send({**order, "env": changes(os.environ, command.environment)}, (output.writer,))
         output.release_writer()
-
-    def _command(self, service: Service | ApplicationService) -> Command:
-        if isinstance(service, Service):
-            return self._own_command(service)
-        return self._application_command(service)
-
-    def _own_command(self, service: Service) -> Command:
-        environment = {
-            **base_environment(),
-            "PYTHONPATH": package_path(),
-            "DODO_SERVICE": service.name,
-            "DODO_READY_FILE": ready_file(self.lane.name, service.name),
-            "DODO_LANE": self.lane.name,
-            "DODO_ODVD": os.pathsep.join(str(self.folder / "files" / path) for path in self.plan.messages),
-            **self.plan.clock_variables,
-        }
-        words = (*service.process, *(self._flag(flag) for flag in service.flags))
-        return Command(service.name, service.layer, words, environment, self.folder, service.judge)
-
-    def _flag(self, flag: Flag) -> str:
-        values: dict[str, Callable[[], str]] = {
-            "path": lambda: str(self.folder / "files" / flag.value),
-            "report": lambda: str(self.report / flag.value),
-            "memory": lambda: memory_name(flag.value, self.lane.memory_prefix),
-            "memories": lambda: ",".join(memory_name(m, self.lane.memory_prefix) for m in flag.value.split(",")),
-        }
-        value = values.get(flag.kind, lambda: flag.value)()
-        return f"--{flag.name}={self.lane.cid if flag.name == 'cid' else value}"
-
-    def _application_command(self, service: ApplicationService) -> Command:
-        folder = (self.folder / self.plan.application.folder).resolve()
-        inherited = base_environment()
-        told = {name: str(self.lane.cid) for name in CID_VARIABLES}
-        variables = {**dotenv(folder / ".env", inherited), **inherited}
-        variables.update({name: cid for name, cid in told.items() if name in self.plan.application.variables})
-        own: dict[str, str] = {}
-        for path in service.env_files:
-            own.update(dotenv(folder / Path(interpolate(path, variables)).expanduser(), variables))
-        for name, value in service.environment.items():
-            own[name] = variables.get(name, "") if value is None else interpolate(value, variables)
-        own = {name: told.get(name, with_cid_text(value, self.lane.cid)) for name, value in own.items()}
-        told_words = ((word, interpolate(word, variables)) for word in service.command)
-        words = tuple(value for word, value in told_words if value or not word.startswith("$"))
-        argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.lane.cid), self.lane.memory_prefix)
-        environment = {**inherited, **own, "DODO_LANE": self.lane.name}
-        return Command(service.name, "application", argv, environment, folder)
 
     async def next_event(self) -> Event:
         return await self._events.get()
@@ -275,20 +204,3 @@ class ProcessBackend:
     def tail(self, service: str) -> list[str]:
         output = self._outputs.get(service)
         return output.tail() if output else []
-
-
-def ready_file(lane: str, service: str) -> str:
-    """Where a service leaves its ready file; in a lane of the host, what begins with the lane's name is removed."""
-    return f"/tmp/{lane}ready-{service}" if lane else f"/tmp/dodo-ready-{service}"
-
-
-def changes(base: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str | None]:
-    """What to set, and with None to remove, to make ``wanted`` of ``base``: the sandbox has the base already."""
-    different: dict[str, str | None] = {name: value for name, value in wanted.items() if base.get(name) != value}
-    return {**different, **{name: wanted.get(name) for name in OWN_VARIABLES}}
-
-
-def package_path() -> str:
-    """``PYTHONPATH`` for services and sandbox: where ``services`` lies, and where ``dodo_dsl`` does."""
-    places = [str(data.root()), str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
-    return os.pathsep.join(dict.fromkeys(p for p in places if p))

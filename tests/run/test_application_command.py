@@ -6,7 +6,7 @@ import pytest
 
 from dodo_dsl.plan.application import plan_application, read_application
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.process import Lane, ProcessBackend
+from dodo_dsl.run.commands import Commands, Lane
 
 COMPOSE = """\
 services:
@@ -33,8 +33,8 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     application = plan_application(source, 140, "host", folder, ())
     common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox", ())
     plan = Plan("t", "t", "t.dodo.yml", *common, application)
-    backend = ProcessBackend(plan, folder, tmp_path / "report", "host", Lane(150))
-    (command,) = [backend._application_command(service) for service in application.services]
+    commands = Commands(plan, folder, tmp_path / "report", Lane(150))
+    (command,) = [commands.of(service) for service in application.services]
     assert command.argv == (
         *("python", "planner.py", "run", "--cid=150", "--rate=20", "--greeting=costs $5"),
         "session=150",
