@@ -1,8 +1,7 @@
-"""The docker backend: the compiled files through ``docker compose``, watched by the engine's events."""
+"""The docker backend: the containers that ``docker compose`` creates, watched by the engine's events."""
 
 import asyncio
 import contextlib
-import json
 import os
 import socket
 import threading
@@ -12,10 +11,10 @@ from typing import Any
 
 from dodo_dsl.plan.application import SANDBOX
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.plan.trace import traced
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
 from dodo_dsl.run.client import said
+from dodo_dsl.run.compose import Compose
 from dodo_dsl.run.copies import copy_out
 from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.output import Output
@@ -23,10 +22,7 @@ from dodo_dsl.run.projects import PROJECT_LABEL, SERVICE_LABEL, remove_project, 
 from dodo_dsl.run.pulls import Pulls, Say
 
 _PORT = 12175
-_BUILD_PROJECT = "dodo-build"
 _REPORT = "/dodo/report"
-_OVERLAP = "overlaps"
-_YIELDING = ("nice", "-n", "10")  # the set-up of one test leaves the processor to those that drive already
 # dd makes one datagram of it: bash itself would write one a line, and a frame may hold a byte that is a line's end
 _TELL = 'printf "%b" "$1" | dd bs=65507 iflag=fullblock status=none > "/dev/udp/$2/$3"'
 
@@ -49,7 +45,6 @@ class DockerBackend:
     ) -> None:
         self.plan = plan
         self.cid = plan.cid
-        self.folder = folder
         self.report = report
         self.project = project
         self._client = client
@@ -58,7 +53,7 @@ class DockerBackend:
         self._say = say
         self._queue: asyncio.Queue[Event] = asyncio.Queue()
         self._loop = asyncio.get_running_loop()
-        self._config: dict[str, Any] = {}
+        self._compose = Compose(plan, folder, report, project, say)
         self._containers: dict[str, Any] = {}
         self._outputs: dict[str, Output] = {}
         self._out_of_memory: set[str] = set()
@@ -67,12 +62,9 @@ class DockerBackend:
         self.left_behind = False
 
     async def open(self) -> None:
-        code, out, problem = await self._compose("config", "--format", "json")
-        if code:
-            raise BackendError(f"docker compose does not take the compiled test: {traced(self.plan, problem)}")
-        self._config = json.loads(out)["services"]
-        await self._provide_images()
-        await self._create()
+        await self._compose.read()
+        await self._compose.provide_images(self._pulls)
+        await self._compose.create(self._subnets)
         await self._begin_to_watch()
 
     async def _begin_to_watch(self) -> None:
@@ -89,65 +81,6 @@ class DockerBackend:
 
     def _filters(self) -> dict[str, Any]:
         return {"label": f"{PROJECT_LABEL}={self.project}"}
-
-    async def _compose(
-        self, *words: str, subnet: str = "", log: Path | None = None, project: str = ""
-    ) -> tuple[int, str, str]:
-        """Exit code, standard output and the last line of standard error of a compose command."""
-        environment = {**os.environ, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
-        for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
-            environment.pop(name, None)  # the test's own .env decides
-        if subnet:
-            environment["DODO_SUBNET"] = subnet
-        process = await asyncio.create_subprocess_exec(
-            *_YIELDING, "docker", "compose", *words, cwd=self.folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-        )  # fmt: skip
-        try:
-            out, err = await process.communicate()
-        except asyncio.CancelledError:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
-            raise
-        if log is not None:
-            log.parent.mkdir(parents=True, exist_ok=True)
-            log.write_bytes(out + err)
-        said = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
-        return process.returncode or 0, out.decode("utf-8", "replace"), said[-1].strip() if said else ""
-
-    async def _provide_images(self) -> None:
-        application = {s.name for s in self.plan.application.services}
-        built = [name for name, s in self._config.items() if "build" in s and "@" not in s.get("image", "")]
-        own = {s["image"] for name, s in self._config.items() if name not in application}
-        foreign = {s["image"] for name, s in self._config.items() if name in application and name not in built}
-        for note in await self._pulls.provide(own, foreign, self._say):
-            self._say(note)
-        named = [name for name in built if "image" in self._config[name]]
-        if named:
-            key = json.dumps([self._config[name]["build"] for name in named])
-            await self._pulls.once(key, lambda: self._build(named, _BUILD_PROJECT))
-        if len(named) < len(built):
-            await self._build([name for name in built if name not in named], self.project)
-
-    async def _build(self, names: list[str], project: str) -> str:
-        """Builds images; compose writes the project into them, so images with names of their own get one for all."""
-        self._say(f"building {', '.join(names)}")
-        log = self.report / "logs" / "build.log"
-        code, _, problem = await self._compose("build", *names, log=log, project=project)
-        if code:
-            raise BackendError(f"the application's images cannot be built: {problem}; {log} has the whole output")
-        return ""
-
-    async def _create(self) -> None:
-        """Network, volumes and containers; a subnet that the engine has in use is left to others."""
-        code, problem = 1, "no subnet is free"
-        for subnet in self._subnets:
-            code, _, problem = await self._compose("create", "--no-build", "--pull", "never", subnet=subnet)
-            if not code or _OVERLAP not in problem:
-                break
-        if code:
-            raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
 
     def _find_containers(self) -> dict[str, Any]:
         found = self._client.containers.list(all=True, filters=self._filters())
@@ -198,9 +131,9 @@ class DockerBackend:
             self._outputs[name] = Output(
                 self.report / "logs" / f"{layer}.{name}.log", self._reader(layer, name, judges)
             )
-        await asyncio.gather(*(self._start(name) for name in self._in_order(names)))
+        await asyncio.gather(*(self._start(name) for name in self._compose.in_order(names)))
         is_ours = layer != "application"
-        return {name: is_ours or self._has_healthcheck(name) for name in names}
+        return {name: is_ours or self._compose.has_healthcheck(name) for name in names}
 
     def _reader(self, layer: str, name: str, judges: set[str]) -> Any:
         def on_line(line: bytes) -> bool:
@@ -210,24 +143,6 @@ class DockerBackend:
             return event is not None
 
         return on_line
-
-    def _in_order(self, names: list[str]) -> list[str]:
-        """Services that others of the same layer depend on come first."""
-        ordered: list[str] = []
-
-        def add(name: str) -> None:
-            if name in names and name not in ordered:
-                for other in self._config.get(name, {}).get("depends_on") or {}:
-                    add(other)
-                ordered.append(name)
-
-        for name in names:
-            add(name)
-        return ordered
-
-    def _has_healthcheck(self, name: str) -> bool:
-        check = self._config.get(name, {}).get("healthcheck")
-        return bool(check) and not check.get("disable") and check.get("test") != ["NONE"]
 
     async def _start(self, name: str) -> None:
         from docker.errors import DockerException
