@@ -20,6 +20,7 @@ from dodo_dsl.run.events import BackendError, Event, Exited, Lost, Noted, Ready,
 from dodo_dsl.run.output import Output
 from dodo_dsl.run.projects import PROJECT_LABEL, SERVICE_LABEL, remove_project, stop_project
 from dodo_dsl.run.pulls import Pulls, Say
+from dodo_dsl.run.watch import Watch
 
 _PORT = 12175
 _REPORT = "/dodo/report"
@@ -52,13 +53,11 @@ class DockerBackend:
         self._subnets = subnets
         self._say = say
         self._queue: asyncio.Queue[Event] = asyncio.Queue()
-        self._loop = asyncio.get_running_loop()
         self._compose = Compose(plan, folder, report, project, say)
         self._containers: dict[str, Any] = {}
         self._outputs: dict[str, Output] = {}
         self._out_of_memory: set[str] = set()
-        self._events: Any = None
-        self._closing = False
+        self._watch = Watch(self._heard, lambda why: self._queue.put_nowait(Lost(why)))
         self.left_behind = False
 
     async def open(self) -> None:
@@ -72,41 +71,17 @@ class DockerBackend:
 
         try:
             self._containers = await asyncio.to_thread(self._find_containers)
-            self._events = await asyncio.to_thread(self._client.events, decode=True, filters=self._filters())
-            threading.Thread(target=self._watch, daemon=True).start()
+            await asyncio.to_thread(self._watch.begin, self._client, self.project)
             if SANDBOX in self._containers:
                 await asyncio.to_thread(self._containers[SANDBOX].start)
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {said(error)}") from error
 
-    def _filters(self) -> dict[str, Any]:
-        return {"label": f"{PROJECT_LABEL}={self.project}"}
-
     def _find_containers(self) -> dict[str, Any]:
-        found = self._client.containers.list(all=True, filters=self._filters())
+        found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self.project}"})
         return {c.labels[SERVICE_LABEL]: c for c in found}
 
-    def _watch(self) -> None:
-        """The thread of the engine's events."""
-        try:
-            for event in self._events:
-                self._tell(self._heard, event)
-        except Exception as error:  # noqa: BLE001  (whatever ends the stream, the engine is out of sight)
-            why = f"the Docker engine went away: {error}"
-        else:
-            why = "the Docker engine went away: its events ended"
-        if not self._closing:
-            self._tell(self._queue.put_nowait, Lost(why))
-
-    def _tell(self, work: Any, *arguments: Any) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(work, *arguments)
-
-    def _heard(self, event: Mapping[str, Any]) -> None:
-        attributes = event.get("Actor", {}).get("Attributes", {})
-        name, action = attributes.get(SERVICE_LABEL, ""), str(event.get("Action", ""))
-        if self._closing or not name:
-            return
+    def _heard(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
         if action == "oom":
             self._out_of_memory.add(name)
         elif action == "health_status: healthy":
@@ -192,15 +167,13 @@ class DockerBackend:
         return "" if code == 0 else (output or b"").decode("utf-8", "replace").strip() or f"exit code {code}"
 
     async def close(self, keep: bool) -> list[str]:
-        self._closing = True
+        self._watch.ignores = True
         kept = []
         if keep and self._containers:
             kept = self._kept()
         else:
             await asyncio.to_thread(self._take_down)
-        if self._events is not None:
-            with contextlib.suppress(Exception):
-                self._events.close()
+        self._watch.close()
         for output in self._outputs.values():
             output.close()
         return kept
@@ -229,7 +202,7 @@ class DockerBackend:
     def _note(self, text: str) -> None:
         """Said at once, and with the outcome."""
         self._say(text)
-        self._tell(self._queue.put_nowait, Noted(text))
+        self._watch.tell(self._queue.put_nowait, Noted(text))
 
     def _records(self, container: Any) -> bool:
         name = container.labels[SERVICE_LABEL]
