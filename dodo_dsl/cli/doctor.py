@@ -8,7 +8,7 @@ from typing import TextIO
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import printable
 from dodo_dsl.run import health
-from dodo_dsl.run.runner import reap_folders
+from dodo_dsl.run.workfolder import reap_folders
 
 EXAMPLES = """examples:
   dodo doctor              every finding, and what to do about it

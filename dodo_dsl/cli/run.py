@@ -24,8 +24,9 @@ from dodo_dsl.report.write import Drawable, forget, write_report
 from dodo_dsl.run import rigs
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
 from dodo_dsl.run.history import History
-from dodo_dsl.run.runner import Policy, Runner, default_backend, reap_folders, work_folder
+from dodo_dsl.run.runner import Policy, Runner, default_backend
 from dodo_dsl.run.schedule import Schedule, schedule
+from dodo_dsl.run.workfolder import reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 
 EXAMPLES = """examples:

@@ -1,12 +1,8 @@
 """Several tests at once, each on a backend of its own, and a clean machine whatever happens."""
 
 import asyncio
-import secrets
-import shutil
 import signal
-import tempfile
 import time
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,15 +10,12 @@ from typing import Literal, Protocol, Self
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
-from dodo_dsl.run.events import BackendError
 from dodo_dsl.run.schedule import Places, Schedule
+from dodo_dsl.run.unanswered import cause, reason, without_answer, without_number
 
 BackendName = Literal["process", "docker"]
-FOLDER_PREFIX = "dodo-run-"
-LOG = "logs/runner.log"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -46,44 +39,6 @@ def default_backend(plans: Sequence[Plan]) -> BackendName:
     """Processes when every application service says how to start as one, else containers."""
     services = [s for plan in plans for s in plan.application.services]
     return "process" if all(s.process for s in services) else "docker"
-
-
-@dataclass
-class WorkFolder:
-    """Where a run's tests are compiled; the next run removes it should this one be killed."""
-
-    path: Path
-    lease: leases.Lease
-    kept: bool = False
-
-    def __enter__(self) -> Self:
-        self.path.mkdir(mode=0o755)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.kept:
-            self.lease.leave()
-        else:
-            shutil.rmtree(self.path, ignore_errors=True)
-            self.lease.release()
-
-
-def work_folder() -> WorkFolder:
-    """A folder of a fresh name, leased."""
-    token = secrets.token_hex(4)
-    path = Path(tempfile.gettempdir()).resolve() / f"{FOLDER_PREFIX}{token}"
-    lease = leases.try_lease(f"{leases.RUN}{token}", {"folder": str(path)})
-    assert lease is not None, "a fresh name is free"
-    return WorkFolder(path, lease)
-
-
-def reap_folders() -> None:
-    """Removes the folders of killed runs."""
-    for lease, about in leases.orphans(leases.RUN):
-        folder = Path(str(about.get("folder", "")))
-        if folder.name == f"{FOLDER_PREFIX}{lease.name.removeprefix(leases.RUN)}":
-            shutil.rmtree(folder, ignore_errors=True)
-        lease.release()
 
 
 @dataclass(frozen=True)
@@ -146,9 +101,9 @@ class Runner:
                 self._began[job.plan.slug] = (job, time.monotonic())
                 outcome = await self._tried(job)
         except asyncio.CancelledError:
-            outcome = self._without_answer(job.plan, "the run was interrupted before this test began")
+            outcome = without_answer(job.plan, self.backends.name, "the run was interrupted before this test began")
         except Exception as error:  # noqa: BLE001  (no job takes the results of the others with it)
-            outcome = self._without_answer(job.plan, _reason(job, error))
+            outcome = without_answer(job.plan, self.backends.name, reason(job, error))
         self._began.pop(job.plan.slug, None)
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
@@ -172,7 +127,7 @@ class Runner:
             try:
                 set_aside(job.report, attempt)
             except OSError as error:
-                notes = (*notes, f"not tried again, as its report cannot be set aside: {_without_number(error)}")
+                notes = (*notes, f"not tried again, as its report cannot be set aside: {without_number(error)}")
                 break
             self.progress.phase(job.plan.slug, f"error, once more: {outcome.reason}")
         return replace(outcome, notes=(*notes, *outcome.notes))
@@ -190,53 +145,9 @@ class Runner:
                 self.kept.extend(kept)
         except Exception as error:  # noqa: BLE001  (whatever it was, it is about this test alone)
             if outcome is None:
-                return self._without_answer(job.plan, _reason(job, error))
-            return replace(outcome, notes=(*outcome.notes, f"not all of the test was taken down: {_cause(job, error)}"))
+                return without_answer(job.plan, self.backends.name, reason(job, error))
+            return replace(outcome, notes=(*outcome.notes, f"not all of the test was taken down: {cause(job, error)}"))
         return outcome
-
-    def _without_answer(self, plan: Plan, reason: str) -> Outcome:
-        """The outcome of a test that never began."""
-        return Outcome(
-            name=plan.name,
-            slug=plan.slug,
-            spec=plan.spec,
-            level=plan.level,
-            kind=plan.kind,
-            outcome="error",
-            reason=reason,
-            cid=plan.cid,
-            seed=plan.seed,
-            clock=plan.clock,
-            backend=self.backends.name,
-        )
-
-
-def _reason(job: Job, error: Exception) -> str:
-    """Why a test has no answer, in a sentence."""
-    why = _cause(job, error)
-    return f"this machine cannot run the test: {why}" if isinstance(error, OSError) else why
-
-
-def _cause(job: Job, error: Exception) -> str:
-    """What an error says; where a fault of DoDo's lies stands in a log beside the test's own."""
-    if isinstance(error, BackendError):
-        return str(error)
-    if isinstance(error, OSError):
-        return _without_number(error)
-    log = job.report / LOG
-    try:
-        log.parent.mkdir(parents=True, exist_ok=True)
-        with log.open("a", encoding="utf-8", errors="replace") as file:
-            traceback.print_exception(error, file=file)
-        more = f" ({LOG} has more)"
-    except OSError:
-        more = ""
-    return f"a fault of DoDo itself: {type(error).__name__}: {error}{more}"
-
-
-def _without_number(error: OSError) -> str:
-    place = f"{error.filename}: " if error.filename else ""
-    return f"{place}{error.strerror or error}"
 
 
 def set_aside(report: Path, attempt: int) -> None:
