@@ -2,30 +2,25 @@
 
 import argparse
 import asyncio
-import contextlib
-import functools
-import os
-import resource
 import signal
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TextIO, cast
+from typing import TextIO, cast
 
 from dodo_dsl.cli import progress, selection, summary
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.compiler import NoApplication, plan, with_clock, with_isolation
-from dodo_dsl.diagnostics import format_text, has_errors, ordered, printable
-from dodo_dsl.emit.write import PLAN_FILE, write
+from dodo_dsl.cli.forecast import at_once, expectation, forecast
+from dodo_dsl.cli.jobs import Usage, prepare
+from dodo_dsl.cli.robust import Robust, more_descriptors, stop_like_interrupt, undisturbed
+from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
-from dodo_dsl.plan.model import Plan, PlanError, from_json
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.write import Drawable, forget, write_report
-from dodo_dsl.run import rigs
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
 from dodo_dsl.run.history import History
 from dodo_dsl.run.runner import Policy, Runner, default_backend
-from dodo_dsl.run.schedule import Schedule, schedule
+from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.workfolder import reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 
@@ -42,10 +37,6 @@ exit codes: 0 all passed, 1 some failed, 2 usage or spec, 3 some ended in error,
 
 
 _MOST_SECONDS = 864_000.0
-
-
-class _Usage(Exception):
-    """A sentence for the user; the exit code is 2."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -95,15 +86,15 @@ def _positive(text: str) -> int:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _stop_like_interrupt)
-    _more_descriptors()
-    stdout = cast(TextIO, _Robust(stdout))
+        signal.signal(number, stop_like_interrupt)
+    more_descriptors()
+    stdout = cast(TextIO, Robust(stdout))
     reap_folders()
     with work_folder() as folder:
         try:
-            jobs, deployment = _prepare(options, folder.path, stdout)
+            jobs, deployment = prepare(options, folder.path, stdout)
             runner = _runner(options, jobs, deployment, stdout, folder.lease.descriptor)
-        except (_Usage, selection.NoSuchTest) as error:
+        except (Usage, selection.NoSuchTest) as error:
             stderr.write(f"dodo run: {error}\n")
             return Exit.USAGE
         outcomes, is_reported = _run(runner, jobs, options.report, stdout)
@@ -113,136 +104,17 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
 
 
-def _more_descriptors() -> None:
-    """Every service has a pipe and a log: as many descriptors as this process may have."""
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with contextlib.suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-
-
-def _prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
-    """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
-    if options.compiled:
-        if options.test or options.level or options.application:
-            raise _Usage("--compiled runs a test as it was compiled: no TEST, --level or --application beside it")
-        plans, deployment = [_load_plan(options.compiled)], Deployment(Path.cwd())
-        folders = [options.compiled.resolve()]
-        if options.clock not in (None, plans[0].clock):
-            raise _Usage(f"this test is compiled for clock {plans[0].clock}; compile it again for another")
-        if options.isolation == "network" and rigs.is_real(plans[0]):
-            raise _Usage(f"rig '{plans[0].rig}' is reached through the host, not with --isolation network")
-    else:
-        plans, deployment = _compile(options, folder, stdout)
-        folders = [folder / p.slug for p in plans]
-    if options.seed is not None:
-        plans = [replace(p, seed=options.seed) for p in plans]
-    if options.wall_timeout is not None:
-        plans = [_with_wall_timeout(p, options.wall_timeout) for p in plans]
-    report = _usable(options.report, [p.slug for p in plans])
-    return [
-        Job(p, f, report / p.slug, original.slug)
-        for n in range(options.repeat)
-        for original, (p, f) in zip(plans, _repetition(plans, folders, n), strict=True)
-    ], deployment
-
-
-def _with_wall_timeout(plan: Plan, seconds: float) -> Plan:
-    return replace(plan, lockstep=replace(plan.lockstep, wall_timeout_s=seconds)) if plan.lockstep else plan
-
-
-def _usable(report: Path, slugs: Sequence[str]) -> Path:
-    """The report's folder, made; a folder of specs or of compiled tests is refused."""
-    try:
-        report.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _Usage(f"'{report}' cannot take the report: {error.strerror}") from error
-    for slug in slugs:
-        if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
-            raise _Usage(f"'{report}' holds tests; name another folder with --report")
-    if not os.access(report, os.W_OK):
-        raise _Usage(f"'{report}' cannot take the report: it may not be written")
-    return report.resolve()
-
-
-def _repetition(plans: Sequence[Plan], folders: Sequence[Path], number: int) -> list[tuple[Plan, Path]]:
-    """The n-th time around: from the second on, name and slug say so."""
-    if number == 0:
-        return list(zip(plans, folders, strict=True))
-    renamed = [replace(p, name=f"{p.name}[run={number + 1}]", slug=f"{p.slug}--run-{number + 1}") for p in plans]
-    return list(zip(renamed, folders, strict=True))
-
-
-def _load_plan(folder: Path) -> Plan:
-    try:
-        return from_json((folder / PLAN_FILE).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise _Usage(f"there is no compiled test at '{folder}': {error.strerror}") from error
-    except (PlanError, UnicodeDecodeError) as error:
-        raise _Usage(f"{folder / PLAN_FILE}: {error}") from error
-
-
-def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Plan], Deployment]:
-    checked = selection.select(options.test, options.level, options.application)
-    if not checked.specs:
-        raise _Usage("there is no test to run")
-    if options.clock:
-        checked = with_clock(checked, options.clock)
-    if options.isolation:
-        checked = with_isolation(checked, options.isolation)
-    problems = checked.diagnostics
-    if checked.ok:
-        try:
-            compiled, more = plan(checked, folder)
-        except NoApplication:
-            raise _Usage("no application; name its compose file with --application or in dodo.yml") from None
-        problems = tuple(ordered([*problems, *more]))
-    stdout.write(format_text(problems))
-    if has_errors(problems):
-        raise _Usage("the tests above cannot be compiled")
-    write(compiled, folder)
-    return list(compiled.suite.plans), checked.deployment
-
-
 def _runner(
     options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, descriptor: int
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or default_backend(plans)
-    order = schedule(options.jobs, _expectation(backend))
-    stdout.write(f"{progress.count(len(jobs))}, {_at_once(order, jobs)}, {backend} backend; ")
-    stdout.write(f"{_forecast(order, jobs, backend)}\n")
+    order = schedule(options.jobs, expectation(backend))
+    stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
+    stdout.write(f"{forecast(order, jobs, backend)}\n")
     shown = progress.choose(stdout, [p.slug for p in plans])
     backends = _backends(options, backend, plans, deployment, descriptor)
     return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
-
-
-def _at_once(order: Schedule, jobs: Sequence[Job]) -> str:
-    """How many tests run at a time, in words."""
-    most = min(int(order.capacity / max(min(order.need(job) for job in jobs), 0.01)), len(jobs))
-    return f"{'up to ' * (len(jobs) > 1)}{max(most, 1)} at a time"
-
-
-def _forecast(order: Schedule, jobs: Sequence[Job], backend: str) -> str:
-    """How long the run will take, in words; a test that never ran here may take its whole time."""
-    history = History()
-    known = all(history.seconds(j.plan.spec, j.test, backend, j.plan.clock) is not None for j in jobs)
-    seconds = order.forecast(order.ordered(jobs))
-    return progress.about(seconds) if known else progress.about(seconds).replace("about", "at most")
-
-
-def _expectation(backend: str) -> Callable[[Job], float]:
-    """How long a job takes as the history has it; an unknown one may take its whole time."""
-    history = History()
-
-    @functools.cache
-    def known(spec: str, test: str, clock: str) -> float | None:
-        return history.seconds(spec, test, backend, clock)
-
-    def expected(job: Job) -> float:
-        seconds = known(job.plan.spec, job.test, job.plan.clock)
-        return job.plan.timeout_s if seconds is None else seconds
-
-    return expected
 
 
 def _backends(
@@ -250,11 +122,11 @@ def _backends(
 ) -> Backends:
     if backend == "docker":
         if options.compiled and options.isolation not in (None, plans[0].isolation):
-            raise _Usage(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
+            raise Usage(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
         return Containers(subnets(deployment.subnets))
     without = sorted({s.name for p in plans for s in p.application.services if not s.process})
     if without:
-        raise _Usage(f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs")
+        raise Usage(f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs")
     return Processes(deployment.cids, options.isolation, (descriptor,))
 
 
@@ -264,7 +136,7 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> t
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
     tests = {job.plan.slug: job.test for job in jobs}
-    with _undisturbed():
+    with undisturbed():
         history = History()
         history.add((tests[outcome.slug], outcome) for outcome in outcomes)
         times = history.times({(job.plan.spec, job.test) for job in jobs}, runner.backends.name)
@@ -280,55 +152,6 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> t
     summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
     stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}\n")
     return outcomes, not unwritten
-
-
-@contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Results that exist are written, whoever presses Ctrl-C now."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
-
-
-class _Robust:
-    """A stream whose reader may leave (``dodo run | head``): the run goes on to its end and report."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._broken = False
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        try:
-            return 0 if self._broken else self._stream.write(text)
-        except OSError:
-            return self._give_up()
-
-    def writelines(self, lines: Iterable[str]) -> None:
-        self.write("".join(lines))
-
-    def flush(self) -> None:
-        try:
-            if not self._broken:
-                self._stream.flush()
-        except OSError:
-            self._give_up()
-
-    def _give_up(self) -> int:
-        self._broken = True
-        with contextlib.suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
-        return 0
-
-
-def _stop_like_interrupt(_number: int, _frame: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:

@@ -1,0 +1,64 @@
+"""What keeps a run going to its end and report: signals, readers that leave, and limits of this process."""
+
+import contextlib
+import os
+import resource
+import signal
+from collections.abc import Iterable, Iterator
+from typing import Any, TextIO
+
+
+def more_descriptors() -> None:
+    """Every service has a pipe and a log: as many descriptors as this process may have."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+
+
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Results that exist are written, whoever presses Ctrl-C now."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+class Robust:
+    """A stream whose reader may leave (``dodo run | head``): the run goes on to its end and report."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._broken = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        try:
+            return 0 if self._broken else self._stream.write(text)
+        except OSError:
+            return self._give_up()
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        self.write("".join(lines))
+
+    def flush(self) -> None:
+        try:
+            if not self._broken:
+                self._stream.flush()
+        except OSError:
+            self._give_up()
+
+    def _give_up(self) -> int:
+        self._broken = True
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+        return 0
+
+
+def stop_like_interrupt(_number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
