@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import lanes, leases, projects, rigs
+from dodo_dsl.run.channel import Nursery
 from dodo_dsl.run.client import connect
 from dodo_dsl.run.commands import Lane
 from dodo_dsl.run.docker import DockerBackend, other_subnets
@@ -44,6 +45,10 @@ class Backends(Protocol):
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None: ...
 
+    def close(self) -> None:
+        """All tests are over; called once at the end."""
+        ...
+
     def open(self, job: Job, say: Say, keep: bool) -> AbstractAsyncContextManager[Backend]:
         """A backend for one test; raises BackendError when there is none to be had."""
         ...
@@ -53,6 +58,7 @@ class Processes:
     """Local processes, each test in namespaces of its own, or on the host in a leased lane, as a real rig always is."""
 
     name = "process"
+    _nursery: Nursery | None = None
 
     def __init__(self, cids: Sequence[int], isolation: str | None, descriptors: tuple[int, ...]) -> None:
         self._cids = cids
@@ -67,11 +73,18 @@ class Processes:
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
         for left in lanes.reap():
             note(f"removed what a killed run left: {left}")
-        if self._isolation is None and any(plan.isolation == "network" for plan in plans):
+        wanted = {self._isolation or plan.isolation for plan in plans}
+        if self._isolation is None and "network" in wanted:
             refusal = await asyncio.to_thread(lanes.namespaces_refusal)
             if refusal:
                 note(f"no namespaces here ({refusal}): tests share the host, each with leases")
                 self._isolation = "host"
+        if "network" in wanted and self._isolation != "host":
+            self._nursery = Nursery(self._descriptors)
+
+    def close(self) -> None:
+        if self._nursery is not None:
+            self._nursery.close()
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
@@ -79,7 +92,7 @@ class Processes:
         isolation = "host" if rigs.is_real(plan) else self._isolation or plan.isolation
         if isolation == "network":
             lane = Lane(plan.cid, descriptors=self._descriptors)
-            yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
+            yield ProcessBackend(plan, job.folder, job.report, isolation, lane, self._nursery)
             return
         async with (
             self._turn(plan),
@@ -113,6 +126,9 @@ class Containers:
             note(f"removed what a killed run left: {removed}")
         for left in reaped.left:
             note(f"what a killed run left cannot be removed: {left}")
+
+    def close(self) -> None:
+        """Nothing but the tests' own is up."""
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:

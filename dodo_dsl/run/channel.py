@@ -5,6 +5,7 @@ import errno
 import json
 import os
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -21,14 +22,51 @@ CLOSE_S = 10.0
 LOG = "sandbox.log"
 
 
-class Channel:
-    """A sandbox of its own; ``heard`` is told its messages, ``lost`` why it cannot be talked to any more."""
+class Nursery:
+    """The runner's end of the process that forks sandboxes; it ends when this is closed, or with the runner."""
 
-    def __init__(self, isolation: str, heard: Callable[[dict[str, Any]], None], lost: Callable[[str], None]) -> None:
+    def __init__(self, descriptors: tuple[int, ...]) -> None:
+        """``descriptors`` are of leases that sandboxes hold, too."""
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "dodo_dsl.run.nursery", str(theirs.fileno())],
+                pass_fds=(theirs.fileno(), *descriptors),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                env={**os.environ, "PYTHONPATH": package_path(), "OPENBLAS_NUM_THREADS": "1"},
+            )
+
+    def fork(self, channel: socket.socket, log: int, lane: str) -> None:
+        """A sandbox at the other end of ``channel``; raises OSError when the nursery has gone."""
+        socket.send_fds(self._socket, [json.dumps({"lane": lane}).encode()], [channel.fileno(), log])
+
+    def close(self) -> None:
+        """Ends the nursery; the sandboxes stay."""
+        self._socket.close()
+        _end(self._process)
+
+
+class Channel:
+    """A sandbox of its own; ``heard`` is told its messages, ``lost`` why it cannot be talked to any more.
+
+    It is a fork of the ``nursery``, or a process of its own where there is none.
+    """
+
+    def __init__(
+        self,
+        isolation: str,
+        heard: Callable[[dict[str, Any]], None],
+        lost: Callable[[str], None],
+        nursery: Nursery | None = None,
+    ) -> None:
         self._isolation = isolation
+        self._nursery = nursery
         self._heard = heard
         self._lost = lost
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: subprocess.Popen[bytes] | _Fork | None = None
         self._socket: socket.socket | None = None
         self._up: asyncio.Future[dict[str, Any]] | None = None
         self._closing = False
@@ -46,19 +84,32 @@ class Channel:
         self._socket, self._up = ours, loop.create_future()
         folder.mkdir(parents=True, exist_ok=True)
         with theirs, (folder / LOG).open("wb") as stderr:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), self._isolation],
-                pass_fds=(theirs.fileno(), *lane.descriptors),
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=stderr,
-                start_new_session=True,
-                env={**os.environ, "PYTHONPATH": package_path(), "DODO_LANE": lane.name},
-            )
+            if not self._is_forked(theirs, stderr.fileno(), lane):
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), self._isolation],
+                    pass_fds=(theirs.fileno(), *lane.descriptors),
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=stderr,
+                    start_new_session=True,
+                    env={**os.environ, "PYTHONPATH": package_path(), "DODO_LANE": lane.name},
+                )
         loop.add_reader(ours, self._hear)
         answer = await self._up
         if "down" in answer:
             raise BackendError(f"no sandbox of isolation {self._isolation}: {answer['down']}")
+        if self._process is None:
+            self._process = _Fork(answer["up"])
+
+    def _is_forked(self, theirs: socket.socket, log: int, lane: Lane) -> bool:
+        """Whether the nursery makes the sandbox; one that has gone makes none."""
+        if self._nursery is None or self._isolation != "network":
+            return False
+        try:
+            self._nursery.fork(theirs, log, lane.name)
+        except OSError:
+            return False
+        return True
 
     def _hear(self) -> None:
         assert self._socket is not None
@@ -129,7 +180,36 @@ def send_patiently(channel: socket.socket, data: bytes, descriptors: tuple[int, 
             return
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+class _Fork:
+    """A process that is another's child, as subprocess has its own."""
+
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        try:
+            self._descriptor = os.pidfd_open(pid)
+        except ProcessLookupError:
+            self._descriptor = -1
+
+    def poll(self) -> int | None:
+        """0 when it has ended."""
+        return 0 if self._descriptor < 0 or select.select([self._descriptor], [], [], 0)[0] else None
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Until it has ended; raises TimeoutExpired."""
+        if self._descriptor >= 0:
+            if not select.select([self._descriptor], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired("sandbox", timeout or 0.0)
+            os.close(self._descriptor)
+            self._descriptor = -1
+        return 0
+
+    def kill(self) -> None:
+        """End it at once."""
+        if self._descriptor >= 0:
+            signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
+
+
+def _end(process: "subprocess.Popen[bytes] | _Fork") -> None:
     try:
         process.wait(CLOSE_S)
     except subprocess.TimeoutExpired:

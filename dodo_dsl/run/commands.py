@@ -1,7 +1,7 @@
 """What starts a test's services as local processes: words, variables, folder, with the lane's CID and memories."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,6 +34,8 @@ class Command:
     environment: Mapping[str, str]
     folder: Path
     judge: bool = False
+    module: bool = False
+    """Whether it is one of DoDo's own Python modules, for which a fork of what has loaded their libraries will do."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class Commands:
             **self.plan.clock_variables,
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
-        return Command(service.name, service.layer, words, environment, self.folder, service.judge)
+        module = _is_module(service.process)
+        return Command(service.name, service.layer, words, environment, self.folder, service.judge, module)
 
     def _flag(self, flag: Flag) -> str:
         values: dict[str, Callable[[], str]] = {
@@ -89,6 +92,12 @@ class Commands:
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.lane.cid), self.lane.memory_prefix)
         environment = {**inherited, **own, "DODO_LANE": self.lane.name}
         return Command(service.name, "application", argv, environment, folder)
+
+
+def _is_module(process: Sequence[str]) -> bool:
+    """Whether a program is ``python -m`` with one of DoDo's own services."""
+    package, _, name = process[2].partition(".") if len(process) == 3 and process[:2] == ("python", "-m") else ("",) * 3
+    return package == "services" and name.isidentifier() and (data.root() / package / name / "__main__.py").is_file()
 
 
 def ready_file(lane: str, service: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from dodo_dsl.plan.model import ApplicationService, Plan, Service
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
-from dodo_dsl.run.channel import LOG, Channel
+from dodo_dsl.run.channel import LOG, Channel, Nursery
 from dodo_dsl.run.commands import Command, Commands, Lane, changes, package_path
 from dodo_dsl.run.environment import MissingVariable
 from dodo_dsl.run.events import Event, Exited, Lost, Unstartable
@@ -23,7 +23,9 @@ class ProcessBackend:
 
     name = "process"
 
-    def __init__(self, plan: Plan, folder: Path, report: Path, isolation: str, lane: Lane) -> None:
+    def __init__(
+        self, plan: Plan, folder: Path, report: Path, isolation: str, lane: Lane, nursery: Nursery | None = None
+    ) -> None:
         self.plan = plan
         self.report = report
         self.isolation = isolation
@@ -32,7 +34,7 @@ class ProcessBackend:
         self._commands = Commands(plan, folder, report, lane)
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._outputs: dict[str, Output] = {}
-        self._channel = Channel(isolation, self._heard, lambda why: self._events.put_nowait(Lost(why)))
+        self._channel = Channel(isolation, self._heard, lambda why: self._events.put_nowait(Lost(why)), nursery)
 
     async def open(self) -> None:
         await self._channel.open(self.lane, self.report)
@@ -77,7 +79,8 @@ class ProcessBackend:
 
         output = Output(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
-        order = {"do": "start", "id": command.name, "argv": command.argv, "cwd": str(command.folder)}
+        words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.module}
+        order = {"do": "start", "id": command.name, **words}
         try:
             self._channel.send({**order, "env": changes(os.environ, command.environment)}, (output.writer,))
         except ValueError as error:

@@ -81,6 +81,7 @@ class Runner:
         finally:
             for number in _SIGNALS:
                 loop.remove_signal_handler(number)
+            self.backends.close()
         return [outcome for outcome in outcomes if outcome is not None]
 
     def _interrupt(self, tasks: Sequence["asyncio.Task[Outcome | None]"]) -> None:

@@ -3,8 +3,9 @@
 It is process 1 of namespaces of its own (``network``), or their parent on the host (``host``). The runner talks to it
 over a socket; when that closes, whatever closed it, the sandbox ends everything that it started, and itself.
 
-    runner to sandbox   {"do": "start", "id", "argv", "env", "cwd"} with the output's descriptor,
-                        "env" being what differs from the sandbox's own (null removes); {"do": "close"};
+    runner to sandbox   {"do": "start", "id", "argv", "env", "cwd", "fork"} with the output's descriptor,
+                        "env" being what differs from the sandbox's own (null removes), "fork" whether argv
+                        is a Python module for which a fork of the sandbox will do; {"do": "close"};
                         {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why}; {"unstartable": id, "why"}; {"exited": id, "code"}
 """
@@ -23,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.run import namespaces
+from dodo_dsl.run.forked import Forked
 
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
@@ -33,10 +35,12 @@ _PORT = 12175
 class Sandbox:
     """The loop of the sandbox's process."""
 
-    def __init__(self, channel: socket.socket, isolation: str) -> None:
+    def __init__(self, channel: socket.socket, isolation: str, forks: bool = False) -> None:
+        """``forks`` says that this process has loaded what services need."""
         self.channel = channel
         self.isolation = isolation
-        self.children: dict[str, subprocess.Popen[bytes]] = {}
+        self.forks = forks
+        self.children: dict[str, subprocess.Popen[bytes] | Forked] = {}
         self.keep = False
         self.ended = False
         self.pumps: dict[int, int] = {}
@@ -94,10 +98,14 @@ class Sandbox:
 
     def _do_start(self, descriptors: list[int], **order: Any) -> None:
         name, output = order["id"], descriptors[0]
+        environment = {k: v for k, v in {**os.environ, **order["env"]}.items() if v is not None}
         try:
+            if self.forks and order["fork"]:
+                self.children[name] = Forked(order["argv"], environment, order["cwd"], output)
+                return
             self.children[name] = subprocess.Popen(
                 order["argv"],
-                env={k: v for k, v in {**os.environ, **order["env"]}.items() if v is not None},
+                env=environment,
                 cwd=order["cwd"],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
@@ -201,9 +209,9 @@ def _in_namespaces(channel: socket.socket) -> None:
 
 
 def main(argv: list[str]) -> int:
-    """``sandbox DESCRIPTOR network|host``: serves the runner at the other end of the descriptor."""
+    """``sandbox DESCRIPTOR network|host [--forks]``: serves the runner at the other end of the descriptor."""
     channel = socket.socket(fileno=int(argv[0]))
-    isolation, outside = argv[1], os.getpid()
+    isolation, outside, forks = argv[1], os.getpid(), "--forks" in argv
     try:
         if isolation == "network":
             _in_namespaces(channel)
@@ -212,7 +220,7 @@ def main(argv: list[str]) -> int:
     except OSError as error:
         channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
         return 1
-    sandbox = Sandbox(channel, isolation)
+    sandbox = Sandbox(channel, isolation, forks)
     sandbox.tell(up=outside)
     sandbox.run()
     return 0
