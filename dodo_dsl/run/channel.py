@@ -63,7 +63,7 @@ class Channel:
         nursery: Nursery | None = None,
     ) -> None:
         self._isolation = isolation
-        self._nursery = nursery
+        self._nursery = nursery if isolation == "network" else None
         self._heard = heard
         self._lost = lost
         self._process: subprocess.Popen[bytes] | _Fork | None = None
@@ -78,12 +78,23 @@ class Channel:
 
     async def open(self, lane: Lane, folder: Path) -> None:
         """Starts the sandbox, which logs into ``folder`` and holds the lane's leases; raises BackendError."""
-        loop = asyncio.get_running_loop()
+        folder.mkdir(parents=True, exist_ok=True)
+        answer = await self._started(lane, folder / LOG)
+        if "down" in answer and self._nursery is not None:  # which may have gone
+            self._nursery = None
+            self._close_socket()
+            answer = await self._started(lane, folder / LOG)
+        if "down" in answer:
+            raise BackendError(f"no sandbox of isolation {self._isolation}: {answer['down']}")
+        if self._process is None:
+            self._process = _Fork(answer["up"])
+
+    async def _started(self, lane: Lane, log: Path) -> dict[str, Any]:
+        """What the new sandbox says first."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
-        self._socket, self._up = ours, loop.create_future()
-        folder.mkdir(parents=True, exist_ok=True)
-        with theirs, (folder / LOG).open("wb") as stderr:
+        self._socket, self._up = ours, asyncio.get_running_loop().create_future()
+        with theirs, log.open("wb") as stderr:
             if not self._is_forked(theirs, stderr.fileno(), lane):
                 self._process = subprocess.Popen(
                     [sys.executable, "-P", "-m", "dodo_dsl.run.sandbox", str(theirs.fileno()), self._isolation],
@@ -94,22 +105,24 @@ class Channel:
                     start_new_session=True,
                     env={**os.environ, "PYTHONPATH": package_path(), "DODO_LANE": lane.name},
                 )
-        loop.add_reader(ours, self._hear)
-        answer = await self._up
-        if "down" in answer:
-            raise BackendError(f"no sandbox of isolation {self._isolation}: {answer['down']}")
-        if self._process is None:
-            self._process = _Fork(answer["up"])
+        asyncio.get_running_loop().add_reader(ours, self._hear)
+        return await self._up
 
     def _is_forked(self, theirs: socket.socket, log: int, lane: Lane) -> bool:
         """Whether the nursery makes the sandbox; one that has gone makes none."""
-        if self._nursery is None or self._isolation != "network":
+        if self._nursery is None:
             return False
         try:
             self._nursery.fork(theirs, log, lane.name)
         except OSError:
+            self._nursery = None
             return False
         return True
+
+    def _close_socket(self) -> None:
+        if self._socket is not None:
+            asyncio.get_running_loop().remove_reader(self._socket)
+            self._socket.close()
 
     def _hear(self) -> None:
         assert self._socket is not None
@@ -123,8 +136,9 @@ class Channel:
             self._take(json.loads(data))
             return
         asyncio.get_running_loop().remove_reader(self._socket)
+        was_up = self._up is not None and self._up.done()
         self._resolve({"down": "it ended at once"})
-        if not self._closing:
+        if was_up and not self._closing:
             self._lost("the test's sandbox ended unexpectedly")
 
     def _take(self, message: dict[str, Any]) -> None:

@@ -1,12 +1,14 @@
 """What the process backend does when its sandbox does not."""
 
+import signal
 import socket
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import channel
+from dodo_dsl.run import backends, channel
+from dodo_dsl.run.lanes import namespaces_refusal
 from tests.run.helpers import Bench
 
 
@@ -28,3 +30,46 @@ def test_an_environment_that_is_too_large_is_the_services_fault(tmp_path: Path) 
     told = "service 'app' could not be started: 14"
     assert (outcome.outcome, outcome.reason[: len(told)]) == ("error", told)
     assert outcome.reason.endswith(" bytes of words and variables, expected at most 131,072")
+
+
+def test_without_a_nursery_a_sandbox_of_its_own_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The nursery has gone before it was asked, and while it was."""
+    if why := namespaces_refusal():
+        pytest.skip(f"no namespaces here: {why}")
+    real = channel.Nursery
+
+    class Gone(real):  # type: ignore[misc, valid-type]
+        def __init__(self, descriptors: tuple[int, ...]) -> None:
+            super().__init__(descriptors)
+            self._process.kill()
+            self._process.wait()
+
+    class Going(real):  # type: ignore[misc, valid-type]
+        def fork(self, *words: object) -> None:
+            self._process.send_signal(signal.SIGSTOP)
+            super().fork(*words)
+            self._process.kill()
+
+    for number, kind in enumerate((Gone, Going)):
+        monkeypatch.setattr(backends, "Nursery", kind)
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        bench = Bench(folder, "network")
+        (outcome,) = bench.run(bench.plan())
+        assert (outcome.outcome, outcome.reason) == ("passed", "it drove")
+
+
+def test_the_nursery_is_gone_after_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if why := namespaces_refusal():
+        pytest.skip(f"no namespaces here: {why}")
+    made = []
+    real = channel.Nursery
+
+    def remembered(descriptors: tuple[int, ...]) -> channel.Nursery:
+        made.append(real(descriptors))
+        return made[-1]
+
+    monkeypatch.setattr(backends, "Nursery", remembered)
+    bench = Bench(tmp_path, "network")
+    bench.run(bench.plan())
+    assert [nursery._process.poll() for nursery in made] == [0]
