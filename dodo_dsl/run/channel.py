@@ -36,7 +36,7 @@ class Nursery:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,
-                env={**os.environ, "PYTHONPATH": package_path(), "OPENBLAS_NUM_THREADS": "1"},
+                env={**os.environ, "PYTHONPATH": package_path()},
             )
 
     def fork(self, channel: socket.socket, log: int, lane: str) -> None:

@@ -18,6 +18,8 @@ import sys
 from dodo_dsl.run import sandbox
 
 MAX_MESSAGE = 4096
+_THREADS = "OPENBLAS_NUM_THREADS"
+"""By default numpy's algebra has threads from its import on."""
 LOADED = (
     "dodo_dsl.opendlv.session",
     "dodo_dsl.opendlv.memory",
@@ -32,10 +34,14 @@ LOADED = (
 
 
 def load() -> None:
-    """Imports it all; objects that live from now on are looked at by no garbage collection of a fork."""
+    """Imports it all, without threads; what lives from now on is looked at by no garbage collection of a fork."""
+    before = dict(os.environ)
+    os.environ[_THREADS] = "1"
     for name in LOADED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
+    os.environ.clear()
+    os.environ.update(before)  # OpenCV sets some, too, and applications are started with them
     from dodo_dsl.opendlv.messages import MessageSet
 
     MessageSet.standard()

@@ -82,6 +82,16 @@ def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
 def test_what_the_nursery_loads_has_no_thread() -> None:
     """The kernel lets a process with several threads into no user namespace of its own."""
     code = "from dodo_dsl.run import nursery; nursery.load(); import os; print(len(os.listdir('/proc/self/task')))"
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    result = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout == "1\n"
+
+
+@pytest.mark.parametrize("threads", [None, "3"])
+def test_the_variables_are_as_before(threads: str | None) -> None:
+    """Applications are started with them."""
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    environment.update({} if threads is None else {"OPENBLAS_NUM_THREADS": threads})
+    code = "import os; from dodo_dsl.run import nursery; b = dict(os.environ); nursery.load(); print(b == os.environ)"
+    words = [sys.executable, "-c", code]
+    result = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+    assert result.stdout == "True\n"
