@@ -80,6 +80,9 @@ class Pinhole:
         sides = np.array([[f, 0.0, width / 2], [-f, 0.0, width / 2], [0.0, f, height / 2], [0.0, -f, height / 2]])
         self.sides = sides / np.linalg.norm(sides, axis=1, keepdims=True)
         """Unit normals, pointing inwards, of the four planes through the camera and the picture's edges."""
+        self.planes = np.column_stack([np.array([0.0, 0.0, 1.0]), self.sides.T])
+        self.offsets = np.array([-NEAR, 0.0, 0.0, 0.0, 0.0])
+        """Of the frustum, near plane first: inside is where ``p @ planes + offsets >= 0``."""
 
     def project(self, points: Array) -> Array:
         """Picture coordinates (..., 2) of points (..., 3) in the camera frame, all with z > 0."""
@@ -104,9 +107,12 @@ class View:
 
     def visible_part(self, polygon: Array) -> Array:
         """What of a convex polygon (k, 3), in the camera frame, lies inside the frustum; maybe empty."""
-        polygon = clip(polygon, np.array([0.0, 0.0, 1.0]), -NEAR)
-        for side in self.camera.sides:
-            polygon = clip(polygon, side, 0.0)
+        distances = polygon @ self.camera.planes + self.camera.offsets
+        inside = distances >= 0.0
+        if not inside.any(axis=0).all():
+            return polygon[:0]
+        for side in np.flatnonzero(~inside.all(axis=0)):
+            polygon = clip(polygon, self.camera.planes[:, side], self.camera.offsets[side])
         return polygon
 
 
