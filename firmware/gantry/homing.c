@@ -6,9 +6,11 @@
 #include "rig.h"
 #include "units.h"
 
-/* SETTLE: brake. FORWARD, BACK: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at
- * home. RELEASE: go until it opens. */
-enum phase { SETTLE, LEAVE_FORWARD, LEAVE_BACK, APPROACH, RELEASE };
+/* SETTLE: brake. LEAVE: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at home.
+ * RELEASE: go until it opens. */
+enum phase { SETTLE, LEAVE, APPROACH, RELEASE };
+
+#define WAYS_OUT 7 /* back_offs from behind a switch that was hit: a slip may lead far */
 
 static int32_t travelled(enum motor motor)
 {
@@ -16,16 +18,11 @@ static int32_t travelled(enum motor motor)
     return way < 0x200000UL ? (int32_t)way : (int32_t)(0x400000UL - way);
 }
 
-static bool pressed(enum motor motor)
-{
-    return (rig.status[motor] & FLAG_SW_CLOSED) != 0;
-}
-
 /* Whether a switch of the motor's axis is closed: y1 and y2 leave together. */
 static bool axis_pressed(enum motor motor)
 {
     for (uint8_t m = 0; m < MOTORS; m++)
-        if (rig_axis(m) == rig_axis(motor) && pressed(m))
+        if (rig_axis(m) == rig_axis(motor) && rig_pressed(m))
             return true;
     return false;
 }
@@ -46,14 +43,31 @@ static void set_top_speeds(bool homing)
     drivers_set(REG_MAX_SPEED, 2, tops);
 }
 
-static void leave(enum phase phase, uint8_t op, int32_t times)
+/* How many back_offs an axis goes next to leave its switch, 0 when it has tried all: the way it came from, or to either
+ * side when nobody knows. */
+static int8_t way_out(enum axis axis)
+{
+    static const int8_t unknown[] = {1, -2};
+    if (rig.blocked[axis] != 0)
+        return rig.tries < WAYS_OUT ? (int8_t)-rig.blocked[axis] : 0;
+    return rig.tries < sizeof unknown ? unknown[rig.tries] : 0;
+}
+
+/* False when a switch stays closed. */
+static bool leave(void)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        uint32_t way = (uint32_t)(axes[rig_axis(m)].back_off * times);
-        orders[m] = axis_pressed(m) ? (struct order){op, way} : (struct order){OP_NOP, 0};
+        int8_t times = axis_pressed(m) ? way_out(rig_axis(m)) : 0;
+        if (times == 0 && axis_pressed(m))
+            return false;
+        uint32_t way = (uint32_t)(axes[rig_axis(m)].back_off * abs(times));
+        uint8_t op = times > 0 ? OP_MOVE + FORWARD : times < 0 ? OP_MOVE : OP_NOP;
+        orders[m] = (struct order){op, way};
     }
-    enter(phase, orders);
+    rig.tries++;
+    enter(LEAVE, orders);
+    return true;
 }
 
 static void approach(void)
@@ -97,7 +111,7 @@ static bool any_pressed(void)
 
 static bool all_pressed(void)
 {
-    return pressed(MOTOR_X) && pressed(MOTOR_Y1) && pressed(MOTOR_Y2) && pressed(MOTOR_ALPHA);
+    return rig_pressed(MOTOR_X) && rig_pressed(MOTOR_Y1) && rig_pressed(MOTOR_Y2) && rig_pressed(MOTOR_ALPHA);
 }
 
 /* Farther than the axis is long, or than a switch takes to open: the switch is stuck. Or y1 and y2 part. */
@@ -127,7 +141,7 @@ static void finish(void)
     rig.calibrated = true;
     rig.mode = MODE_REST;
     for (uint8_t a = 0; a < AXES; a++)
-        rig.blocked[a] = rig.going[a] = 0;
+        rig.blocked[a] = 0;
 }
 
 /* All motors stand: go on with the next phase. */
@@ -135,12 +149,10 @@ static void next_phase(void)
 {
     if (rig.phase == SETTLE)
         set_up();
-    if (rig.phase == SETTLE && any_pressed())
-        leave(LEAVE_FORWARD, OP_MOVE + FORWARD, 1);
-    else if (rig.phase == LEAVE_FORWARD && any_pressed())
-        leave(LEAVE_BACK, OP_MOVE, 2);
+    if (rig.phase < APPROACH && !any_pressed())
+        approach();
     else if (rig.phase < APPROACH)
-        any_pressed() ? fail() : approach();
+        leave() ? (void)0 : fail();
     else if (rig.phase == APPROACH)
         all_pressed() ? release() : fail();
     else
@@ -154,6 +166,7 @@ void homing_begin(void)
     rig_forget();
     rig.mode = MODE_HOMING;
     rig.phase = SETTLE;
+    rig.tries = 0;
 }
 
 void homing_tick(void)

@@ -16,8 +16,6 @@ static int32_t clipped(enum axis axis, int32_t want)
 {
     int32_t at = rig_position(axis), size = labs(want);
     int32_t room = want > 0 ? axes[axis].high - at : at - axes[axis].low;
-    if (sign(want) == rig.blocked[axis])
-        return 0;
     int32_t fastest = units_braking_speed(axis, room - size * LAG_MS / 1000);
     return sign(want) * (size < fastest ? size : fastest);
 }
@@ -30,8 +28,6 @@ static void tell(struct order *orders, enum axis axis, int32_t speed)
         if (rig_axis(m) == axis)
             orders[m] = (struct order){op, (uint32_t)labs(speed)};
     rig.told[axis] = speed;
-    if (speed != 0)
-        rig.going[axis] = sign(speed);
 }
 
 static void drive(void)
@@ -76,20 +72,12 @@ uint8_t motion_run(const int32_t *velocity, uint32_t now)
     return 0;
 }
 
-static uint8_t check_goal(enum axis axis, int32_t micro)
-{
-    if (!units_inside(axis, micro))
-        return ERROR_BOUNDS;
-    int32_t way = units_steps(axis, micro) - rig.position[rig_motor(axis)];
-    return rig.blocked[axis] != 0 && sign(way) == rig.blocked[axis] ? ERROR_BLOCKED : 0;
-}
-
 uint8_t motion_goto(const int32_t *position)
 {
     bool slept = rig.trouble == STATUS_WATCHDOG;
     uint8_t error = slept ? 0 : refused();
     for (uint8_t a = 0; a < AXES && error == 0; a++)
-        error = check_goal(a, position[a]);
+        error = units_inside(a, position[a]) ? 0 : ERROR_BOUNDS;
     if (error != 0)
         return error;
     if (slept)
@@ -109,7 +97,6 @@ static void set_off(void)
     for (uint8_t m = 0; m < MOTORS; m++) {
         enum axis axis = rig_axis(m);
         orders[m] = (struct order){OP_GOTO, (uint32_t)rig.goal[axis] & 0x3FFFFFUL};
-        rig.going[axis] = sign(rig.goal[axis] - rig.position[m]);
     }
     drivers_send(orders, 3);
     rig.mode = MODE_GOTO;

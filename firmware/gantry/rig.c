@@ -35,6 +35,11 @@ bool rig_moves(void)
     return false;
 }
 
+bool rig_pressed(enum motor motor)
+{
+    return (rig.status[motor] & FLAG_SW_CLOSED) != 0;
+}
+
 int32_t rig_position(enum axis axis)
 {
     return units_micro(axis, rig.position[rig_motor(axis)]);
@@ -122,19 +127,9 @@ static bool judge_drivers(void)
     return false;
 }
 
-static bool pressed(enum motor motor)
-{
-    return (rig.status[motor] & FLAG_SW_CLOSED) != 0;
-}
-
-/* The direction of the end that an axis stands at. */
-static int8_t nearest_end(enum axis axis)
-{
-    int32_t middle = axes[axis].low / 2 + axes[axis].high / 2;
-    return rig_position(axis) < middle ? -1 : 1;
-}
-
-/* The drivers stop on the edge by themselves, the pair's other one does not. */
+/* The drivers stop on the edge by themselves, the pair's other one does not. No right motion reaches a switch, so the
+ * position was wrong, or the switch is stuck and guards neither end: only CALIBRATE moves the rig after it. The
+ * direction is the driver's, as an axis that brakes before it turns still goes the old way. */
 static void judge_switch(enum motor motor)
 {
     enum axis axis = rig_axis(motor);
@@ -142,8 +137,9 @@ static void judge_switch(enum motor motor)
     if (idle || rig.touched[motor] || (rig.status[motor] & (FLAG_SW_CLOSED | FLAG_SW_EVENT)) == 0)
         return;
     rig.touched[motor] = true;
-    rig.blocked[axis] = rig.going[axis] != 0 ? rig.going[axis] : nearest_end(axis);
+    rig.blocked[axis] = (rig.status[motor] & FLAG_FORWARD) != 0 ? 1 : -1;
     rig_trouble(STATUS_LIMIT, (uint8_t)(1 << axis));
+    rig_forget();
 }
 
 static void judge_square(void)
@@ -155,27 +151,12 @@ static void judge_square(void)
     }
 }
 
-static void unblock(void)
-{
-    bool closed[AXES] = {false, false, false};
-    for (uint8_t m = 0; m < MOTORS; m++)
-        closed[rig_axis(m)] |= pressed(m);
-    for (uint8_t a = 0; a < AXES; a++) {
-        if (rig.blocked[a] != 0 && !closed[a] && rig.trouble == 0) {
-            rig.blocked[a] = 0;
-            rig_acknowledge();
-        }
-    }
-}
-
 void rig_judge(void)
 {
     bool homing = rig.mode == MODE_HOMING;
     if (!homing && broken_axes() == 0)
         for (uint8_t m = 0; m < MOTORS; m++)
             judge_switch(m);
-    if (!judge_drivers() || homing)
-        return;
-    judge_square();
-    unblock();
+    if (judge_drivers() && !homing)
+        judge_square();
 }

@@ -21,9 +21,8 @@ struct rig {
     int32_t want[AXES];     /* micro/s, of the last RUN */
     int32_t told[AXES];     /* units of SPEED, of the last order */
     int32_t goal[AXES];     /* steps */
-    int8_t going[AXES];     /* the direction of the last order: -1, 0 or 1 */
-    int8_t blocked[AXES];   /* the direction in which a switch is closed, or 0 */
-    uint8_t phase;          /* of homing */
+    int8_t blocked[AXES];   /* the direction in which a switch was hit, until home is found; or 0 */
+    uint8_t phase, tries;   /* of homing */
     int32_t begin[MOTORS];  /* position at the begin of homing's phase */
 };
 
@@ -38,6 +37,9 @@ void rig_look(void);
 
 /* Whether any motor turns. */
 bool rig_moves(void);
+
+/* Whether a motor's switch is closed. */
+bool rig_pressed(enum motor motor);
 
 /* Measured position of an axis, micro. */
 int32_t rig_position(enum axis axis);

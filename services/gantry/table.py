@@ -54,4 +54,3 @@ class Error(IntEnum):
     UNCALIBRATED = 6
     HOMING = 7
     TROUBLE = 8
-    BLOCKED = 9
