@@ -1,7 +1,7 @@
 /* The firmware's core on a host, against the models of drivers and mechanics, in a time that only orders advance.
  *
- * Lines on standard input: `send HEX` gives the core bytes, `run S` lets time pass, `restart` is a reset of the
- * controller, `quit`, and those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
+ * Lines on standard input: `send HEX` gives the core bytes, `run S` lets time pass, `pass S` while the core is busy,
+ * `restart` is a reset of the controller, `quit`, and those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -69,6 +69,8 @@ static bool obey(char *line)
         send(line + 5);
     else if (strncmp(line, "run ", 4) == 0)
         run(strtod(line + 4, NULL));
+    else if (strncmp(line, "pass ", 5) == 0)
+        pass(strtod(line + 5, NULL));
     else if (strcmp(line, "restart") == 0)
         gantry_begin();
     else

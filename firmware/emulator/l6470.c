@@ -168,6 +168,12 @@ void l6470_short(struct l6470 *chip)
     shut(chip);
 }
 
+void l6470_forget(struct l6470 *chip)
+{
+    forget(chip);
+    chip->latched = 0;
+}
+
 /* Bytes */
 
 static uint32_t value_of(struct l6470 *chip, uint8_t reg)

@@ -44,6 +44,9 @@ void l6470_heat(struct l6470 *chip, enum l6470_heat heat);
 void l6470_loss(struct l6470 *chip);
 void l6470_short(struct l6470 *chip);
 
+/* A driver that starts anew without a word. */
+void l6470_forget(struct l6470 *chip);
+
 /* Time passes, s. */
 void l6470_advance(struct l6470 *chip, double dt);
 

@@ -131,12 +131,11 @@ static bool too_far(void)
 
 static void finish(void)
 {
-    if (any_pressed()) {
+    if (any_pressed() || !rig_acknowledge()) {
         fail();
         return;
     }
     set_top_speeds(false);
-    rig_acknowledge();
     drivers_set_all(REG_MARK, 3, DRIVER_MARK);
     rig.calibrated = true;
     rig.mode = MODE_REST;

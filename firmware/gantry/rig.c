@@ -10,6 +10,7 @@ struct rig rig;
 #define BROKEN_LOW 0x0000
 #define RIGHT_FLAGS (FLAG_UVLO_NOT | FLAG_OCD_NOT)
 #define LOSS_FLAGS (FLAG_LOSS_A_NOT | FLAG_LOSS_B_NOT)
+#define SOUND_FLAGS (RIGHT_FLAGS | FLAG_HOT_NOT | LOSS_FLAGS) /* without one of them a rotor may be anywhere */
 
 enum motor rig_motor(enum axis axis)
 {
@@ -71,18 +72,21 @@ void rig_trouble(uint8_t status, uint8_t hard)
     rig_stop(hard);
 }
 
-void rig_acknowledge(void)
+bool rig_acknowledge(void)
 {
     uint16_t flags[MOTORS];
+    bool sound = true;
     drivers_status(flags, true);
     for (uint8_t m = 0; m < MOTORS; m++) {
-        if ((flags[m] & LOSS_FLAGS) != LOSS_FLAGS)
-            rig_forget();
+        sound = sound && (flags[m] & SOUND_FLAGS) == SOUND_FLAGS;
         if ((flags[m] & FLAG_SW_CLOSED) == 0)
             rig.touched[m] = false;
     }
+    if (!sound || (rig.calibrated && !drivers_remember()))
+        rig_forget();
     rig_look();
     rig.trouble = 0;
+    return sound;
 }
 
 /* The axes whose drivers are away, without power, short-circuited, or were given nonsense. */

@@ -53,8 +53,9 @@ void rig_forget(void);
 /* End the motion with a status, as rig_stop does. */
 void rig_trouble(uint8_t status, uint8_t hard);
 
-/* Take back flags whose reason is over, and the trouble. */
-void rig_acknowledge(void);
+/* Take back flags whose reason is over, and the trouble. False when a flag or a driver that forgot what it was told
+ * speaks against the position, which is void then. */
+bool rig_acknowledge(void);
 
 /* One step of the supervision: what the drivers say, and what follows from it. */
 void rig_judge(void);

@@ -87,3 +87,24 @@ def test_a_hard_stop_from_high_speed_voids_the_position(bench: Bench) -> None:
     bench.order("switch x works")
     bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("motor", MOTORS)
+@pytest.mark.parametrize("order", ["heat {} hot", "short {}", "push {} 8", "forget {}"])
+def test_stop_does_not_hide_what_voids_the_position(bench: Bench, motor: str, order: str) -> None:
+    """STOP takes back the flags before the firmware has looked at them."""
+    bench.order(order.format(motor))
+    bench.order(f"heat {motor} cool")
+    if order.startswith("push"):
+        bench.order("pass 0.0005")
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+
+
+def test_stop_does_not_hide_a_dip_of_the_supply(bench: Bench) -> None:
+    bench.order("motors off")
+    bench.order("motors on")
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+    bench.run(0.1)
+    assert bench.status() == Status.NOT_CALIBRATED
