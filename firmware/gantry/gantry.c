@@ -66,6 +66,8 @@ static void stop(void)
 
 static uint8_t obey(const struct request *request)
 {
+    if (request->command == COMMAND_STOP || request->command == COMMAND_CALIBRATE)
+        rig.resumed = false;
     switch (request->command) {
     case COMMAND_GOTO:
         return motion_goto(request->numbers);

@@ -184,6 +184,7 @@ void homing_wake(void)
     int32_t skew = rig.position[MOTOR_Y1] - rig.position[MOTOR_Y2];
     rig.calibrated = drivers_remember() && labs(skew) <= axes[AXIS_Y].square;
     if (rig.calibrated) {
+        rig.resumed = true;
         rig_stop(0);
         return;
     }

@@ -51,6 +51,8 @@ static uint8_t refused(void)
         return ERROR_HOMING;
     if (rig.trouble != 0)
         return ERROR_TROUBLE;
+    if (rig.resumed)
+        return ERROR_RESTARTED;
     return rig.calibrated ? 0 : ERROR_UNCALIBRATED;
 }
 

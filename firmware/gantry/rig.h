@@ -14,6 +14,7 @@ struct rig {
     enum mode mode;
     uint8_t trouble; /* the status that ended a motion, until it is acknowledged; 0 for none */
     bool calibrated;
+    bool resumed; /* the position is from before a reset, and nobody said that this was noticed */
     uint32_t heard; /* ms, when the last RUN came */
     uint16_t status[MOTORS];
     int32_t position[MOTORS];

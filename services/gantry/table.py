@@ -54,3 +54,4 @@ class Error(IntEnum):
     UNCALIBRATED = 6
     HOMING = 7
     TROUBLE = 8
+    RESTARTED = 9

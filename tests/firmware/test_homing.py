@@ -150,3 +150,25 @@ def test_a_reset_does_not_take_up_a_part(bench: Bench, motor: str) -> None:
     bench.run(0.1)
     bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("line", ["$RUN:0.2,0,0", "$GOTO:0.3,0,0"])
+@pytest.mark.parametrize("notice", ["$STOP", "$CALIBRATE"])
+def test_after_a_reset_nobody_drives_on_unaware(bench: Bench, line: str, notice: str) -> None:
+    """The master of before goes on with its lines, and does not look at the status."""
+    bench.keep_running("0.2,0,0", 0.6)
+    bench.order("restart")
+    for _ in range(20):
+        assert bench.say(line) == [f"$ERROR:{int(Error.RESTARTED)}"]
+        bench.run(0.05)
+    assert bench.status() == Status.IDLE
+    assert not bench.pose()["moves"]
+    bench.say(notice)
+    bench.until(Status.IDLE)
+    assert bench.say(line) == []
+
+
+def test_a_start_without_a_position_needs_no_stop(fresh: Bench) -> None:
+    fresh.order("restart")
+    fresh.calibrate()
+    fresh.go(-0.5, -0.5, 0)
