@@ -38,6 +38,8 @@ static bool on_motor(struct plant *plant, const char *order, int motor, const ch
         plant->carriages[motor].torn = true;
     else if (strcmp(order, "short") == 0)
         l6470_short(chip);
+    else if (strcmp(order, "freeze") == 0)
+        l6470_freeze(chip, true);
     else if (strcmp(order, "forget") == 0)
         l6470_forget(chip);
     else

@@ -13,6 +13,7 @@
     "  miscount MOTOR STEPS                a driver whose counter is off by full steps\n" \
     "  tear MOTOR                          a belt that is off: the motor turns and nothing moves\n" \
     "  short MOTOR                         a driver that sees too much current\n" \
+    "  freeze MOTOR                        a driver whose counter stands still\n" \
     "  forget MOTOR                        a driver that starts anew and has no flag of it\n" \
     "  motors on|off                       the motors' supply\n"
 

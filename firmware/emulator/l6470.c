@@ -64,6 +64,8 @@ void l6470_wake(struct l6470 *chip, bool awake)
 
 int32_t l6470_position(const struct l6470 *chip)
 {
+    if (chip->frozen)
+        return chip->frozen_at;
     int64_t steps = (int64_t)floor(chip->field) - (int64_t)chip->zero;
     return (int32_t)((steps + 0x200000) & 0x3FFFFF) - 0x200000;
 }
@@ -166,6 +168,12 @@ void l6470_short(struct l6470 *chip)
 {
     chip->latched |= L6470_OVERCURRENT;
     shut(chip);
+}
+
+void l6470_freeze(struct l6470 *chip, bool frozen)
+{
+    chip->frozen_at = l6470_position(chip);
+    chip->frozen = frozen;
 }
 
 void l6470_forget(struct l6470 *chip)

@@ -95,8 +95,18 @@ void gantry_take(uint8_t byte)
     uint8_t error = state == LINE_DAMAGED ? ERROR_DAMAGED : line_parse(line.text, &request);
     if (error == 0)
         error = obey(&request);
-    if (error != 0)
+    if (error == 0)
+        rig.lived = port_now();
+    else
         answer_error(error);
+}
+
+/* Nobody watches GOTO or CALIBRATE any more. */
+static void supervise_line(uint32_t now)
+{
+    bool alone = rig.mode == MODE_GOTO_SOON || rig.mode == MODE_GOTO || rig.mode == MODE_HOMING;
+    if (alone && now - rig.lived >= WATCHDOG_MS)
+        rig_trouble(STATUS_WATCHDOG, 0);
 }
 
 void gantry_begin(void)
@@ -115,6 +125,7 @@ void gantry_tick(void)
     ticked = now;
     rig_look();
     rig_judge();
+    supervise_line(now);
     motion_tick(now);
-    homing_tick();
+    homing_tick(now);
 }

@@ -30,6 +30,7 @@ static bool axis_pressed(enum motor motor)
 static void enter(enum phase phase, const struct order *orders)
 {
     rig.phase = (uint8_t)phase;
+    rig.since = port_now();
     for (uint8_t m = 0; m < MOTORS; m++)
         rig.begin[m] = rig.position[m];
     drivers_send(orders, orders[0].op == OP_RELEASE + FORWARD ? 0 : 3);
@@ -166,13 +167,14 @@ void homing_begin(void)
     rig.mode = MODE_HOMING;
     rig.phase = SETTLE;
     rig.tries = 0;
+    rig.since = port_now();
 }
 
-void homing_tick(void)
+void homing_tick(uint32_t now)
 {
     if (rig.mode != MODE_HOMING)
         return;
-    if (too_far())
+    if (too_far() || now - rig.since >= HOMING_PHASE_MS)
         fail();
     else if (!rig_moves())
         next_phase();

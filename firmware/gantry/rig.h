@@ -16,6 +16,8 @@ struct rig {
     bool calibrated;
     bool resumed; /* the position is from before a reset, and nobody said that this was noticed */
     uint32_t heard; /* ms, when the last RUN came */
+    uint32_t lived; /* ms, when the last valid line came, whatever it was */
+    uint32_t since; /* ms, when homing's phase began */
     uint16_t status[MOTORS];
     int32_t position[MOTORS];
     bool touched[MOTORS];   /* the switch closed, and has been dealt with */

@@ -63,8 +63,8 @@ def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, moto
     passed = 0.0
     while (status := bench.status()) == Status.HOMING:
         assert passed < 60
-        bench.run(0.5)
-        passed += 0.5
+        bench.run(0.4)
+        passed += 0.4
     assert status in (Status.FAULT, Status.STALL)
     assert all(one["value"] <= 0.4 for one in bench.happened("crash"))
     if stuck == "closed":
@@ -82,9 +82,22 @@ def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
     assert 1.85 < fresh.extremes()["way"][0] < 1.9
 
 
+def test_an_axis_that_never_arrives_is_a_fault(fresh: Bench) -> None:
+    """Neither its switch nor its counter says how far it is."""
+    fresh.order("tear x")
+    fresh.order("freeze x")
+    fresh.say("$CALIBRATE")
+    passed = fresh.until(Status.FAULT)
+    assert 30 <= passed <= 33
+    fresh.run(1)
+    assert not fresh.pose()["moves"]
+    fresh.say("$STOP")
+    assert fresh.status() == Status.NOT_CALIBRATED
+
+
 def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
     fresh.say("$CALIBRATE")
-    fresh.run(1)
+    fresh.watch(1)
     fresh.order("switch x closed")
     fresh.run(0.01)
     fresh.order("switch x works")
@@ -97,7 +110,7 @@ def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
 
 def test_only_stop_ends_it_early(fresh: Bench) -> None:
     fresh.say("$CALIBRATE")
-    fresh.run(1)
+    fresh.watch(1)
     for line in ("$RUN:0.1,0,0", "$GOTO:0,0,0", "$CALIBRATE"):
         assert fresh.say(line) == [f"$ERROR:{int(Error.HOMING)}"]
     fresh.say("$STOP")
@@ -128,7 +141,7 @@ def test_a_reset_takes_up_the_position_of_the_drivers(bench: Bench) -> None:
 def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str) -> None:
     if what == "homing":
         bench.say("$CALIBRATE")
-        bench.run(1)
+        bench.watch(1)
     elif what == "power":
         bench.order("motors off")
         bench.order("motors on")
@@ -137,7 +150,6 @@ def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str)
         bench.run(0.1)
     bench.order("restart")
     bench.run(0.5)
-    bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 
@@ -148,7 +160,6 @@ def test_a_reset_does_not_take_up_a_part(bench: Bench, motor: str) -> None:
     bench.run(0.1)
     bench.order("restart")
     bench.run(0.1)
-    bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 

@@ -25,6 +25,7 @@ def test_trouble_stops_everything(bench: Bench, motor: str, order: str, status: 
     assert bench.status() == status
     bench.run(1)
     assert not bench.pose()["moves"]
+    assert bench.say("$POSITION")[0].startswith("$ERROR") == void
     bench.order(f"heat {motor} cool")
     bench.say("$STOP")
     assert bench.status() == (Status.NOT_CALIBRATED if void else Status.IDLE)
