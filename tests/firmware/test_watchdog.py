@@ -111,3 +111,40 @@ def test_calibrate_without_anybody_is_not_calibrated(bench: Bench) -> None:
     assert bench.say("$GOTO:0,0,0") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
     bench.calibrate()
     bench.go(0, 0, 0)
+
+
+WRAPS = [0.02, 0.25, 0.49]
+"""s after the last line in which the clock of milliseconds wraps."""
+
+
+@pytest.mark.parametrize("wraps", WRAPS)
+def test_silence_is_noticed_in_time_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
+    bench.order(f"wraps {1.0 + wraps}")
+    bench.keep_running("0.3,0,0", 1)
+    bench.order(f"wraps {wraps}")
+    bench.say("$RUN:0.3,0,0")
+    bench.run(WATCHDOG - 0.01)
+    assert bench.status() == Status.MOVING
+    assert bench.pose()["vx"] == pytest.approx(0.3, rel=0.02)
+    bench.run(0.03)
+    assert bench.status() == Status.WATCHDOG
+    assert bench.pose()["vx"] < 0.295
+
+
+@pytest.mark.parametrize("wraps", WRAPS)
+def test_a_run_lives_on_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
+    bench.order(f"wraps {wraps}")
+    bench.keep_running("0.1,0,0", 2, every=0.4)
+    assert bench.status() == Status.MOVING
+
+
+@pytest.mark.parametrize("wraps", WRAPS)
+def test_goto_is_watched_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
+    bench.order(f"wraps {wraps}")
+    bench.say("$GOTO:0.9,0,0")
+    bench.run(WATCHDOG - 0.02)
+    assert bench.status() == Status.MOVING
+    bench.order(f"wraps {wraps}")
+    bench.say("$STATUS")
+    bench.run(WATCHDOG + 0.02)
+    assert bench.status() == Status.WATCHDOG
