@@ -28,10 +28,15 @@ void port_exchange(uint8_t *bytes)
     chain_select(&plant.chain, false);
 }
 
-void port_reset_drivers(void)
+void port_hold_drivers(void)
 {
     for (int m = 0; m < MOTORS; m++)
         l6470_wake(&plant.chain.chips[m], false);
+}
+
+void port_reset_drivers(void)
+{
+    port_hold_drivers();
     pass(0.001);
     for (int m = 0; m < MOTORS; m++)
         l6470_wake(&plant.chain.chips[m], true);

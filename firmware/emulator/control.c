@@ -47,6 +47,15 @@ static bool on_motor(struct plant *plant, const char *order, int motor, const ch
     return true;
 }
 
+static bool cut(struct plant *plant, const char *word)
+{
+    static const char *const wires[] = {"nothing", "spi", "clock", "data"};
+    int wire = which(word, wires, 4);
+    if (wire >= 0)
+        plant->chain.cut = (enum cut)wire;
+    return wire >= 0;
+}
+
 bool control(struct plant *plant, const char *line)
 {
     char order[16] = "", first[16] = "", second[16] = "";
@@ -56,6 +65,8 @@ bool control(struct plant *plant, const char *line)
     } else if (words == 1 && strcmp(order, "extremes") == 0) {
         say_extremes(plant);
         memset(plant->extremes, 0, sizeof plant->extremes);
+    } else if (words == 2 && strcmp(order, "cut") == 0) {
+        return cut(plant, first);
     } else if (words == 2 && strcmp(order, "motors") == 0 && (!strcmp(first, "on") || !strcmp(first, "off"))) {
         plant_motor_power(plant, strcmp(first, "on") == 0);
     } else {

@@ -15,6 +15,7 @@
     "  short MOTOR                         a driver that sees too much current\n" \
     "  freeze MOTOR                        a driver whose counter stands still\n" \
     "  forget MOTOR                        a driver that starts anew and has no flag of it\n" \
+    "  cut spi|clock|data|nothing          wires to the drivers, which go on with what they do\n" \
     "  motors on|off                       the motors' supply\n"
 
 /* Whether the order was one of these and done. */

@@ -93,6 +93,14 @@ static void configure_ramps(void)
     drivers_set(REG_DEC, 2, ramps);
 }
 
+void drivers_set_top_speeds(bool homing)
+{
+    uint32_t tops[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        tops[m] = homing ? axes[axis_of[m]].homing_top_register : axes[axis_of[m]].top_register;
+    drivers_set(REG_MAX_SPEED, 2, tops);
+}
+
 void drivers_configure(void)
 {
     uint32_t configs[MOTORS];
@@ -107,6 +115,7 @@ void drivers_configure(void)
     drivers_set_all(REG_OCD_TH, 1, DRIVER_OCD_TH);
     drivers_set_all(REG_STALL_TH, 1, DRIVER_STALL_TH);
     configure_ramps();
+    drivers_set_top_speeds(false);
 }
 
 bool drivers_remember(void)

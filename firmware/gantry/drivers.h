@@ -46,6 +46,9 @@ void drivers_position(int32_t position[MOTORS]);
 /* Write everything that differs from a driver's reset state; they must stand. */
 void drivers_configure(void);
 
+/* The highest speeds of homing, or those of all else. */
+void drivers_set_top_speeds(bool homing);
+
 /* Whether all drivers are configured, and bear the mark of a valid position. */
 bool drivers_remember(void);
 

@@ -36,14 +36,6 @@ static void enter(enum phase phase, const struct order *orders)
     drivers_send(orders, orders[0].op == OP_RELEASE + FORWARD ? 0 : 3);
 }
 
-static void set_top_speeds(bool homing)
-{
-    uint32_t tops[MOTORS];
-    for (uint8_t m = 0; m < MOTORS; m++)
-        tops[m] = homing ? axes[rig_axis(m)].homing_top_register : axes[rig_axis(m)].top_register;
-    drivers_set(REG_MAX_SPEED, 2, tops);
-}
-
 /* How many back_offs an axis goes next to leave its switch, 0 when it has tried all: the way it came from, or to either
  * side when nobody knows. */
 static int8_t way_out(enum axis axis)
@@ -97,7 +89,7 @@ static void set_up(void)
     port_reset_drivers();
     drivers_configure();
     rig_acknowledge();
-    set_top_speeds(true);
+    drivers_set_top_speeds(true);
 }
 
 static void fail(void)
@@ -136,7 +128,7 @@ static void finish(void)
         fail();
         return;
     }
-    set_top_speeds(false);
+    drivers_set_top_speeds(false);
     drivers_set_all(REG_MARK, 3, DRIVER_MARK);
     rig.calibrated = true;
     rig.mode = MODE_REST;
@@ -192,6 +184,5 @@ void homing_wake(void)
     }
     port_reset_drivers();
     drivers_configure();
-    set_top_speeds(false);
     rig_acknowledge();
 }

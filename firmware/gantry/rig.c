@@ -2,12 +2,14 @@
 
 #include <stdlib.h>
 
+#include "port.h"
 #include "units.h"
 
 struct rig rig;
 
 #define BROKEN_HIGH 0xFFFF /* what the line says without a driver */
 #define BROKEN_LOW 0x0000
+#define MUTE_LOOKS 2 /* a driver that does not answer so often in turn is away, and with it those behind it */
 #define RIGHT_FLAGS (FLAG_UVLO_NOT | FLAG_OCD_NOT)
 #define LOSS_FLAGS (FLAG_LOSS_A_NOT | FLAG_LOSS_B_NOT)
 #define SOUND_FLAGS (RIGHT_FLAGS | FLAG_HOT_NOT | LOSS_FLAGS) /* without one of them a rotor may be anywhere */
@@ -72,10 +74,20 @@ void rig_trouble(uint8_t status, uint8_t hard)
     rig_stop(hard);
 }
 
+static void let_go(void)
+{
+    port_reset_drivers();
+    drivers_configure();
+    rig.held = false;
+    rig.mute = 0;
+}
+
 bool rig_acknowledge(void)
 {
     uint16_t flags[MOTORS];
     bool sound = true;
+    if (rig.held)
+        let_go();
     drivers_status(flags, true);
     for (uint8_t m = 0; m < MOTORS; m++) {
         sound = sound && (flags[m] & SOUND_FLAGS) == SOUND_FLAGS;
@@ -89,14 +101,34 @@ bool rig_acknowledge(void)
     return sound;
 }
 
+static bool absent(enum motor motor)
+{
+    return rig.status[motor] == BROKEN_HIGH || rig.status[motor] == BROKEN_LOW;
+}
+
+bool rig_mute(void)
+{
+    for (uint8_t m = 0; m < MOTORS; m++)
+        if (absent(m))
+            return true;
+    return false;
+}
+
+void rig_hold(void)
+{
+    port_hold_drivers();
+    rig.held = true;
+    rig_trouble(STATUS_FAULT, (1 << AXES) - 1);
+    rig_forget();
+}
+
 /* The axes whose drivers are away, without power, short-circuited, or were given nonsense. */
 static uint8_t broken_axes(void)
 {
     uint8_t broken = 0;
     for (uint8_t m = 0; m < MOTORS; m++) {
         uint16_t s = rig.status[m];
-        bool absent = s == BROKEN_HIGH || s == BROKEN_LOW;
-        if (absent || (s & RIGHT_FLAGS) != RIGHT_FLAGS || (s & (FLAG_WRONG | FLAG_NOT_PERFORMED)) != 0)
+        if (absent(m) || (s & RIGHT_FLAGS) != RIGHT_FLAGS || (s & (FLAG_WRONG | FLAG_NOT_PERFORMED)) != 0)
             broken |= (uint8_t)(1 << rig_axis(m));
     }
     return broken;
@@ -155,8 +187,19 @@ static void judge_square(void)
     }
 }
 
+/* A driver that does not answer does not hear either, and goes on with what it was told last. */
+static void judge_bus(void)
+{
+    if (rig.held)
+        return;
+    rig.mute = rig_mute() ? rig.mute + 1 : 0;
+    if (rig.mute >= MUTE_LOOKS)
+        rig_hold();
+}
+
 void rig_judge(void)
 {
+    judge_bus();
     bool homing = rig.mode == MODE_HOMING;
     if (!homing && broken_axes() == 0)
         for (uint8_t m = 0; m < MOTORS; m++)

@@ -18,6 +18,8 @@ struct rig {
     uint32_t heard; /* ms, when the last RUN came */
     uint32_t lived; /* ms, when the last valid line came, whatever it was */
     uint32_t since; /* ms, when homing's phase began */
+    bool held;    /* the drivers' reset is down, as orders do not reach them */
+    uint8_t mute; /* looks in which a driver did not answer, one after the other */
     uint16_t status[MOTORS];
     int32_t position[MOTORS];
     bool touched[MOTORS];   /* the switch closed, and has been dealt with */
@@ -55,6 +57,12 @@ void rig_forget(void);
 
 /* End the motion with a status, as rig_stop does. */
 void rig_trouble(uint8_t status, uint8_t hard);
+
+/* Take the current from all motors, as orders do not reach them; until the trouble is acknowledged. */
+void rig_hold(void);
+
+/* Whether a driver does not answer. */
+bool rig_mute(void);
 
 /* Take back flags whose reason is over, and the trouble. False when a flag or a driver that forgot what it was told
  * speaks against the position, which is void then. */

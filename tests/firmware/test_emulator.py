@@ -53,6 +53,9 @@ def test_run_brakes_before_the_edge(rig: Rig) -> None:
         ("heat y1 hot", Status.HOT),
         ("short x", Status.FAULT),
         ("motors off", Status.FAULT),
+        ("cut spi", Status.FAULT),
+        ("cut clock", Status.FAULT),
+        ("cut data", Status.FAULT),
     ],
 )
 def test_faults_stop_the_rig_and_have_a_status(rig: Rig, order: str, status: Status) -> None:

@@ -109,3 +109,31 @@ def test_stop_does_not_hide_a_dip_of_the_supply(bench: Bench) -> None:
     assert bench.status() == Status.NOT_CALIBRATED
     bench.run(0.1)
     assert bench.status() == Status.NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("wire", ["spi", "clock", "data"])
+@pytest.mark.parametrize("line", ["$RUN:0.3,0.2,0.4", "$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
+def test_drivers_that_cannot_be_told_lose_their_current(bench: Bench, wire: str, line: str) -> None:
+    for _ in range(15):
+        bench.say(line)
+        bench.run(0.05)
+    bench.order(f"cut {wire}")
+    bench.run(0.02)
+    assert bench.status() == Status.FAULT
+    bench.run(0.15)
+    pose = bench.pose()
+    assert not pose["moves"]
+    assert abs(pose["vx"]) + abs(pose["vy"]) + abs(pose["vyaw"]) < 1e-3
+    for attempt in ("$STOP", "$CALIBRATE", line):
+        bench.say(attempt)
+        bench.run(0.1)
+        assert bench.status() == Status.FAULT
+    assert not bench.pose()["moves"]
+    bench.order("cut nothing")
+    bench.run(0.1)
+    assert bench.status() == Status.FAULT
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+    bench.calibrate()
+    bench.go(0.1, 0.1, 0.1)
+    assert bench.is_true()
