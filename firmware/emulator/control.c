@@ -24,6 +24,7 @@ static int motor_of(const char *word)
 static bool on_motor(struct plant *plant, const char *order, int motor, const char *how)
 {
     static const char *const stuck[] = {"works", "open", "closed"}, *const heats[] = {"cool", "warm", "hot"};
+    static const char *const off_on[] = {"off", "on"};
     struct l6470 *chip = &plant->chain.chips[motor];
     int choice;
     if (strcmp(order, "push") == 0 && fabs(strtod(how, NULL)) <= 10000)
@@ -38,8 +39,10 @@ static bool on_motor(struct plant *plant, const char *order, int motor, const ch
         plant->carriages[motor].torn = true;
     else if (strcmp(order, "short") == 0)
         l6470_short(chip);
-    else if (strcmp(order, "freeze") == 0)
-        l6470_freeze(chip, true);
+    else if (strcmp(order, "freeze") == 0 && (choice = which(how, off_on, 2)) >= 0)
+        l6470_freeze(chip, choice);
+    else if (strcmp(order, "deaf") == 0 && (choice = which(how, off_on, 2)) >= 0)
+        chip->deaf = choice;
     else if (strcmp(order, "forget") == 0)
         l6470_forget(chip);
     else

@@ -79,7 +79,7 @@ static uint16_t motion_bits(const struct l6470 *chip)
 {
     if (chip->motion == L6470_STANDS)
         return 0;
-    if (chip->motion == L6470_STOPS || fabs(chip->speed) > fabs(chip->wanted))
+    if (chip->motion == L6470_STOPS || chip->speed * chip->wanted < 0 || fabs(chip->speed) > fabs(chip->wanted))
         return 2;
     return fabs(chip->speed) < fabs(chip->wanted) ? 1 : 3;
 }
@@ -288,6 +288,8 @@ static void release(struct l6470 *chip, bool forward)
 static void perform(struct l6470 *chip)
 {
     uint8_t op = chip->op, reg = op & 0x1F;
+    if (chip->deaf)
+        return;
     bool forward = op & 1;
     uint32_t value = chip->argument;
     if (op < 0x20)
@@ -348,6 +350,8 @@ static void begin(struct l6470 *chip, uint8_t op)
         return;
     if (op > 0x20 && op < 0x40 && rows[op & 0x1F].bits > 0)
         answer(chip, value_of(chip, op & 0x1F), bytes_of(op & 0x1F));
+    else if (chip->deaf && op != 0xD0)
+        return;
     else if (!perform_bare(chip, op))
         chip->latched |= L6470_WRONG;
 }

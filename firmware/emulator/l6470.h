@@ -18,6 +18,7 @@ struct l6470 {
     bool powered, awake; /* motor supply, and reset high */
     bool bridges_off, off_after_stop, forward, copy_to_mark;
     bool switch_closed;
+    bool deaf;   /* it answers, and does nothing of what it is told */
     bool frozen; /* the counter stands still */
     int32_t frozen_at;
     enum l6470_heat heat;

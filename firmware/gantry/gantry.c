@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "doubt.h"
 #include "homing.h"
 #include "line.h"
 #include "motion.h"
@@ -127,5 +128,6 @@ void gantry_tick(void)
     rig_judge();
     supervise_line(now);
     motion_tick(now);
+    doubt_tick(now);
     homing_tick(now);
 }

@@ -5,6 +5,7 @@
 #include "units.h"
 
 #define LAG_MS 4 /* from a measurement to the driver's answer to it, at the most */
+#define AGAIN_MS 50 /* after which an order is given again, as it may have got lost */
 
 static int8_t sign(int32_t value)
 {
@@ -30,17 +31,19 @@ static void tell(struct order *orders, enum axis axis, int32_t speed)
     rig.told[axis] = speed;
 }
 
-static void drive(void)
+static void drive(uint32_t now)
 {
     struct order orders[MOTORS] = {{OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}};
-    bool news = false;
+    bool again = now - rig.sent >= AGAIN_MS, news = again;
     for (uint8_t a = 0; a < AXES; a++) {
         int32_t speed = units_speed(a, clipped(a, rig.want[a]));
-        if (speed != rig.told[a]) {
+        if (again || speed != rig.told[a]) {
             tell(orders, a, speed);
             news = true;
         }
     }
+    if (again)
+        rig.sent = now;
     if (news)
         drivers_send(orders, 3);
 }
@@ -70,7 +73,7 @@ uint8_t motion_run(const int32_t *velocity, uint32_t now)
         rig.want[a] = velocity[a];
     rig.mode = MODE_RUN;
     rig.heard = now;
-    drive();
+    drive(now);
     return 0;
 }
 
@@ -116,7 +119,7 @@ static void supervise_run(uint32_t now)
 {
     bool standing = rig.told[AXIS_X] == 0 && rig.told[AXIS_Y] == 0 && rig.told[AXIS_YAW] == 0;
     if (now - rig.heard < WATCHDOG_MS)
-        drive();
+        drive(now);
     else if (standing)
         rig.mode = MODE_REST;
     else

@@ -10,6 +10,13 @@
 
 enum mode { MODE_REST, MODE_RUN, MODE_GOTO_SOON, MODE_GOTO, MODE_HOMING };
 
+/* A motor's way since it has the speed that it was told. */
+struct way {
+    uint32_t since; /* ms */
+    int32_t begin;  /* microsteps */
+    int32_t told;   /* units of SPEED */
+};
+
 struct rig {
     enum mode mode;
     uint8_t trouble; /* the status that ended a motion, until it is acknowledged; 0 for none */
@@ -25,6 +32,10 @@ struct rig {
     bool touched[MOTORS];   /* the switch closed, and has been dealt with */
     int32_t want[AXES];     /* micro/s, of the last RUN */
     int32_t told[AXES];     /* units of SPEED, of the last order */
+    uint32_t sent;          /* ms, when all orders of a RUN were last given */
+    uint32_t obeyed;        /* ms, when no driver contradicted what it was told */
+    bool doubted;           /* one still does after it was told to brake */
+    struct way way[MOTORS];
     int32_t goal[AXES];     /* steps */
     int8_t blocked[AXES];   /* the direction in which a switch was hit, until home is found; or 0 */
     uint8_t phase, tries;   /* of homing */

@@ -85,7 +85,7 @@ def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
 def test_an_axis_that_never_arrives_is_a_fault(fresh: Bench) -> None:
     """Neither its switch nor its counter says how far it is."""
     fresh.order("tear x")
-    fresh.order("freeze x")
+    fresh.order("freeze x on")
     fresh.say("$CALIBRATE")
     passed = fresh.until(Status.FAULT)
     assert 30 <= passed <= 33
