@@ -9,7 +9,8 @@
 #define RESONANCE (2 * M_PI * 60) /* rad/s, of a NEMA 17 with its load */
 #define DAMPING (2 * 0.3 * RESONANCE)
 #define PULL (RESONANCE * RESONANCE * 2 / M_PI) /* full steps/s2 at one full step of lag, the most there is */
-#define FRICTION 20000.0                        /* full steps/s2 without current, 6 m/s2 */
+#define BARRIER (PULL * 4 / M_PI) /* (full steps/s)2, half the square of the speed that one pole can catch: 480 */
+#define FRICTION 20000.0          /* full steps/s2 of a rotor that no field holds, 6 m/s2 */
 
 static const struct axis_constants constants[AXES] = AXIS_ROWS;
 
@@ -92,16 +93,25 @@ static void note_slip(struct plant *plant, enum motor motor)
     c->slips = slips;
 }
 
+static void rub(struct carriage *c)
+{
+    double loss = FRICTION * PLANT_DT;
+    c->speed = fabs(c->speed) < loss ? 0 : c->speed - copysign(loss, c->speed);
+}
+
+/* A rotor that is too quick for a pole slips over one after the other: they pull it to and fro, and only friction brakes
+ * it. Pull and damping come from the same current, so both together are no more than the most that there is. */
 static void move_rotor(struct plant *plant, enum motor motor, double field_speed)
 {
     struct carriage *c = &plant->carriages[motor];
-    if (plant->chain.chips[motor].bridges_off) {
-        double loss = FRICTION * PLANT_DT;
-        c->speed = fabs(c->speed) < loss ? 0 : c->speed - copysign(loss, c->speed);
-    } else {
-        double lag = field_of(plant, motor) - c->at;
-        c->speed += (PULL * sin(M_PI_2 * lag) - DAMPING * (c->speed - field_speed)) * PLANT_DT;
-    }
+    double lag = field_of(plant, motor) - c->at, relative = c->speed - field_speed;
+    bool slips = relative * relative / 2 + BARRIER / 2 * (1 - cos(M_PI_2 * lag)) > BARRIER;
+    bool off = plant->chain.chips[motor].bridges_off;
+    double pull = PULL * sin(M_PI_2 * lag) - (slips ? 0 : DAMPING * relative);
+    if (!off)
+        c->speed += fmin(fmax(pull, -PULL), PULL) * PLANT_DT;
+    if (off || slips)
+        rub(c);
     c->at += c->speed * PLANT_DT;
 }
 
