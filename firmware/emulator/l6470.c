@@ -8,6 +8,7 @@
 #define RAMP_UNIT (MICRO * 14.5519152)   /* microsteps/s2 of a unit of ACC: 2^-40 step/tick2 */
 #define TOP_UNIT (MICRO / 0.065536)      /* microsteps/s of a unit of MAX_SPEED */
 #define LOW_UNIT (MICRO * 0.238418579)   /* microsteps/s of a unit of MIN_SPEED */
+#define TURN (4 * MICRO)                 /* microsteps of an electrical turn */
 #define RELEASE_LEAST (MICRO * 5)
 #define STOPS_SOFT (1 << 4) /* SW_MODE in CONFIG */
 
@@ -41,7 +42,7 @@ static void forget(struct l6470 *chip)
         chip->registers[i] = rows[i].reset;
     chip->motion = L6470_STANDS;
     chip->speed = chip->wanted = 0;
-    chip->field = chip->zero = floor(chip->field);
+    chip->field = chip->zero = TURN * floor(chip->field / TURN + 0.5); /* EL_POS is 0: the rotor will jump there */
     chip->bridges_off = chip->forward = true;
     chip->off_after_stop = false;
     chip->latched = L6470_UNDERVOLTAGE;

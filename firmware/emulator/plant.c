@@ -10,7 +10,11 @@
 #define DAMPING (2 * 0.3 * RESONANCE)
 #define PULL (RESONANCE * RESONANCE * 2 / M_PI) /* full steps/s2 at one full step of lag, the most there is */
 #define BARRIER (PULL * 4 / M_PI) /* (full steps/s)2, half the square of the speed that one pole can catch: 480 */
+#define BOUNCING 0.003            /* s that a switch bounces when it closes or opens */
+#define BOUNCE 0.0003             /* s between two edges of that */
 #define FRICTION 20000.0          /* full steps/s2 of a rotor that no field holds, 6 m/s2 */
+
+#define CAUGHT 0.6                /* of a turn of four steps; at a half a rotor can fall to either side */
 
 static const struct axis_constants constants[AXES] = AXIS_ROWS;
 
@@ -48,6 +52,12 @@ static double field_of(const struct plant *plant, enum motor motor)
     return floor(plant->chain.chips[motor].field) / MICRO + plant->carriages[motor].origin;
 }
 
+static bool bounces(const struct plant *plant, const struct carriage *c)
+{
+    double left = c->bounces_until - plant->time;
+    return left > 0 && (int)(left / BOUNCE) % 2 == 1;
+}
+
 static void see_switch(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
@@ -56,8 +66,11 @@ static void see_switch(struct plant *plant, enum motor motor)
     double back = c->closed ? 1 : 0;
     bool low_end = c->at < steps_of(motor, ends[axis].closes) * (back - 1);
     bool high_end = c->at > high - back * steps_of(motor, ends[axis].hysteresis);
-    c->closed = low_end || high_end;
-    bool seen = c->stuck == SWITCH_WORKS ? c->closed : c->stuck == SWITCH_CLOSED;
+    bool closed = low_end || high_end;
+    if (closed != c->closed)
+        c->bounces_until = plant->time + BOUNCING + BOUNCE / 2;
+    c->closed = closed;
+    bool seen = c->stuck == SWITCH_WORKS ? c->closed != bounces(plant, c) : c->stuck == SWITCH_CLOSED;
     if (seen != plant->chain.chips[motor].switch_closed)
         say_event(plant->time, seen ? "closed" : "open", motor, 0);
     l6470_switch(&plant->chain.chips[motor], seen);
@@ -83,10 +96,12 @@ static void hit_frame(struct plant *plant, enum motor motor)
 static void note_slip(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
-    long slips = lround((field_of(plant, motor) - c->at) / 4);
-    if (slips == c->slips)
+    double turns = (field_of(plant, motor) - c->at) / 4;
+    long slips = lround(turns);
+    bool held = !plant->chain.chips[motor].bridges_off;
+    if (held && fabs(turns - (double)c->slips) < CAUGHT)
         return;
-    if (!plant->chain.chips[motor].bridges_off) {
+    if (held) {
         say_event(plant->time, "slip", motor, (double)(slips - c->slips));
         l6470_loss(&plant->chain.chips[motor]);
     }

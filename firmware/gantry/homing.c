@@ -6,10 +6,12 @@
 #include "rig.h"
 #include "units.h"
 
-/* SETTLE: brake. LEAVE: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at home.
+/* SETTLE: brake. START: the drivers begin anew, at which rotors jump by up to two steps, and hold them. LEAVE: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at home.
  * RELEASE: go until it opens. */
-enum phase { SETTLE, LEAVE, APPROACH, RELEASE };
+enum phase { SETTLE, START, LEAVE, APPROACH, RELEASE };
 
+#define QUIET_LOOKS 10 /* in which all stands and no switch bounces, before the next phase begins */
+#define START_LOOKS 50 /* in which the rotors come to rest after their jump */
 #define WAYS_OUT 7 /* back_offs from behind a switch that was hit: a slip may lead far */
 
 static int32_t travelled(enum motor motor)
@@ -27,13 +29,13 @@ static bool axis_pressed(enum motor motor)
     return false;
 }
 
-static void enter(enum phase phase, const struct order *orders)
+static void enter(enum phase phase)
 {
     rig.phase = (uint8_t)phase;
+    rig.quiet = 0;
     rig.since = port_now();
     for (uint8_t m = 0; m < MOTORS; m++)
         rig.begin[m] = rig.position[m];
-    drivers_send(orders, orders[0].op == OP_RELEASE + FORWARD ? 0 : 3);
 }
 
 /* How many back_offs an axis goes next to leave its switch, 0 when it has tried all: the way it came from, or to either
@@ -59,7 +61,8 @@ static bool leave(void)
         orders[m] = (struct order){op, way};
     }
     rig.tries++;
-    enter(LEAVE, orders);
+    drivers_send(orders, 3);
+    enter(LEAVE);
     return true;
 }
 
@@ -68,7 +71,8 @@ static void approach(void)
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
         orders[m] = (struct order){OP_GO_UNTIL, (uint32_t)axes[rig_axis(m)].homing_speed};
-    enter(APPROACH, orders);
+    drivers_send(orders, 3);
+    enter(APPROACH);
 }
 
 /* The counters begin at 0 here as well, so that the way to where the switches open is seen. */
@@ -81,15 +85,21 @@ static void release(void)
     }
     drivers_send(zero, 0);
     rig_look();
-    enter(RELEASE, orders);
+    drivers_send(orders, 0);
+    enter(RELEASE);
 }
 
 static void set_up(void)
 {
+    struct order hold[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        hold[m] = (struct order){OP_HARD_STOP, 0};
     port_reset_drivers();
     drivers_configure();
     rig_acknowledge();
     drivers_set_top_speeds(true);
+    drivers_send(hold, 0);
+    enter(START);
 }
 
 static void fail(void)
@@ -136,12 +146,22 @@ static void finish(void)
         rig.blocked[a] = 0;
 }
 
+static bool quiet(void)
+{
+    uint8_t closed = 0;
+    for (uint8_t m = 0; m < MOTORS; m++)
+        closed |= (uint8_t)(rig_pressed(m) << m);
+    rig.quiet = rig_moves() || closed != rig.closed ? 0 : rig.quiet + 1;
+    rig.closed = closed;
+    return rig.quiet >= (rig.phase == START ? START_LOOKS : QUIET_LOOKS);
+}
+
 /* All motors stand: go on with the next phase. */
 static void next_phase(void)
 {
     if (rig.phase == SETTLE)
         set_up();
-    if (rig.phase < APPROACH && !any_pressed())
+    else if (rig.phase < APPROACH && !any_pressed())
         approach();
     else if (rig.phase < APPROACH)
         leave() ? (void)0 : fail();
@@ -158,7 +178,7 @@ void homing_begin(void)
     rig_forget();
     rig.mode = MODE_HOMING;
     rig.phase = SETTLE;
-    rig.tries = 0;
+    rig.tries = rig.quiet = 0;
     rig.since = port_now();
 }
 
@@ -168,7 +188,7 @@ void homing_tick(uint32_t now)
         return;
     if (too_far() || now - rig.since >= HOMING_PHASE_MS)
         fail();
-    else if (!rig_moves())
+    else if (quiet())
         next_phase();
 }
 

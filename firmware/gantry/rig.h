@@ -39,6 +39,7 @@ struct rig {
     int32_t goal[AXES];     /* steps */
     int8_t blocked[AXES];   /* the direction in which a switch was hit, until home is found; or 0 */
     uint8_t phase, tries;   /* of homing */
+    uint8_t quiet, closed;  /* looks without any change; motors (1 << motor) whose switches were closed then */
     int32_t begin[MOTORS];  /* position at the begin of homing's phase */
 };
 

@@ -35,6 +35,46 @@ def test_it_finds_home_from_a_closed_switch_at_either_end(bench_program: Path, p
         assert bench.happened("crash") == []
 
 
+@pytest.mark.parametrize("shift", range(6))
+def test_home_is_found_from_anywhere_though_switches_bounce(bench_program: Path, shift: int) -> None:
+    """Wherever an axis starts, the switches bounce for some milliseconds at any phase of the firmware's looks."""
+    place = (-0.85 + 0.00017 * shift, -0.6 + 0.00023 * shift, -140 + 0.13 * shift)
+    with Bench(bench_program, place) as bench:
+        bench.calibrate()
+        bench.run(0.3)
+        assert bench.is_true()
+        edges = [one["event"] for one in bench.events if one["event"] in ("open", "closed") and one["motor"] == "x"]
+        assert len(edges) > 10
+        bench.watch(0.4)
+        assert bench.status() == Status.IDLE
+
+
+def test_rotors_jump_when_drivers_start_anew(bench: Bench) -> None:
+    """A driver's electrical angle is 0 after its reset, up to two full steps away."""
+    bench.go(0.0003, 0.0001, 0.5)
+    before = bench.pose()
+    bench.say("$CALIBRATE")
+    bench.run(0.09)
+    after = bench.pose()
+    jumps = [abs(after[axis] - before[axis]) / (128 * MICROSTEP[axis]) for axis in ("x", "y", "yaw")]
+    assert 0.5 < max(jumps) < 4.5
+    bench.until(Status.IDLE)
+    bench.run(0.3)
+    assert bench.is_true()
+    assert bench.happened("slip") == []
+
+
+@pytest.mark.parametrize("beyond", [1, 3, 9, 20])
+def test_a_rotor_may_stand_between_two_poles_when_drivers_start_anew(bench: Bench, beyond: int) -> None:
+    """So it falls to either side, and has to rest there before the field sets off, or it loses a turn of four steps."""
+    half_turn = round((0.9 + 0.1) / MICROSTEP["x"] / 512) * 512 - 256
+    bench.go(-0.9 + (half_turn + beyond) * MICROSTEP["x"], -0.7 + (half_turn - beyond) * MICROSTEP["y"], 0)
+    bench.calibrate()
+    bench.run(0.3)
+    assert bench.is_true()
+    assert bench.happened("slip") == []
+
+
 def test_y1_and_y2_are_square_afterwards(fresh: Bench) -> None:
     fresh.order("push y1 12")
     fresh.run(0.1)
