@@ -17,8 +17,7 @@ static int which(const char *word, const char *const *words, int count)
 
 static int motor_of(const char *word)
 {
-    static const char *const motors[MOTORS] = {"x", "y1", "y2", "alpha"};
-    return which(word, motors, MOTORS);
+    return which(word, say_motors, MOTORS);
 }
 
 static bool on_motor(struct plant *plant, const char *order, int motor, const char *how)

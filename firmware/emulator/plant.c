@@ -17,6 +17,7 @@
 #define CAUGHT 0.6                /* of a turn of four steps; at a half a rotor can fall to either side */
 
 static const struct axis_constants constants[AXES] = AXIS_ROWS;
+static const enum axis axis_of[MOTORS] = MOTOR_AXES;
 
 /* In m or degrees: from step 0 to where the switch at home closes, from the highest position to where the other one
  * closes, how much earlier that one opens, and how far behind them the frame ends. */
@@ -24,25 +25,20 @@ static const struct {
     double closes, beyond, hysteresis, frame;
 } ends[AXES] = {{0.001, 0.005, 0.001, 0.02}, {0.001, 0.005, 0.001, 0.02}, {1, 1.5, 1, 8}};
 
-static enum axis axis_of(enum motor motor)
-{
-    return motor == MOTOR_X ? AXIS_X : motor == MOTOR_ALPHA ? AXIS_YAW : AXIS_Y;
-}
-
 double plant_unit(enum motor motor)
 {
-    return (double)constants[axis_of(motor)].micro_q32 / 4294967296.0 * MICRO / 1e6;
+    return (double)constants[axis_of[motor]].micro_q32 / 4294967296.0 * MICRO / 1e6;
 }
 
 /* m or degrees of an axis as full steps. */
 static double steps_of(enum motor motor, double length)
 {
-    return length * (axis_of(motor) == AXIS_YAW ? M_PI / 180 : 1) / plant_unit(motor);
+    return length * (axis_of[motor] == AXIS_YAW ? M_PI / 180 : 1) / plant_unit(motor);
 }
 
 static double length_of(enum motor motor)
 {
-    const struct axis_constants *c = &constants[axis_of(motor)];
+    const struct axis_constants *c = &constants[axis_of[motor]];
     return c->high * 1e-6 / plant_unit(motor) + c->offset / MICRO;
 }
 
@@ -61,7 +57,7 @@ static bool bounces(const struct plant *plant, const struct carriage *c)
 static void see_switch(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
-    enum axis axis = axis_of(motor);
+    enum axis axis = axis_of[motor];
     double high = length_of(motor) + steps_of(motor, ends[axis].beyond);
     double back = c->closed ? 1 : 0;
     bool low_end = c->at < steps_of(motor, ends[axis].closes) * (back - 1);
@@ -79,7 +75,7 @@ static void see_switch(struct plant *plant, enum motor motor)
 static void hit_frame(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
-    double room = steps_of(motor, ends[axis_of(motor)].frame), at = fmin(fmax(c->at, -room), length_of(motor) + room);
+    double room = steps_of(motor, ends[axis_of[motor]].frame), at = fmin(fmax(c->at, -room), length_of(motor) + room);
     if (at == c->at) {
         c->crashed = false;
         return;
@@ -170,7 +166,7 @@ void plant_begin(struct plant *plant, const double *place)
         struct l6470 *chip = &plant->chain.chips[m];
         chip->awake = true;
         l6470_power(chip, true);
-        c->at = c->origin = place[axis_of(m)] / plant_unit(m) + constants[axis_of(m)].offset / MICRO;
+        c->at = c->origin = place[axis_of[m]] / plant_unit(m) + constants[axis_of[m]].offset / MICRO;
         see_switch(plant, m);
     }
 }
@@ -188,7 +184,7 @@ struct pose plant_pose(const struct plant *plant)
     struct pose pose = {.skew = 0};
     for (int m = 0; m < MOTORS; m++) {
         const struct carriage *c = &plant->carriages[m];
-        enum axis axis = axis_of(m);
+        enum axis axis = axis_of[m];
         double half = axis == AXIS_Y ? 0.5 : 1, unit = plant_unit(m);
         pose.place[axis] += half * (c->at - constants[axis].offset / MICRO) * unit;
         pose.speed[axis] += half * c->speed * unit;

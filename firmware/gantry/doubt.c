@@ -13,7 +13,7 @@
 /* Whether a motor stands, moves, or goes steadily the other way than it was told. One that brakes may still obey. */
 static bool contradicts(enum motor motor)
 {
-    int32_t told = rig.told[rig_axis(motor)];
+    int32_t told = rig.told[units_axis(motor)];
     uint16_t motion = rig.status[motor] & FLAG_MOTION;
     bool forward = (rig.status[motor] & FLAG_FORWARD) != 0;
     if (motion == 0)
@@ -24,14 +24,14 @@ static bool contradicts(enum motor motor)
 /* The ways are compared only from when a motor has reached the speed that it was told. */
 static void begin_way(enum motor motor, uint32_t now)
 {
-    rig.way[motor] = (struct way){now, rig.position[motor], rig.told[rig_axis(motor)]};
+    rig.way[motor] = (struct way){now, rig.position[motor], rig.told[units_axis(motor)]};
 }
 
 /* Whether a counter goes another way than a motor was told. */
 static bool strays(enum motor motor, uint32_t now)
 {
     const struct way *way = &rig.way[motor];
-    bool steady = (rig.status[motor] & FLAG_MOTION) == MOTION_CONSTANT && way->told == rig.told[rig_axis(motor)];
+    bool steady = (rig.status[motor] & FLAG_MOTION) == MOTION_CONSTANT && way->told == rig.told[units_axis(motor)];
     uint32_t time = now - way->since;
     if (steady && time < WAY_MS)
         return false;

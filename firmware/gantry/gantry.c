@@ -4,6 +4,7 @@
 
 #include "doubt.h"
 #include "homing.h"
+#include "judge.h"
 #include "line.h"
 #include "motion.h"
 #include "port.h"
@@ -125,7 +126,7 @@ void gantry_tick(void)
         return;
     ticked = now;
     rig_look();
-    rig_judge();
+    judge_tick();
     supervise_line(now);
     motion_tick(now);
     doubt_tick(now);

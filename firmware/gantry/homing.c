@@ -4,6 +4,7 @@
 
 #include "port.h"
 #include "rig.h"
+#include "switches.h"
 #include "units.h"
 
 /* SETTLE: brake. START: the drivers begin anew, at which rotors jump by up to two steps, and hold them. LEAVE: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at home.
@@ -18,15 +19,6 @@ static int32_t travelled(enum motor motor)
 {
     uint32_t way = ((uint32_t)rig.position[motor] - (uint32_t)rig.begin[motor]) & 0x3FFFFFUL;
     return way < 0x200000UL ? (int32_t)way : (int32_t)(0x400000UL - way);
-}
-
-/* Whether a switch of the motor's axis is closed: y1 and y2 leave together. */
-static bool axis_pressed(enum motor motor)
-{
-    for (uint8_t m = 0; m < MOTORS; m++)
-        if (rig_axis(m) == rig_axis(motor) && rig_pressed(m))
-            return true;
-    return false;
 }
 
 static void enter(enum phase phase)
@@ -53,10 +45,10 @@ static bool leave(void)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        int8_t times = axis_pressed(m) ? way_out(rig_axis(m)) : 0;
-        if (times == 0 && axis_pressed(m))
+        int8_t times = switches_axis_closed(units_axis(m)) ? way_out(units_axis(m)) : 0;
+        if (times == 0 && switches_axis_closed(units_axis(m)))
             return false;
-        uint32_t way = (uint32_t)(axes[rig_axis(m)].back_off * abs(times));
+        uint32_t way = (uint32_t)(axes[units_axis(m)].back_off * abs(times));
         uint8_t op = times > 0 ? OP_MOVE + FORWARD : times < 0 ? OP_MOVE : OP_NOP;
         orders[m] = (struct order){op, way};
     }
@@ -70,7 +62,7 @@ static void approach(void)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        orders[m] = (struct order){OP_GO_UNTIL, (uint32_t)axes[rig_axis(m)].homing_speed};
+        orders[m] = (struct order){OP_GO_UNTIL, (uint32_t)axes[units_axis(m)].homing_speed};
     drivers_send(orders, 3);
     enter(APPROACH);
 }
@@ -107,23 +99,13 @@ static void fail(void)
     rig_trouble(STATUS_FAULT, (1 << AXES) - 1);
 }
 
-static bool any_pressed(void)
-{
-    return axis_pressed(MOTOR_X) || axis_pressed(MOTOR_Y1) || axis_pressed(MOTOR_ALPHA);
-}
-
-static bool all_pressed(void)
-{
-    return rig_pressed(MOTOR_X) && rig_pressed(MOTOR_Y1) && rig_pressed(MOTOR_Y2) && rig_pressed(MOTOR_ALPHA);
-}
-
 /* Farther than the axis is long, or than a switch takes to open: the switch is stuck. Or y1 and y2 part. */
 static bool too_far(void)
 {
     if (rig.phase != APPROACH && rig.phase != RELEASE)
         return false;
     for (uint8_t m = 0; m < MOTORS; m++) {
-        enum axis axis = rig_axis(m);
+        enum axis axis = units_axis(m);
         int32_t length = units_steps(axis, axes[axis].high) + 4 * axes[axis].back_off;
         if (travelled(m) > (rig.phase == APPROACH ? length : 2 * axes[axis].back_off))
             return true;
@@ -134,7 +116,7 @@ static bool too_far(void)
 
 static void finish(void)
 {
-    if (any_pressed() || !rig_acknowledge()) {
+    if (switches_any_closed() || !rig_acknowledge()) {
         fail();
         return;
     }
@@ -146,27 +128,17 @@ static void finish(void)
         rig.blocked[a] = 0;
 }
 
-static bool quiet(void)
-{
-    uint8_t closed = 0;
-    for (uint8_t m = 0; m < MOTORS; m++)
-        closed |= (uint8_t)(rig_pressed(m) << m);
-    rig.quiet = rig_moves() || closed != rig.closed ? 0 : rig.quiet + 1;
-    rig.closed = closed;
-    return rig.quiet >= (rig.phase == START ? START_LOOKS : QUIET_LOOKS);
-}
-
 /* All motors stand: go on with the next phase. */
 static void next_phase(void)
 {
     if (rig.phase == SETTLE)
         set_up();
-    else if (rig.phase < APPROACH && !any_pressed())
+    else if (rig.phase < APPROACH && !switches_any_closed())
         approach();
     else if (rig.phase < APPROACH)
         leave() ? (void)0 : fail();
     else if (rig.phase == APPROACH)
-        all_pressed() ? release() : fail();
+        switches_all_closed() ? release() : fail();
     else
         finish();
 }
@@ -188,7 +160,7 @@ void homing_tick(uint32_t now)
         return;
     if (too_far() || now - rig.since >= HOMING_PHASE_MS)
         fail();
-    else if (quiet())
+    else if (switches_quiet(rig.phase == START ? START_LOOKS : QUIET_LOOKS))
         next_phase();
 }
 

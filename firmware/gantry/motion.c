@@ -26,7 +26,7 @@ static void tell(struct order *orders, enum axis axis, int32_t speed)
 {
     uint8_t op = speed == 0 ? OP_SOFT_STOP : speed > 0 ? OP_RUN | FORWARD : OP_RUN;
     for (uint8_t m = 0; m < MOTORS; m++)
-        if (rig_axis(m) == axis)
+        if (units_axis(m) == axis)
             orders[m] = (struct order){op, (uint32_t)labs(speed)};
     rig.told[axis] = speed;
 }
@@ -100,7 +100,7 @@ static void set_off(void)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        enum axis axis = rig_axis(m);
+        enum axis axis = units_axis(m);
         orders[m] = (struct order){OP_GOTO, (uint32_t)rig.goal[axis] & 0x3FFFFFUL};
     }
     drivers_send(orders, 3);
@@ -111,7 +111,7 @@ static void arrive(void)
 {
     rig.mode = MODE_REST;
     for (uint8_t m = 0; m < MOTORS; m++)
-        if (rig.position[m] != rig.goal[rig_axis(m)])
+        if (rig.position[m] != rig.goal[units_axis(m)])
             rig_trouble(STATUS_FAULT, 0);
 }
 

@@ -45,18 +45,11 @@ struct rig {
 
 extern struct rig rig;
 
-/* The first motor of an axis, and the axis of a motor. */
-enum motor rig_motor(enum axis axis);
-enum axis rig_axis(enum motor motor);
-
 /* Read STATUS and ABS_POS of all drivers. */
 void rig_look(void);
 
 /* Whether any motor turns. */
 bool rig_moves(void);
-
-/* Whether a motor's switch is closed. */
-bool rig_pressed(enum motor motor);
 
 /* Measured position of an axis, micro. */
 int32_t rig_position(enum axis axis);
@@ -73,14 +66,12 @@ void rig_trouble(uint8_t status, uint8_t hard);
 /* Take the current from all motors, as orders do not reach them; until the trouble is acknowledged. */
 void rig_hold(void);
 
-/* Whether a driver does not answer. */
+/* Whether a driver does not answer, and whether any does not. */
+bool rig_absent(enum motor motor);
 bool rig_mute(void);
 
 /* Take back flags whose reason is over, and the trouble. False when a flag or a driver that forgot what it was told
  * speaks against the position, which is void then. */
 bool rig_acknowledge(void);
-
-/* One step of the supervision: what the drivers say, and what follows from it. */
-void rig_judge(void);
 
 #endif
