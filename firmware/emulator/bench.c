@@ -1,7 +1,8 @@
 /* The firmware's core on a host, against the models of drivers and mechanics, in a time that only orders advance.
  *
  * Lines on standard input: `send HEX` gives the core bytes, `run S` lets time pass, `pass S` while the core is busy,
- * `wraps S` lets the core's clock of milliseconds wrap in S seconds, `restart` is a reset of the controller, `quit`, and those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
+ * `wraps S` lets the core's clock of milliseconds wrap in S seconds, `restart` is a reset of the controller, `quit`, and
+ * those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

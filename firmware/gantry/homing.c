@@ -7,8 +7,8 @@
 #include "switches.h"
 #include "units.h"
 
-/* SETTLE: brake. START: the drivers begin anew, at which rotors jump by up to two steps, and hold them. LEAVE: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at home.
- * RELEASE: go until it opens. */
+/* SETTLE: brake. START: the drivers begin anew, at which rotors jump by up to two steps, and hold them. LEAVE: leave a
+ * switch that is closed, at whichever end it is. APPROACH: go to the switch at home. RELEASE: go until it opens. */
 enum phase { SETTLE, START, LEAVE, APPROACH, RELEASE };
 
 #define QUIET_LOOKS 10 /* in which all stands and no switch bounces, before the next phase begins */
