@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include "homing.h"
 #include "rig.h"
 #include "units.h"
 
@@ -64,7 +65,8 @@ static void judge_orders(uint32_t now)
 
 void doubt_tick(uint32_t now)
 {
-    bool judged = (rig.mode == MODE_RUN || rig.mode == MODE_REST) && !rig.held && !rig_mute();
+    bool brakes = rig.mode == MODE_REST || rig.mode == MODE_GOTO_SOON || homing_brakes();
+    bool judged = (rig.mode == MODE_RUN || brakes) && !rig.held && !rig_mute();
     for (uint8_t m = 0; m < MOTORS; m++)
         if (!judged)
             begin_way(m, now);

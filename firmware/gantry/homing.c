@@ -154,6 +154,11 @@ void homing_begin(void)
     rig.since = port_now();
 }
 
+bool homing_brakes(void)
+{
+    return rig.mode == MODE_HOMING && rig.phase == SETTLE;
+}
+
 void homing_tick(uint32_t now)
 {
     if (rig.mode != MODE_HOMING)

@@ -17,14 +17,15 @@ def keep_saying(bench: Bench, velocity: str, seconds: float) -> None:
 
 
 @pytest.mark.parametrize("motor", MOTORS)
-@pytest.mark.parametrize("line", ["$STOP", "$RUN:-0.2,-0.2,-0.2", "$RUN:0,0,0"])
+@pytest.mark.parametrize("line", ["$STOP", "$GOTO:0,0,0", "$CALIBRATE", "$RUN:-0.2,-0.2,-0.2", "$RUN:0,0,0"])
 def test_a_driver_that_does_not_obey_loses_its_current(bench: Bench, motor: str, line: str) -> None:
     """It answers and goes on. It is told again, then everything brakes, and then nothing has current."""
     bench.keep_running(SPEED, 1)
     bench.order(f"deaf {motor} on")
+    bench.say(line)
     for _ in range(8):
-        bench.say(line if "RUN" in line else "$STATUS") if _ else bench.say(line)
         bench.run(0.05)
+        bench.say(line if "RUN" in line else "$STATUS")
     bench.run(0.05)
     assert bench.status() == Status.FAULT
     assert not bench.pose()["moves"]

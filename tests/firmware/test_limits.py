@@ -154,6 +154,22 @@ def test_a_switch_hit_while_the_axis_turns_is_left_the_way_it_came(bench: Bench,
     assert bench.happened("crash") == []
 
 
+def test_a_switch_hit_at_speed_while_the_rig_is_told_to_go_back_blocks_both_ways(bench: Bench) -> None:
+    bench.go(0.5, 0, 0)
+    miscount(bench, "x", True, 0.2)
+    while bench.pose()["x"] < 0.76:
+        bench.keep_running("0.5,0,0", 0.02, every=0.02)
+    run_until_limit(bench, "$RUN:-0.5,0,0", patience=1)
+    bench.run(0.5)
+    bench.say("$STOP")
+    bench.extremes()
+    for line in ("$RUN:0.3,0,0", "$RUN:-0.3,0,0", "$GOTO:0,0,0"):
+        assert bench.say(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    bench.run(0.5)
+    assert bench.extremes()["way"] == [0, 0, 0]
+    assert bench.happened("crash") == []
+
+
 @pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
 def test_a_switch_that_is_stuck_closed_lets_nothing_move(bench: Bench, motor: str) -> None:
     """Both ends share an input, so a stuck switch guards neither: CALIBRATE tries to leave it, and then gives up."""
