@@ -1,7 +1,8 @@
 /* The firmware's core on a host, against the models of drivers and mechanics, in a time that only orders advance.
  *
- * Lines on standard input: `send HEX` gives the core bytes, `run S` lets time pass, `restart` is a reset of the
- * controller, `quit`, and those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
+ * Lines on standard input: `send HEX` gives the core bytes, `run S` lets time pass, `pass S` while the core is busy,
+ * `wraps S` lets the core's clock of milliseconds wrap in S seconds, `restart` is a reset of the controller, `quit`, and
+ * those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +13,7 @@
 #include "say.h"
 
 static struct plant plant;
+static uint32_t clock_at_begin;
 
 static void pass(double seconds)
 {
@@ -27,10 +29,15 @@ void port_exchange(uint8_t *bytes)
     chain_select(&plant.chain, false);
 }
 
-void port_reset_drivers(void)
+void port_hold_drivers(void)
 {
     for (int m = 0; m < MOTORS; m++)
         l6470_wake(&plant.chain.chips[m], false);
+}
+
+void port_reset_drivers(void)
+{
+    port_hold_drivers();
     pass(0.001);
     for (int m = 0; m < MOTORS; m++)
         l6470_wake(&plant.chain.chips[m], true);
@@ -39,7 +46,7 @@ void port_reset_drivers(void)
 
 uint32_t port_now(void)
 {
-    return (uint32_t)(plant.time * 1000 + 1e-6) + 4294967000U; /* wraps soon, on purpose */
+    return (uint32_t)(plant.time * 1000 + 1e-6) + clock_at_begin;
 }
 
 void port_answer(const char *line)
@@ -69,6 +76,10 @@ static bool obey(char *line)
         send(line + 5);
     else if (strncmp(line, "run ", 4) == 0)
         run(strtod(line + 4, NULL));
+    else if (strncmp(line, "pass ", 5) == 0)
+        pass(strtod(line + 5, NULL));
+    else if (strncmp(line, "wraps ", 6) == 0)
+        clock_at_begin -= port_now() + (uint32_t)(strtod(line + 6, NULL) * 1000);
     else if (strcmp(line, "restart") == 0)
         gantry_begin();
     else

@@ -6,10 +6,14 @@
 
 #define CHIPS 4
 
+/* What is cut of the wires to the drivers: nothing, chip select (or all), clock, data to the first. */
+enum cut { CUT_NOTHING, CUT_SELECT, CUT_CLOCK, CUT_DATA };
+
 struct chain {
     struct l6470 chips[CHIPS]; /* the first is nearest to the controller's output */
     uint8_t shift[CHIPS];
     bool selected;
+    enum cut cut;
 };
 
 void chain_select(struct chain *chain, bool selected);

@@ -17,13 +17,13 @@ static int which(const char *word, const char *const *words, int count)
 
 static int motor_of(const char *word)
 {
-    static const char *const motors[MOTORS] = {"x", "y1", "y2", "alpha"};
-    return which(word, motors, MOTORS);
+    return which(word, say_motors, MOTORS);
 }
 
 static bool on_motor(struct plant *plant, const char *order, int motor, const char *how)
 {
     static const char *const stuck[] = {"works", "open", "closed"}, *const heats[] = {"cool", "warm", "hot"};
+    static const char *const off_on[] = {"off", "on"};
     struct l6470 *chip = &plant->chain.chips[motor];
     int choice;
     if (strcmp(order, "push") == 0 && fabs(strtod(how, NULL)) <= 10000)
@@ -38,9 +38,24 @@ static bool on_motor(struct plant *plant, const char *order, int motor, const ch
         plant->carriages[motor].torn = true;
     else if (strcmp(order, "short") == 0)
         l6470_short(chip);
+    else if (strcmp(order, "freeze") == 0 && (choice = which(how, off_on, 2)) >= 0)
+        l6470_freeze(chip, choice);
+    else if (strcmp(order, "deaf") == 0 && (choice = which(how, off_on, 2)) >= 0)
+        chip->deaf = choice;
+    else if (strcmp(order, "forget") == 0)
+        l6470_forget(chip);
     else
         return false;
     return true;
+}
+
+static bool cut(struct plant *plant, const char *word)
+{
+    static const char *const wires[] = {"nothing", "spi", "clock", "data"};
+    int wire = which(word, wires, 4);
+    if (wire >= 0)
+        plant->chain.cut = (enum cut)wire;
+    return wire >= 0;
 }
 
 bool control(struct plant *plant, const char *line)
@@ -52,6 +67,8 @@ bool control(struct plant *plant, const char *line)
     } else if (words == 1 && strcmp(order, "extremes") == 0) {
         say_extremes(plant);
         memset(plant->extremes, 0, sizeof plant->extremes);
+    } else if (words == 2 && strcmp(order, "cut") == 0) {
+        return cut(plant, first);
     } else if (words == 2 && strcmp(order, "motors") == 0 && (!strcmp(first, "on") || !strcmp(first, "off"))) {
         plant_motor_power(plant, strcmp(first, "on") == 0);
     } else {

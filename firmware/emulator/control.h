@@ -13,6 +13,10 @@
     "  miscount MOTOR STEPS                a driver whose counter is off by full steps\n" \
     "  tear MOTOR                          a belt that is off: the motor turns and nothing moves\n" \
     "  short MOTOR                         a driver that sees too much current\n" \
+    "  deaf MOTOR on|off                   a driver that answers, and does nothing of what it is told\n" \
+    "  freeze MOTOR on|off                 a driver whose counter stands still\n" \
+    "  forget MOTOR                        a driver that starts anew and has no flag of it\n" \
+    "  cut spi|clock|data|nothing          wires to the drivers, which go on with what they do\n" \
     "  motors on|off                       the motors' supply\n"
 
 /* Whether the order was one of these and done. */

@@ -18,6 +18,9 @@ struct l6470 {
     bool powered, awake; /* motor supply, and reset high */
     bool bridges_off, off_after_stop, forward, copy_to_mark;
     bool switch_closed;
+    bool deaf;   /* it answers, and does nothing of what it is told */
+    bool frozen; /* the counter stands still */
+    int32_t frozen_at;
     enum l6470_heat heat;
     uint16_t latched; /* flags of STATUS that are raised, all active high here */
     uint8_t op, left, answer_left;
@@ -43,6 +46,12 @@ void l6470_heat(struct l6470 *chip, enum l6470_heat heat);
 /* A motor that slipped, and a short circuit. */
 void l6470_loss(struct l6470 *chip);
 void l6470_short(struct l6470 *chip);
+
+/* A counter that stands still from now on, or goes on. */
+void l6470_freeze(struct l6470 *chip, bool frozen);
+
+/* A driver that starts anew without a word. */
+void l6470_forget(struct l6470 *chip);
 
 /* Time passes, s. */
 void l6470_advance(struct l6470 *chip, double dt);

@@ -9,9 +9,15 @@
 #define RESONANCE (2 * M_PI * 60) /* rad/s, of a NEMA 17 with its load */
 #define DAMPING (2 * 0.3 * RESONANCE)
 #define PULL (RESONANCE * RESONANCE * 2 / M_PI) /* full steps/s2 at one full step of lag, the most there is */
-#define FRICTION 20000.0                        /* full steps/s2 without current, 6 m/s2 */
+#define BARRIER (PULL * 4 / M_PI) /* (full steps/s)2, half the square of the speed that one pole can catch: 480 */
+#define BOUNCING 0.003            /* s that a switch bounces when it closes or opens */
+#define BOUNCE 0.0003             /* s between two edges of that */
+#define FRICTION 20000.0          /* full steps/s2 of a rotor that no field holds, 6 m/s2 */
+
+#define CAUGHT 0.6                /* of a turn of four steps; at a half a rotor can fall to either side */
 
 static const struct axis_constants constants[AXES] = AXIS_ROWS;
+static const enum axis axis_of[MOTORS] = MOTOR_AXES;
 
 /* In m or degrees: from step 0 to where the switch at home closes, from the highest position to where the other one
  * closes, how much earlier that one opens, and how far behind them the frame ends. */
@@ -19,25 +25,20 @@ static const struct {
     double closes, beyond, hysteresis, frame;
 } ends[AXES] = {{0.001, 0.005, 0.001, 0.02}, {0.001, 0.005, 0.001, 0.02}, {1, 1.5, 1, 8}};
 
-static enum axis axis_of(enum motor motor)
-{
-    return motor == MOTOR_X ? AXIS_X : motor == MOTOR_ALPHA ? AXIS_YAW : AXIS_Y;
-}
-
 double plant_unit(enum motor motor)
 {
-    return (double)constants[axis_of(motor)].micro_q32 / 4294967296.0 * MICRO / 1e6;
+    return (double)constants[axis_of[motor]].micro_q32 / 4294967296.0 * MICRO / 1e6;
 }
 
 /* m or degrees of an axis as full steps. */
 static double steps_of(enum motor motor, double length)
 {
-    return length * (axis_of(motor) == AXIS_YAW ? M_PI / 180 : 1) / plant_unit(motor);
+    return length * (axis_of[motor] == AXIS_YAW ? M_PI / 180 : 1) / plant_unit(motor);
 }
 
 static double length_of(enum motor motor)
 {
-    const struct axis_constants *c = &constants[axis_of(motor)];
+    const struct axis_constants *c = &constants[axis_of[motor]];
     return c->high * 1e-6 / plant_unit(motor) + c->offset / MICRO;
 }
 
@@ -47,16 +48,25 @@ static double field_of(const struct plant *plant, enum motor motor)
     return floor(plant->chain.chips[motor].field) / MICRO + plant->carriages[motor].origin;
 }
 
+static bool bounces(const struct plant *plant, const struct carriage *c)
+{
+    double left = c->bounces_until - plant->time;
+    return left > 0 && (int)(left / BOUNCE) % 2 == 1;
+}
+
 static void see_switch(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
-    enum axis axis = axis_of(motor);
+    enum axis axis = axis_of[motor];
     double high = length_of(motor) + steps_of(motor, ends[axis].beyond);
     double back = c->closed ? 1 : 0;
     bool low_end = c->at < steps_of(motor, ends[axis].closes) * (back - 1);
     bool high_end = c->at > high - back * steps_of(motor, ends[axis].hysteresis);
-    c->closed = low_end || high_end;
-    bool seen = c->stuck == SWITCH_WORKS ? c->closed : c->stuck == SWITCH_CLOSED;
+    bool closed = low_end || high_end;
+    if (closed != c->closed)
+        c->bounces_until = plant->time + BOUNCING + BOUNCE / 2;
+    c->closed = closed;
+    bool seen = c->stuck == SWITCH_WORKS ? c->closed != bounces(plant, c) : c->stuck == SWITCH_CLOSED;
     if (seen != plant->chain.chips[motor].switch_closed)
         say_event(plant->time, seen ? "closed" : "open", motor, 0);
     l6470_switch(&plant->chain.chips[motor], seen);
@@ -65,7 +75,7 @@ static void see_switch(struct plant *plant, enum motor motor)
 static void hit_frame(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
-    double room = steps_of(motor, ends[axis_of(motor)].frame), at = fmin(fmax(c->at, -room), length_of(motor) + room);
+    double room = steps_of(motor, ends[axis_of[motor]].frame), at = fmin(fmax(c->at, -room), length_of(motor) + room);
     if (at == c->at) {
         c->crashed = false;
         return;
@@ -82,26 +92,37 @@ static void hit_frame(struct plant *plant, enum motor motor)
 static void note_slip(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
-    long slips = lround((field_of(plant, motor) - c->at) / 4);
-    if (slips == c->slips)
+    double turns = (field_of(plant, motor) - c->at) / 4;
+    long slips = lround(turns);
+    bool held = !plant->chain.chips[motor].bridges_off;
+    if (held && fabs(turns - (double)c->slips) < CAUGHT)
         return;
-    if (!plant->chain.chips[motor].bridges_off) {
+    if (held) {
         say_event(plant->time, "slip", motor, (double)(slips - c->slips));
         l6470_loss(&plant->chain.chips[motor]);
     }
     c->slips = slips;
 }
 
+static void rub(struct carriage *c)
+{
+    double loss = FRICTION * PLANT_DT;
+    c->speed = fabs(c->speed) < loss ? 0 : c->speed - copysign(loss, c->speed);
+}
+
+/* A rotor that is too quick for a pole slips over one after the other: they pull it to and fro, and only friction brakes
+ * it. Pull and damping come from the same current, so both together are no more than the most that there is. */
 static void move_rotor(struct plant *plant, enum motor motor, double field_speed)
 {
     struct carriage *c = &plant->carriages[motor];
-    if (plant->chain.chips[motor].bridges_off) {
-        double loss = FRICTION * PLANT_DT;
-        c->speed = fabs(c->speed) < loss ? 0 : c->speed - copysign(loss, c->speed);
-    } else {
-        double lag = field_of(plant, motor) - c->at;
-        c->speed += (PULL * sin(M_PI_2 * lag) - DAMPING * (c->speed - field_speed)) * PLANT_DT;
-    }
+    double lag = field_of(plant, motor) - c->at, relative = c->speed - field_speed;
+    bool slips = relative * relative / 2 + BARRIER / 2 * (1 - cos(M_PI_2 * lag)) > BARRIER;
+    bool off = plant->chain.chips[motor].bridges_off;
+    double pull = PULL * sin(M_PI_2 * lag) - (slips ? 0 : DAMPING * relative);
+    if (!off)
+        c->speed += fmin(fmax(pull, -PULL), PULL) * PLANT_DT;
+    if (off || slips)
+        rub(c);
     c->at += c->speed * PLANT_DT;
 }
 
@@ -145,7 +166,7 @@ void plant_begin(struct plant *plant, const double *place)
         struct l6470 *chip = &plant->chain.chips[m];
         chip->awake = true;
         l6470_power(chip, true);
-        c->at = c->origin = place[axis_of(m)] / plant_unit(m) + constants[axis_of(m)].offset / MICRO;
+        c->at = c->origin = place[axis_of[m]] / plant_unit(m) + constants[axis_of[m]].offset / MICRO;
         see_switch(plant, m);
     }
 }
@@ -163,7 +184,7 @@ struct pose plant_pose(const struct plant *plant)
     struct pose pose = {.skew = 0};
     for (int m = 0; m < MOTORS; m++) {
         const struct carriage *c = &plant->carriages[m];
-        enum axis axis = axis_of(m);
+        enum axis axis = axis_of[m];
         double half = axis == AXIS_Y ? 0.5 : 1, unit = plant_unit(m);
         pose.place[axis] += half * (c->at - constants[axis].offset / MICRO) * unit;
         pose.speed[axis] += half * c->speed * unit;

@@ -15,6 +15,7 @@ struct carriage {
     double origin;     /* at - field when nothing was lost */
     long slips;        /* turns of four full steps that rotor and field are apart */
     bool closed, crashed, torn; /* torn: the belt is off */
+    double bounces_until;       /* s */
     enum stuck stuck;
 };
 

@@ -9,7 +9,7 @@
 
 static int listener = -1;
 static struct sockaddr_un address;
-static const char *const names[MOTORS] = {"x", "y1", "y2", "alpha"};
+const char *const say_motors[MOTORS] = MOTOR_NAMES;
 
 int say_to(const char *path)
 {
@@ -40,7 +40,7 @@ void say(const char *format, ...)
 
 void say_event(double time, const char *event, enum motor motor, double value)
 {
-    say("\"event\": \"%s\", \"t\": %.4f, \"motor\": \"%s\", \"value\": %.4g", event, time, names[motor], value);
+    say("\"event\": \"%s\", \"t\": %.4f, \"motor\": \"%s\", \"value\": %.4g", event, time, say_motors[motor], value);
 }
 
 void say_pose(const struct plant *plant)

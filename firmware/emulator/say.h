@@ -7,6 +7,8 @@
 /* Send each line to a Unix datagram socket as well; lines that nobody takes are dropped. 0, or -1 with errno. */
 int say_to(const char *path);
 
+extern const char *const say_motors[MOTORS];
+
 void say_event(double time, const char *event, enum motor motor, double value);
 void say_pose(const struct plant *plant);
 void say_extremes(const struct plant *plant);

@@ -3,8 +3,6 @@
 #include "port.h"
 #include "units.h"
 
-static const uint8_t axis_of[MOTORS] = {AXIS_X, AXIS_Y, AXIS_Y, AXIS_YAW};
-
 static uint32_t config_of(uint8_t motor)
 {
     return motor == 0 ? DRIVER_CONFIG_FIRST : DRIVER_CONFIG_OTHERS;
@@ -88,9 +86,17 @@ static void configure_ramps(void)
 {
     uint32_t ramps[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        ramps[m] = axes[axis_of[m]].ramp_register;
+        ramps[m] = axes[units_axis(m)].ramp_register;
     drivers_set(REG_ACC, 2, ramps);
     drivers_set(REG_DEC, 2, ramps);
+}
+
+void drivers_set_top_speeds(bool homing)
+{
+    uint32_t tops[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        tops[m] = homing ? axes[units_axis(m)].homing_top_register : axes[units_axis(m)].top_register;
+    drivers_set(REG_MAX_SPEED, 2, tops);
 }
 
 void drivers_configure(void)
@@ -107,6 +113,7 @@ void drivers_configure(void)
     drivers_set_all(REG_OCD_TH, 1, DRIVER_OCD_TH);
     drivers_set_all(REG_STALL_TH, 1, DRIVER_STALL_TH);
     configure_ramps();
+    drivers_set_top_speeds(false);
 }
 
 bool drivers_remember(void)

@@ -19,9 +19,12 @@ enum { /* commands; those that move forward are one more; GO_UNTIL copies the po
 };
 
 enum { /* flags of STATUS */
-    FLAG_SW_CLOSED = 1 << 2, FLAG_SW_EVENT = 1 << 3, FLAG_MOTION = 3 << 5, FLAG_NOT_PERFORMED = 1 << 7,
-    FLAG_WRONG = 1 << 8, FLAG_BUSY_NOT = 1 << 1, FLAG_UVLO_NOT = 1 << 9, FLAG_WARM_NOT = 1 << 10,
-    FLAG_HOT_NOT = 1 << 11, FLAG_OCD_NOT = 1 << 12, FLAG_LOSS_A_NOT = 1 << 13, FLAG_LOSS_B_NOT = 1 << 14
+    FLAG_SW_CLOSED = 1 << 2, FLAG_SW_EVENT = 1 << 3, FLAG_FORWARD = 1 << 4, FLAG_MOTION = 3 << 5, FLAG_NOT_PERFORMED = 1 << 7,
+    FLAG_WRONG = 1 << 8, FLAG_UVLO_NOT = 1 << 9, FLAG_WARM_NOT = 1 << 10,
+    FLAG_HOT_NOT = 1 << 11, FLAG_OCD_NOT = 1 << 12, FLAG_LOSS_A_NOT = 1 << 13, FLAG_LOSS_B_NOT = 1 << 14,
+    FLAGS_RIGHT = FLAG_UVLO_NOT | FLAG_OCD_NOT, FLAGS_LOSS = FLAG_LOSS_A_NOT | FLAG_LOSS_B_NOT,
+    FLAGS_SOUND = FLAGS_RIGHT | FLAG_HOT_NOT | FLAGS_LOSS, /* without one of them a rotor may be anywhere */
+    MOTION_BRAKES = 2 << 5, MOTION_CONSTANT = 3 << 5 /* values of FLAG_MOTION; 0 stands */
 };
 
 struct order {
@@ -45,6 +48,9 @@ void drivers_position(int32_t position[MOTORS]);
 
 /* Write everything that differs from a driver's reset state; they must stand. */
 void drivers_configure(void);
+
+/* The highest speeds of homing, or those of all else. */
+void drivers_set_top_speeds(bool homing);
 
 /* Whether all drivers are configured, and bear the mark of a valid position. */
 bool drivers_remember(void);

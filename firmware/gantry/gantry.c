@@ -2,7 +2,9 @@
 
 #include <string.h>
 
+#include "doubt.h"
 #include "homing.h"
+#include "judge.h"
 #include "line.h"
 #include "motion.h"
 #include "port.h"
@@ -66,6 +68,8 @@ static void stop(void)
 
 static uint8_t obey(const struct request *request)
 {
+    if (request->command == COMMAND_STOP || request->command == COMMAND_CALIBRATE)
+        rig.resumed = false;
     switch (request->command) {
     case COMMAND_GOTO:
         return motion_goto(request->numbers);
@@ -93,8 +97,18 @@ void gantry_take(uint8_t byte)
     uint8_t error = state == LINE_DAMAGED ? ERROR_DAMAGED : line_parse(line.text, &request);
     if (error == 0)
         error = obey(&request);
-    if (error != 0)
+    if (error == 0)
+        rig.lived = port_now();
+    else
         answer_error(error);
+}
+
+/* Nobody watches GOTO or CALIBRATE any more. */
+static void supervise_line(uint32_t now)
+{
+    bool alone = rig.mode == MODE_GOTO_SOON || rig.mode == MODE_GOTO || rig.mode == MODE_HOMING;
+    if (alone && now - rig.lived >= WATCHDOG_MS)
+        rig_trouble(STATUS_WATCHDOG, 0);
 }
 
 void gantry_begin(void)
@@ -112,7 +126,9 @@ void gantry_tick(void)
         return;
     ticked = now;
     rig_look();
-    rig_judge();
+    judge_tick();
+    supervise_line(now);
     motion_tick(now);
-    homing_tick();
+    doubt_tick(now);
+    homing_tick(now);
 }

@@ -4,11 +4,16 @@
 
 #include "port.h"
 #include "rig.h"
+#include "switches.h"
 #include "units.h"
 
-/* SETTLE: brake. FORWARD, BACK: leave a switch that is closed, at whichever end it is. APPROACH: go to the switch at
- * home. RELEASE: go until it opens. */
-enum phase { SETTLE, LEAVE_FORWARD, LEAVE_BACK, APPROACH, RELEASE };
+/* SETTLE: brake. START: the drivers begin anew, at which rotors jump by up to two steps, and hold them. LEAVE: leave a
+ * switch that is closed, at whichever end it is. APPROACH: go to the switch at home. RELEASE: go until it opens. */
+enum phase { SETTLE, START, LEAVE, APPROACH, RELEASE };
+
+#define QUIET_LOOKS 10 /* in which all stands and no switch bounces, before the next phase begins */
+#define START_LOOKS 50 /* in which the rotors come to rest after their jump */
+#define WAYS_OUT 7 /* back_offs from behind a switch that was hit: a slip may lead far */
 
 static int32_t travelled(enum motor motor)
 {
@@ -16,52 +21,50 @@ static int32_t travelled(enum motor motor)
     return way < 0x200000UL ? (int32_t)way : (int32_t)(0x400000UL - way);
 }
 
-static bool pressed(enum motor motor)
-{
-    return (rig.status[motor] & FLAG_SW_CLOSED) != 0;
-}
-
-/* Whether a switch of the motor's axis is closed: y1 and y2 leave together. */
-static bool axis_pressed(enum motor motor)
-{
-    for (uint8_t m = 0; m < MOTORS; m++)
-        if (rig_axis(m) == rig_axis(motor) && pressed(m))
-            return true;
-    return false;
-}
-
-static void enter(enum phase phase, const struct order *orders)
+static void enter(enum phase phase)
 {
     rig.phase = (uint8_t)phase;
+    rig.quiet = 0;
+    rig.since = port_now();
     for (uint8_t m = 0; m < MOTORS; m++)
         rig.begin[m] = rig.position[m];
-    drivers_send(orders, orders[0].op == OP_RELEASE + FORWARD ? 0 : 3);
 }
 
-static void set_top_speeds(bool homing)
+/* How many back_offs an axis goes next to leave its switch, 0 when it has tried all: the way it came from, or to either
+ * side when nobody knows. */
+static int8_t way_out(enum axis axis)
 {
-    uint32_t tops[MOTORS];
-    for (uint8_t m = 0; m < MOTORS; m++)
-        tops[m] = homing ? axes[rig_axis(m)].homing_top_register : axes[rig_axis(m)].top_register;
-    drivers_set(REG_MAX_SPEED, 2, tops);
+    static const int8_t unknown[] = {1, -2};
+    if (rig.blocked[axis] != 0)
+        return rig.tries < WAYS_OUT ? (int8_t)-rig.blocked[axis] : 0;
+    return rig.tries < sizeof unknown ? unknown[rig.tries] : 0;
 }
 
-static void leave(enum phase phase, uint8_t op, int32_t times)
+/* False when a switch stays closed. */
+static bool leave(void)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        uint32_t way = (uint32_t)(axes[rig_axis(m)].back_off * times);
-        orders[m] = axis_pressed(m) ? (struct order){op, way} : (struct order){OP_NOP, 0};
+        int8_t times = switches_axis_closed(units_axis(m)) ? way_out(units_axis(m)) : 0;
+        if (times == 0 && switches_axis_closed(units_axis(m)))
+            return false;
+        uint32_t way = (uint32_t)(axes[units_axis(m)].back_off * abs(times));
+        uint8_t op = times > 0 ? OP_MOVE + FORWARD : times < 0 ? OP_MOVE : OP_NOP;
+        orders[m] = (struct order){op, way};
     }
-    enter(phase, orders);
+    rig.tries++;
+    drivers_send(orders, 3);
+    enter(LEAVE);
+    return true;
 }
 
 static void approach(void)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        orders[m] = (struct order){OP_GO_UNTIL, (uint32_t)axes[rig_axis(m)].homing_speed};
-    enter(APPROACH, orders);
+        orders[m] = (struct order){OP_GO_UNTIL, (uint32_t)axes[units_axis(m)].homing_speed};
+    drivers_send(orders, 3);
+    enter(APPROACH);
 }
 
 /* The counters begin at 0 here as well, so that the way to where the switches open is seen. */
@@ -74,30 +77,26 @@ static void release(void)
     }
     drivers_send(zero, 0);
     rig_look();
-    enter(RELEASE, orders);
+    drivers_send(orders, 0);
+    enter(RELEASE);
 }
 
 static void set_up(void)
 {
+    struct order hold[MOTORS];
+    for (uint8_t m = 0; m < MOTORS; m++)
+        hold[m] = (struct order){OP_HARD_STOP, 0};
     port_reset_drivers();
     drivers_configure();
     rig_acknowledge();
-    set_top_speeds(true);
+    drivers_set_top_speeds(true);
+    drivers_send(hold, 0);
+    enter(START);
 }
 
 static void fail(void)
 {
     rig_trouble(STATUS_FAULT, (1 << AXES) - 1);
-}
-
-static bool any_pressed(void)
-{
-    return axis_pressed(MOTOR_X) || axis_pressed(MOTOR_Y1) || axis_pressed(MOTOR_ALPHA);
-}
-
-static bool all_pressed(void)
-{
-    return pressed(MOTOR_X) && pressed(MOTOR_Y1) && pressed(MOTOR_Y2) && pressed(MOTOR_ALPHA);
 }
 
 /* Farther than the axis is long, or than a switch takes to open: the switch is stuck. Or y1 and y2 part. */
@@ -106,7 +105,7 @@ static bool too_far(void)
     if (rig.phase != APPROACH && rig.phase != RELEASE)
         return false;
     for (uint8_t m = 0; m < MOTORS; m++) {
-        enum axis axis = rig_axis(m);
+        enum axis axis = units_axis(m);
         int32_t length = units_steps(axis, axes[axis].high) + 4 * axes[axis].back_off;
         if (travelled(m) > (rig.phase == APPROACH ? length : 2 * axes[axis].back_off))
             return true;
@@ -117,17 +116,16 @@ static bool too_far(void)
 
 static void finish(void)
 {
-    if (any_pressed()) {
+    if (switches_any_closed() || !rig_acknowledge()) {
         fail();
         return;
     }
-    set_top_speeds(false);
-    rig_acknowledge();
+    drivers_set_top_speeds(false);
     drivers_set_all(REG_MARK, 3, DRIVER_MARK);
     rig.calibrated = true;
     rig.mode = MODE_REST;
     for (uint8_t a = 0; a < AXES; a++)
-        rig.blocked[a] = rig.going[a] = 0;
+        rig.blocked[a] = 0;
 }
 
 /* All motors stand: go on with the next phase. */
@@ -135,14 +133,12 @@ static void next_phase(void)
 {
     if (rig.phase == SETTLE)
         set_up();
-    if (rig.phase == SETTLE && any_pressed())
-        leave(LEAVE_FORWARD, OP_MOVE + FORWARD, 1);
-    else if (rig.phase == LEAVE_FORWARD && any_pressed())
-        leave(LEAVE_BACK, OP_MOVE, 2);
+    else if (rig.phase < APPROACH && !switches_any_closed())
+        approach();
     else if (rig.phase < APPROACH)
-        any_pressed() ? fail() : approach();
+        leave() ? (void)0 : fail();
     else if (rig.phase == APPROACH)
-        all_pressed() ? release() : fail();
+        switches_all_closed() ? release() : fail();
     else
         finish();
 }
@@ -154,15 +150,22 @@ void homing_begin(void)
     rig_forget();
     rig.mode = MODE_HOMING;
     rig.phase = SETTLE;
+    rig.tries = rig.quiet = 0;
+    rig.since = port_now();
 }
 
-void homing_tick(void)
+bool homing_brakes(void)
+{
+    return rig.mode == MODE_HOMING && rig.phase == SETTLE;
+}
+
+void homing_tick(uint32_t now)
 {
     if (rig.mode != MODE_HOMING)
         return;
-    if (too_far())
+    if (too_far() || now - rig.since >= HOMING_PHASE_MS)
         fail();
-    else if (!rig_moves())
+    else if (switches_quiet(rig.phase == START ? START_LOOKS : QUIET_LOOKS))
         next_phase();
 }
 
@@ -172,11 +175,11 @@ void homing_wake(void)
     int32_t skew = rig.position[MOTOR_Y1] - rig.position[MOTOR_Y2];
     rig.calibrated = drivers_remember() && labs(skew) <= axes[AXIS_Y].square;
     if (rig.calibrated) {
+        rig.resumed = true;
         rig_stop(0);
         return;
     }
     port_reset_drivers();
     drivers_configure();
-    set_top_speeds(false);
     rig_acknowledge();
 }

@@ -5,6 +5,7 @@
 #include "units.h"
 
 #define LAG_MS 4 /* from a measurement to the driver's answer to it, at the most */
+#define AGAIN_MS 50 /* after which an order is given again, as it may have got lost */
 
 static int8_t sign(int32_t value)
 {
@@ -16,8 +17,6 @@ static int32_t clipped(enum axis axis, int32_t want)
 {
     int32_t at = rig_position(axis), size = labs(want);
     int32_t room = want > 0 ? axes[axis].high - at : at - axes[axis].low;
-    if (sign(want) == rig.blocked[axis])
-        return 0;
     int32_t fastest = units_braking_speed(axis, room - size * LAG_MS / 1000);
     return sign(want) * (size < fastest ? size : fastest);
 }
@@ -27,24 +26,24 @@ static void tell(struct order *orders, enum axis axis, int32_t speed)
 {
     uint8_t op = speed == 0 ? OP_SOFT_STOP : speed > 0 ? OP_RUN | FORWARD : OP_RUN;
     for (uint8_t m = 0; m < MOTORS; m++)
-        if (rig_axis(m) == axis)
+        if (units_axis(m) == axis)
             orders[m] = (struct order){op, (uint32_t)labs(speed)};
     rig.told[axis] = speed;
-    if (speed != 0)
-        rig.going[axis] = sign(speed);
 }
 
-static void drive(void)
+static void drive(uint32_t now)
 {
     struct order orders[MOTORS] = {{OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}};
-    bool news = false;
+    bool again = now - rig.sent >= AGAIN_MS, news = again;
     for (uint8_t a = 0; a < AXES; a++) {
         int32_t speed = units_speed(a, clipped(a, rig.want[a]));
-        if (speed != rig.told[a]) {
+        if (again || speed != rig.told[a]) {
             tell(orders, a, speed);
             news = true;
         }
     }
+    if (again)
+        rig.sent = now;
     if (news)
         drivers_send(orders, 3);
 }
@@ -55,6 +54,8 @@ static uint8_t refused(void)
         return ERROR_HOMING;
     if (rig.trouble != 0)
         return ERROR_TROUBLE;
+    if (rig.resumed)
+        return ERROR_RESTARTED;
     return rig.calibrated ? 0 : ERROR_UNCALIBRATED;
 }
 
@@ -72,16 +73,8 @@ uint8_t motion_run(const int32_t *velocity, uint32_t now)
         rig.want[a] = velocity[a];
     rig.mode = MODE_RUN;
     rig.heard = now;
-    drive();
+    drive(now);
     return 0;
-}
-
-static uint8_t check_goal(enum axis axis, int32_t micro)
-{
-    if (!units_inside(axis, micro))
-        return ERROR_BOUNDS;
-    int32_t way = units_steps(axis, micro) - rig.position[rig_motor(axis)];
-    return rig.blocked[axis] != 0 && sign(way) == rig.blocked[axis] ? ERROR_BLOCKED : 0;
 }
 
 uint8_t motion_goto(const int32_t *position)
@@ -89,7 +82,7 @@ uint8_t motion_goto(const int32_t *position)
     bool slept = rig.trouble == STATUS_WATCHDOG;
     uint8_t error = slept ? 0 : refused();
     for (uint8_t a = 0; a < AXES && error == 0; a++)
-        error = check_goal(a, position[a]);
+        error = units_inside(a, position[a]) ? 0 : ERROR_BOUNDS;
     if (error != 0)
         return error;
     if (slept)
@@ -107,9 +100,8 @@ static void set_off(void)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        enum axis axis = rig_axis(m);
+        enum axis axis = units_axis(m);
         orders[m] = (struct order){OP_GOTO, (uint32_t)rig.goal[axis] & 0x3FFFFFUL};
-        rig.going[axis] = sign(rig.goal[axis] - rig.position[m]);
     }
     drivers_send(orders, 3);
     rig.mode = MODE_GOTO;
@@ -119,7 +111,7 @@ static void arrive(void)
 {
     rig.mode = MODE_REST;
     for (uint8_t m = 0; m < MOTORS; m++)
-        if (rig.position[m] != rig.goal[rig_axis(m)])
+        if (rig.position[m] != rig.goal[units_axis(m)])
             rig_trouble(STATUS_FAULT, 0);
 }
 
@@ -127,7 +119,7 @@ static void supervise_run(uint32_t now)
 {
     bool standing = rig.told[AXIS_X] == 0 && rig.told[AXIS_Y] == 0 && rig.told[AXIS_YAW] == 0;
     if (now - rig.heard < WATCHDOG_MS)
-        drive();
+        drive(now);
     else if (standing)
         rig.mode = MODE_REST;
     else

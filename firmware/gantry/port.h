@@ -11,6 +11,9 @@ void port_exchange(uint8_t *bytes);
 /* Pull the drivers' reset down and up again, and wait until they listen. They forget everything. */
 void port_reset_drivers(void);
 
+/* Pull the drivers' reset down and leave it there: no motor has current, whatever else is broken. */
+void port_hold_drivers(void);
+
 /* Milliseconds since the start; it wraps. */
 uint32_t port_now(void);
 

@@ -1,25 +1,12 @@
 #include "rig.h"
 
-#include <stdlib.h>
-
+#include "port.h"
 #include "units.h"
 
 struct rig rig;
 
 #define BROKEN_HIGH 0xFFFF /* what the line says without a driver */
 #define BROKEN_LOW 0x0000
-#define RIGHT_FLAGS (FLAG_UVLO_NOT | FLAG_OCD_NOT)
-#define LOSS_FLAGS (FLAG_LOSS_A_NOT | FLAG_LOSS_B_NOT)
-
-enum motor rig_motor(enum axis axis)
-{
-    return axis == AXIS_X ? MOTOR_X : axis == AXIS_Y ? MOTOR_Y1 : MOTOR_ALPHA;
-}
-
-enum axis rig_axis(enum motor motor)
-{
-    return motor == MOTOR_X ? AXIS_X : motor == MOTOR_ALPHA ? AXIS_YAW : AXIS_Y;
-}
 
 void rig_look(void)
 {
@@ -37,14 +24,14 @@ bool rig_moves(void)
 
 int32_t rig_position(enum axis axis)
 {
-    return units_micro(axis, rig.position[rig_motor(axis)]);
+    return units_micro(axis, rig.position[units_motor(axis)]);
 }
 
 void rig_stop(uint8_t hard)
 {
     struct order orders[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        bool at_once = (hard & (1 << rig_axis(m))) != 0;
+        bool at_once = (hard & (1 << units_axis(m))) != 0;
         orders[m] = (struct order){at_once ? OP_HARD_STOP : OP_SOFT_STOP, 0};
     }
     drivers_send(orders, 0);
@@ -66,116 +53,50 @@ void rig_trouble(uint8_t status, uint8_t hard)
     rig_stop(hard);
 }
 
-void rig_acknowledge(void)
+static void let_go(void)
+{
+    port_reset_drivers();
+    drivers_configure();
+    rig.held = false;
+    rig.mute = 0;
+}
+
+bool rig_acknowledge(void)
 {
     uint16_t flags[MOTORS];
+    bool sound = true;
+    if (rig.held)
+        let_go();
     drivers_status(flags, true);
     for (uint8_t m = 0; m < MOTORS; m++) {
-        if ((flags[m] & LOSS_FLAGS) != LOSS_FLAGS)
-            rig_forget();
+        sound = sound && (flags[m] & FLAGS_SOUND) == FLAGS_SOUND;
         if ((flags[m] & FLAG_SW_CLOSED) == 0)
             rig.touched[m] = false;
     }
+    if (!sound || (rig.calibrated && !drivers_remember()))
+        rig_forget();
     rig_look();
     rig.trouble = 0;
+    return sound;
 }
 
-/* The axes whose drivers are away, without power, short-circuited, or were given nonsense. */
-static uint8_t broken_axes(void)
+bool rig_absent(enum motor motor)
 {
-    uint8_t broken = 0;
-    for (uint8_t m = 0; m < MOTORS; m++) {
-        uint16_t s = rig.status[m];
-        bool absent = s == BROKEN_HIGH || s == BROKEN_LOW;
-        if (absent || (s & RIGHT_FLAGS) != RIGHT_FLAGS || (s & (FLAG_WRONG | FLAG_NOT_PERFORMED)) != 0)
-            broken |= (uint8_t)(1 << rig_axis(m));
-    }
-    return broken;
+    return rig.status[motor] == BROKEN_HIGH || rig.status[motor] == BROKEN_LOW;
 }
 
-/* The axes that lack any of these flags, which are low when active. */
-static uint8_t axes_without(uint16_t flags)
+bool rig_mute(void)
 {
-    uint8_t found = 0;
     for (uint8_t m = 0; m < MOTORS; m++)
-        if ((rig.status[m] & flags) != flags)
-            found |= (uint8_t)(1 << rig_axis(m));
-    return found;
-}
-
-static bool judge_drivers(void)
-{
-    uint8_t broken = broken_axes(), shut = axes_without(FLAG_HOT_NOT);
-    bool lost = axes_without(LOSS_FLAGS) != 0;
-    if (broken != 0) {
-        rig_trouble(STATUS_FAULT, broken);
-    } else if (shut != 0) {
-        rig_trouble(STATUS_HOT, shut);
-    } else if (lost) {
-        rig_trouble(STATUS_STALL, 0);
-    } else {
-        if (axes_without(FLAG_WARM_NOT) != 0)
-            rig_trouble(STATUS_HOT, 0);
-        return axes_without(FLAG_WARM_NOT) == 0;
-    }
-    rig_forget();
+        if (rig_absent(m))
+            return true;
     return false;
 }
 
-static bool pressed(enum motor motor)
+void rig_hold(void)
 {
-    return (rig.status[motor] & FLAG_SW_CLOSED) != 0;
-}
-
-/* The direction of the end that an axis stands at. */
-static int8_t nearest_end(enum axis axis)
-{
-    int32_t middle = axes[axis].low / 2 + axes[axis].high / 2;
-    return rig_position(axis) < middle ? -1 : 1;
-}
-
-/* The drivers stop on the edge by themselves, the pair's other one does not. */
-static void judge_switch(enum motor motor)
-{
-    enum axis axis = rig_axis(motor);
-    bool idle = !rig.calibrated && !rig_moves();
-    if (idle || rig.touched[motor] || (rig.status[motor] & (FLAG_SW_CLOSED | FLAG_SW_EVENT)) == 0)
-        return;
-    rig.touched[motor] = true;
-    rig.blocked[axis] = rig.going[axis] != 0 ? rig.going[axis] : nearest_end(axis);
-    rig_trouble(STATUS_LIMIT, (uint8_t)(1 << axis));
-}
-
-static void judge_square(void)
-{
-    int32_t skew = rig.position[MOTOR_Y1] - rig.position[MOTOR_Y2];
-    if (rig.calibrated && labs(skew) > axes[AXIS_Y].square) {
-        rig_trouble(STATUS_FAULT, 1 << AXIS_Y);
-        rig_forget();
-    }
-}
-
-static void unblock(void)
-{
-    bool closed[AXES] = {false, false, false};
-    for (uint8_t m = 0; m < MOTORS; m++)
-        closed[rig_axis(m)] |= pressed(m);
-    for (uint8_t a = 0; a < AXES; a++) {
-        if (rig.blocked[a] != 0 && !closed[a] && rig.trouble == 0) {
-            rig.blocked[a] = 0;
-            rig_acknowledge();
-        }
-    }
-}
-
-void rig_judge(void)
-{
-    bool homing = rig.mode == MODE_HOMING;
-    if (!homing && broken_axes() == 0)
-        for (uint8_t m = 0; m < MOTORS; m++)
-            judge_switch(m);
-    if (!judge_drivers() || homing)
-        return;
-    judge_square();
-    unblock();
+    port_hold_drivers();
+    rig.held = true;
+    rig_trouble(STATUS_FAULT, (1 << AXES) - 1);
+    rig_forget();
 }

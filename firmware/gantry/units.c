@@ -1,6 +1,20 @@
 #include "units.h"
 
 const struct axis_constants axes[AXES] = AXIS_ROWS;
+static const uint8_t motor_axes[MOTORS] = MOTOR_AXES;
+
+enum motor units_motor(enum axis axis)
+{
+    uint8_t motor = 0;
+    while (motor_axes[motor] != axis)
+        motor++;
+    return (enum motor)motor;
+}
+
+enum axis units_axis(enum motor motor)
+{
+    return (enum axis)motor_axes[motor];
+}
 
 static int32_t scaled(int32_t value, int64_t q32)
 {

@@ -9,6 +9,10 @@
 
 extern const struct axis_constants axes[AXES];
 
+/* The first motor of an axis, and the axis of a motor. */
+enum motor units_motor(enum axis axis);
+enum axis units_axis(enum motor motor);
+
 /* Micro to microsteps from home, y = c x + offset, and back. */
 int32_t units_steps(enum axis axis, int32_t micro);
 int32_t units_micro(enum axis axis, int32_t steps);

@@ -8,7 +8,7 @@ from enum import IntEnum
 BAUD = 115_200
 LINE_LONGEST = 64
 WATCHDOG = 0.5
-"""s without RUN after which the rig brakes."""
+"""s without RUN, or without any valid line during GOTO and CALIBRATE, after which the rig brakes."""
 COMMANDS = {"GOTO": 3, "RUN": 3, "STOP": 0, "CALIBRATE": 0, "POSITION": 0, "STATUS": 0}
 """The number of arguments of each."""
 BOUNDS = {
@@ -54,4 +54,4 @@ class Error(IntEnum):
     UNCALIBRATED = 6
     HOMING = 7
     TROUBLE = 8
-    BLOCKED = 9
+    RESTARTED = 9

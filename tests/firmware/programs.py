@@ -114,6 +114,12 @@ class Program:
             assert self.say(f"$RUN:{velocity}") == []
             self.run(every)
 
+    def watch(self, seconds: float, every: float = 0.2) -> None:
+        """Let time pass, and ask for the status meanwhile, as a master does."""
+        for _ in range(round(seconds / every)):
+            self.run(every)
+            self.status()
+
     def is_true(self, microsteps: float = 1.0) -> bool:
         """Whether the measured position is the true one."""
         pose, measured = self.pose(), self.position()

@@ -85,7 +85,7 @@ def test_stop_ends_goto(bench: Bench) -> None:
 
 def test_run_ends_goto(bench: Bench) -> None:
     bench.say("$GOTO:0.9,0,0")
-    bench.run(0.5)
+    bench.run(0.4)
     bench.keep_running("-0.1,0,0", 1.5)
     assert bench.pose()["vx"] == pytest.approx(-0.1, rel=0.02)
 

@@ -53,6 +53,9 @@ def test_run_brakes_before_the_edge(rig: Rig) -> None:
         ("heat y1 hot", Status.HOT),
         ("short x", Status.FAULT),
         ("motors off", Status.FAULT),
+        ("cut spi", Status.FAULT),
+        ("cut clock", Status.FAULT),
+        ("cut data", Status.FAULT),
     ],
 )
 def test_faults_stop_the_rig_and_have_a_status(rig: Rig, order: str, status: Status) -> None:
@@ -94,6 +97,9 @@ def test_opening_the_port_resets_the_controller_and_the_position_stays(rig: Rig)
     assert len(rig.happened("reset")) == resets + 1
     assert rig.status() == Status.IDLE
     assert rig.is_true()
+    assert rig.say("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.RESTARTED)}"]
+    rig.say("$STOP")
+    assert rig.say("$RUN:0.1,0,0") == []
 
 
 def test_a_port_that_keeps_dtr_up_resets_nothing(rig: Rig) -> None:

@@ -35,6 +35,46 @@ def test_it_finds_home_from_a_closed_switch_at_either_end(bench_program: Path, p
         assert bench.happened("crash") == []
 
 
+@pytest.mark.parametrize("shift", range(6))
+def test_home_is_found_from_anywhere_though_switches_bounce(bench_program: Path, shift: int) -> None:
+    """Wherever an axis starts, the switches bounce for some milliseconds at any phase of the firmware's looks."""
+    place = (-0.85 + 0.00017 * shift, -0.6 + 0.00023 * shift, -140 + 0.13 * shift)
+    with Bench(bench_program, place) as bench:
+        bench.calibrate()
+        bench.run(0.3)
+        assert bench.is_true()
+        edges = [one["event"] for one in bench.events if one["event"] in ("open", "closed") and one["motor"] == "x"]
+        assert len(edges) > 10
+        bench.watch(0.4)
+        assert bench.status() == Status.IDLE
+
+
+def test_rotors_jump_when_drivers_start_anew(bench: Bench) -> None:
+    """A driver's electrical angle is 0 after its reset, up to two full steps away."""
+    bench.go(0.0003, 0.0001, 0.5)
+    before = bench.pose()
+    bench.say("$CALIBRATE")
+    bench.run(0.09)
+    after = bench.pose()
+    jumps = [abs(after[axis] - before[axis]) / (128 * MICROSTEP[axis]) for axis in ("x", "y", "yaw")]
+    assert 0.5 < max(jumps) < 4.5
+    bench.until(Status.IDLE)
+    bench.run(0.3)
+    assert bench.is_true()
+    assert bench.happened("slip") == []
+
+
+@pytest.mark.parametrize("beyond", [1, 3, 9, 20])
+def test_a_rotor_may_stand_between_two_poles_when_drivers_start_anew(bench: Bench, beyond: int) -> None:
+    """So it falls to either side, and has to rest there before the field sets off, or it loses a turn of four steps."""
+    half_turn = round((0.9 + 0.1) / MICROSTEP["x"] / 512) * 512 - 256
+    bench.go(-0.9 + (half_turn + beyond) * MICROSTEP["x"], -0.7 + (half_turn - beyond) * MICROSTEP["y"], 0)
+    bench.calibrate()
+    bench.run(0.3)
+    assert bench.is_true()
+    assert bench.happened("slip") == []
+
+
 def test_y1_and_y2_are_square_afterwards(fresh: Bench) -> None:
     fresh.order("push y1 12")
     fresh.run(0.1)
@@ -63,8 +103,8 @@ def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, moto
     passed = 0.0
     while (status := bench.status()) == Status.HOMING:
         assert passed < 60
-        bench.run(0.5)
-        passed += 0.5
+        bench.run(0.4)
+        passed += 0.4
     assert status in (Status.FAULT, Status.STALL)
     assert all(one["value"] <= 0.4 for one in bench.happened("crash"))
     if stuck == "closed":
@@ -82,9 +122,22 @@ def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
     assert 1.85 < fresh.extremes()["way"][0] < 1.9
 
 
+def test_an_axis_that_never_arrives_is_a_fault(fresh: Bench) -> None:
+    """Neither its switch nor its counter says how far it is."""
+    fresh.order("tear x")
+    fresh.order("freeze x on")
+    fresh.say("$CALIBRATE")
+    passed = fresh.until(Status.FAULT)
+    assert 30 <= passed <= 33
+    fresh.run(1)
+    assert not fresh.pose()["moves"]
+    fresh.say("$STOP")
+    assert fresh.status() == Status.NOT_CALIBRATED
+
+
 def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
     fresh.say("$CALIBRATE")
-    fresh.run(1)
+    fresh.watch(1)
     fresh.order("switch x closed")
     fresh.run(0.01)
     fresh.order("switch x works")
@@ -97,7 +150,7 @@ def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
 
 def test_only_stop_ends_it_early(fresh: Bench) -> None:
     fresh.say("$CALIBRATE")
-    fresh.run(1)
+    fresh.watch(1)
     for line in ("$RUN:0.1,0,0", "$GOTO:0,0,0", "$CALIBRATE"):
         assert fresh.say(line) == [f"$ERROR:{int(Error.HOMING)}"]
     fresh.say("$STOP")
@@ -128,7 +181,7 @@ def test_a_reset_takes_up_the_position_of_the_drivers(bench: Bench) -> None:
 def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str) -> None:
     if what == "homing":
         bench.say("$CALIBRATE")
-        bench.run(1)
+        bench.watch(1)
     elif what == "power":
         bench.order("motors off")
         bench.order("motors on")
@@ -137,7 +190,6 @@ def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str)
         bench.run(0.1)
     bench.order("restart")
     bench.run(0.5)
-    bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 
@@ -148,5 +200,26 @@ def test_a_reset_does_not_take_up_a_part(bench: Bench, motor: str) -> None:
     bench.run(0.1)
     bench.order("restart")
     bench.run(0.1)
-    bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("line", ["$RUN:0.2,0,0", "$GOTO:0.3,0,0"])
+@pytest.mark.parametrize("notice", ["$STOP", "$CALIBRATE"])
+def test_after_a_reset_nobody_drives_on_unaware(bench: Bench, line: str, notice: str) -> None:
+    """The master of before goes on with its lines, and does not look at the status."""
+    bench.keep_running("0.2,0,0", 0.6)
+    bench.order("restart")
+    for _ in range(20):
+        assert bench.say(line) == [f"$ERROR:{int(Error.RESTARTED)}"]
+        bench.run(0.05)
+    assert bench.status() == Status.IDLE
+    assert not bench.pose()["moves"]
+    bench.say(notice)
+    bench.until(Status.IDLE)
+    assert bench.say(line) == []
+
+
+def test_a_start_without_a_position_needs_no_stop(fresh: Bench) -> None:
+    fresh.order("restart")
+    fresh.calibrate()
+    fresh.go(-0.5, -0.5, 0)

@@ -8,6 +8,16 @@ from tests.firmware.programs import Bench
 AXES = ("x", "y", "yaw")
 BEYOND = {"x": 0.000002, "y": 0.000002, "yaw": 0.00002}
 QUICK = {"x": "0.9", "y": "0.9", "yaw": "0.9"}
+MOTORS = {"x": ("x",), "y": ("y1", "y2"), "yaw": ("alpha",)}
+STEPS = {axis: 1 / (128 * step) for axis, step in MICROSTEP.items()}
+"""Full steps per m or rad."""
+NEAR = {"x": 0.05, "y": 0.05, "yaw": 0.15}
+SWITCH = {"x": (0.001, 0.005), "y": (0.001, 0.005), "yaw": (0.0174, 0.0261)}
+"""How far beyond the bounds the switches close, at home and at the far end."""
+BRAKE = {"x": 0.006, "y": 0.006, "yaw": 0.003}
+"""Less than what an axis needs to brake from 0.12 m/s (rad/s)."""
+WOBBLE = {"x": 0.0005, "y": 0.0005, "yaw": 0.02}
+"""A rotor's oscillation."""
 
 
 def with_one(axis: str, value: str) -> str:
@@ -86,54 +96,113 @@ def test_a_switch_stops_its_axis_at_once_and_the_others_softly(bench: Bench, mot
     assert not bench.pose()["moves"]
 
 
-def test_run_and_goto_wait_for_stop_after_a_switch(bench: Bench) -> None:
+def test_after_a_switch_only_calibrate_moves_the_rig(bench: Bench) -> None:
     close_in_motion(bench, "x", "0.1,0,0")
     for line in ("$RUN:-0.1,0,0", "$GOTO:0,0,0"):
         assert bench.say(line) == [f"$ERROR:{int(Error.TROUBLE)}"]
-    bench.say("$STOP")
-    assert bench.status() == Status.IDLE
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(("motor", "axis"), [("x", 0), ("y1", 1), ("y2", 1), ("alpha", 2)])
-def test_the_direction_of_a_closed_switch_is_blocked(bench: Bench, motor: str, axis: int, sign: int) -> None:
-    velocity = ["0", "0", "0"]
-    velocity[axis] = str(0.1 * sign)
-    close_in_motion(bench, motor, ",".join(velocity))
-    bench.say("$STOP")
-    bench.run(0.3)
-    bench.extremes()
-    bench.keep_running(",".join(velocity), 0.5)
-    goal = ["0", "0", "0"]
-    goal[axis] = str(0.5 * sign)
-    assert bench.say(f"$GOTO:{','.join(goal)}") == [f"$ERROR:{int(Error.BLOCKED)}"]
-    assert bench.extremes()["way"][axis] == 0
-    velocity[axis] = str(-0.1 * sign)
-    bench.keep_running(",".join(velocity), 0.5)
-    assert bench.extremes()["way"][axis] > 0.02
-
-
-def test_the_direction_is_free_when_the_switch_has_opened(bench: Bench) -> None:
-    close_in_motion(bench, "x", "0.1,0,0")
-    bench.say("$STOP")
-    bench.run(0.3)
-    bench.keep_running("-0.1,0,0", 0.2)
-    bench.order("switch x works")
-    bench.keep_running("-0.1,0,0", 0.2)
-    bench.keep_running("0.1,0,0", 1)
-    assert bench.pose()["vx"] == pytest.approx(0.1, rel=0.05)
-    assert bench.status() == Status.MOVING
-
-
-def test_a_rig_that_lost_steps_unnoticed_is_caught_by_its_switch(bench: Bench) -> None:
-    """Everything is 5 cm nearer to the far end than the counters say: the switch stops it before the frame."""
-    bench.order(f"push x {4 * 42}")
-    bench.run(0.2)
-    assert bench.status() == Status.STALL
-    assert bench.say("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.TROUBLE)}"]
+    assert bench.status() == Status.LIMIT
     bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
-    assert bench.say("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    for line in ("$RUN:-0.1,0,0", "$GOTO:0,0,0", "$POSITION"):
+        assert bench.say(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    bench.order("switch x works")
+    bench.calibrate()
+    bench.run(0.3)
+    assert bench.is_true()
+
+
+def miscount(bench: Bench, axis: str, far: bool, beyond: float) -> None:
+    """Move the counters of an axis, so that its switch lies that much (m, rad) within its measured bounds."""
+    steps = beyond * STEPS[axis] * (1 if far else -1)
+    for motor in MOTORS[axis]:
+        bench.order(f"miscount {motor} {steps:.0f}")
+
+
+def run_until_limit(bench: Bench, line: str, patience: float = 8.0) -> None:
+    """RUN again and again until a switch closes."""
+    for _ in range(round(patience / 0.02)):
+        if bench.status() == Status.LIMIT:
+            return
+        bench.say(line)
+        bench.run(0.02)
+    raise AssertionError("no switch closed")
+
+
+@pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
+@pytest.mark.parametrize("axis", AXES)
+def test_a_switch_hit_while_the_axis_turns_is_left_the_way_it_came(bench: Bench, axis: str, far: bool) -> None:
+    """The counter is wrong; the rig is told to go back, and meets the switch while it brakes."""
+    sign, index = (1 if far else -1), AXES.index(axis)
+    goal = [0.0, 0.0, 0.0]
+    goal[index] = BOUNDS[axis][far] - sign * NEAR[axis]
+    bench.go(*goal)
+    miscount(bench, axis, far, 2 * NEAR[axis])
+    turn = sign * BOUNDS[axis][far] + SWITCH[axis][far] - BRAKE[axis]
+    while bench.pose()[axis] * sign < turn:
+        bench.keep_running(with_one(axis, f"{sign * 0.12}"), 0.01, every=0.01)
+    run_until_limit(bench, f"$RUN:{with_one(axis, f'{-sign * 0.12}')}", patience=1)
+    assert bench.pose()[axis] * sign > BOUNDS[axis][far] * sign
+    bench.say("$STOP")
+    bench.run(0.2)
+    assert bench.say(f"$RUN:{with_one(axis, f'{sign * 0.1}')}") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    hit = bench.pose()[axis]
+    bench.say("$CALIBRATE")
+    for _ in range(20):
+        bench.run(0.02)
+        assert bench.pose()[axis] * sign < hit * sign + WOBBLE[axis]
+    bench.until(Status.IDLE)
+    assert bench.happened("crash") == []
+
+
+def test_a_switch_hit_at_speed_while_the_rig_is_told_to_go_back_blocks_both_ways(bench: Bench) -> None:
+    bench.go(0.5, 0, 0)
+    miscount(bench, "x", True, 0.2)
+    while bench.pose()["x"] < 0.76:
+        bench.keep_running("0.5,0,0", 0.02, every=0.02)
+    run_until_limit(bench, "$RUN:-0.5,0,0", patience=1)
+    bench.run(0.5)
+    bench.say("$STOP")
+    bench.extremes()
+    for line in ("$RUN:0.3,0,0", "$RUN:-0.3,0,0", "$GOTO:0,0,0"):
+        assert bench.say(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    bench.run(0.5)
+    assert bench.extremes()["way"] == [0, 0, 0]
+    assert bench.happened("crash") == []
+
+
+@pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
+def test_a_switch_that_is_stuck_closed_lets_nothing_move(bench: Bench, motor: str) -> None:
+    """Both ends share an input, so a stuck switch guards neither: CALIBRATE tries to leave it, and then gives up."""
+    close_in_motion(bench, motor, "0.05,0.05,0.1")
+    bench.run(1)
+    bench.say("$STOP")
+    bench.extremes()
+    for sign in ("", "-"):
+        assert bench.say(f"$RUN:{sign}0.1,{sign}0.1,{sign}0.1") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    assert bench.extremes()["way"] == [0, 0, 0]
+    bench.say("$CALIBRATE")
+    bench.until(Status.FAULT)
+    ways = bench.extremes()["way"]
+    assert max(ways[:2]) <= 0.022 and ways[2] <= 0.5
+    bench.say("$STOP")
+    assert bench.say("$RUN:0.1,0.1,0.1") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+
+
+@pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
+@pytest.mark.parametrize("axis", AXES)
+def test_a_rig_whose_counter_is_wrong_is_caught_by_its_switch(bench: Bench, axis: str, far: bool) -> None:
+    """The end is nearer than the counters say."""
+    sign = 1 if far else -1
+    goal = [0.0, 0.0, 0.0]
+    goal[AXES.index(axis)] = BOUNDS[axis][far] - sign * NEAR[axis]
+    bench.go(*goal)
+    miscount(bench, axis, far, 3 * NEAR[axis])
+    run_until_limit(bench, f"$RUN:{with_one(axis, f'{sign * 0.12}')}")
+    bench.run(0.3)
+    assert not bench.pose()["moves"]
+    assert bench.happened("crash") == []
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
 
 
 def test_a_pair_that_is_not_square_stops(bench: Bench) -> None:

@@ -25,6 +25,7 @@ def test_trouble_stops_everything(bench: Bench, motor: str, order: str, status: 
     assert bench.status() == status
     bench.run(1)
     assert not bench.pose()["moves"]
+    assert bench.say("$POSITION")[0].startswith("$ERROR") == void
     bench.order(f"heat {motor} cool")
     bench.say("$STOP")
     assert bench.status() == (Status.NOT_CALIBRATED if void else Status.IDLE)
@@ -87,3 +88,52 @@ def test_a_hard_stop_from_high_speed_voids_the_position(bench: Bench) -> None:
     bench.order("switch x works")
     bench.say("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("motor", MOTORS)
+@pytest.mark.parametrize("order", ["heat {} hot", "short {}", "push {} 8", "forget {}"])
+def test_stop_does_not_hide_what_voids_the_position(bench: Bench, motor: str, order: str) -> None:
+    """STOP takes back the flags before the firmware has looked at them."""
+    bench.order(order.format(motor))
+    bench.order(f"heat {motor} cool")
+    if order.startswith("push"):
+        bench.order("pass 0.0005")
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+
+
+def test_stop_does_not_hide_a_dip_of_the_supply(bench: Bench) -> None:
+    bench.order("motors off")
+    bench.order("motors on")
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+    bench.run(0.1)
+    assert bench.status() == Status.NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("wire", ["spi", "clock", "data"])
+@pytest.mark.parametrize("line", ["$RUN:0.3,0.2,0.4", "$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
+def test_drivers_that_cannot_be_told_lose_their_current(bench: Bench, wire: str, line: str) -> None:
+    for _ in range(15):
+        bench.say(line)
+        bench.run(0.05)
+    bench.order(f"cut {wire}")
+    bench.run(0.02)
+    assert bench.status() == Status.FAULT
+    bench.run(0.15)
+    pose = bench.pose()
+    assert not pose["moves"]
+    assert abs(pose["vx"]) + abs(pose["vy"]) + abs(pose["vyaw"]) < 1e-3
+    for attempt in ("$STOP", "$CALIBRATE", line):
+        bench.say(attempt)
+        bench.run(0.1)
+        assert bench.status() == Status.FAULT
+    assert not bench.pose()["moves"]
+    bench.order("cut nothing")
+    bench.run(0.1)
+    assert bench.status() == Status.FAULT
+    bench.say("$STOP")
+    assert bench.status() == Status.NOT_CALIBRATED
+    bench.calibrate()
+    bench.go(0.1, 0.1, 0.1)
+    assert bench.is_true()

@@ -59,7 +59,92 @@ def test_goto_acknowledges_it(bench: Bench) -> None:
     assert bench.status() == Status.IDLE
 
 
-def test_goto_needs_nobody(bench: Bench) -> None:
+@pytest.mark.parametrize("line", ["$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
+def test_goto_and_calibrate_brake_when_nobody_is_there(bench: Bench, line: str) -> None:
+    bench.say(line)
+    bench.watch(0.6)
+    bench.run(WATCHDOG - 0.01)
+    before = abs(bench.pose()["vx"])
+    bench.run(0.06)
+    assert abs(bench.pose()["vx"]) < before - 0.01
+    assert bench.status() == Status.WATCHDOG
+    bench.run(2)
+    assert not bench.pose()["moves"]
+    assert max(bench.extremes()["ramp"][:2]) <= 0.5
+    bench.say("$STOP")
+    assert bench.status() == (Status.IDLE if "GOTO" in line else Status.NOT_CALIBRATED)
+
+
+def test_goto_brakes_when_nobody_is_there_before_it_sets_off(bench: Bench) -> None:
+    bench.keep_running("0.8,0,0", 1.6)
+    bench.say("$GOTO:-0.5,0,0")
+    bench.run(WATCHDOG + 0.01)
+    assert bench.status() == Status.WATCHDOG
+    assert bench.pose()["moves"]
+    bench.run(3)
+    assert bench.position()[0] > 0.5
+
+
+@pytest.mark.parametrize("line", ["$STATUS", "$POSITION"])
+def test_goto_goes_on_while_somebody_asks(bench: Bench, line: str) -> None:
     bench.say("$GOTO:0.5,0,0")
-    bench.run(5)
+    for _ in range(12):
+        bench.run(WATCHDOG - 0.02)
+        bench.say(line)
     assert bench.status() == Status.IDLE
+    assert bench.position()[0] == pytest.approx(0.5, abs=1e-5)
+
+
+@pytest.mark.parametrize("line", ["$GOTO:2,0,0", "$NOISE", "$RUN:1", "STATUS", ""])
+@pytest.mark.parametrize("motion", ["$GOTO:0.7,0.5,2", "$CALIBRATE"])
+def test_a_line_with_a_mistake_is_nobody(bench: Bench, motion: str, line: str) -> None:
+    bench.say(motion)
+    for _ in range(12):
+        bench.run(0.05)
+        bench.say(line)
+    assert bench.status() == Status.WATCHDOG
+
+
+def test_calibrate_without_anybody_is_not_calibrated(bench: Bench) -> None:
+    bench.say("$CALIBRATE")
+    bench.run(2)
+    assert bench.say("$GOTO:0,0,0") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    bench.calibrate()
+    bench.go(0, 0, 0)
+
+
+WRAPS = [0.02, 0.25, 0.49]
+"""s after the last line in which the clock of milliseconds wraps."""
+
+
+@pytest.mark.parametrize("wraps", WRAPS)
+def test_silence_is_noticed_in_time_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
+    bench.order(f"wraps {1.0 + wraps}")
+    bench.keep_running("0.3,0,0", 1)
+    bench.order(f"wraps {wraps}")
+    bench.say("$RUN:0.3,0,0")
+    bench.run(WATCHDOG - 0.01)
+    assert bench.status() == Status.MOVING
+    assert bench.pose()["vx"] == pytest.approx(0.3, rel=0.02)
+    bench.run(0.03)
+    assert bench.status() == Status.WATCHDOG
+    assert bench.pose()["vx"] < 0.295
+
+
+@pytest.mark.parametrize("wraps", WRAPS)
+def test_a_run_lives_on_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
+    bench.order(f"wraps {wraps}")
+    bench.keep_running("0.1,0,0", 2, every=0.4)
+    assert bench.status() == Status.MOVING
+
+
+@pytest.mark.parametrize("wraps", WRAPS)
+def test_goto_is_watched_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
+    bench.order(f"wraps {wraps}")
+    bench.say("$GOTO:0.9,0,0")
+    bench.run(WATCHDOG - 0.02)
+    assert bench.status() == Status.MOVING
+    bench.order(f"wraps {wraps}")
+    bench.say("$STATUS")
+    bench.run(WATCHDOG + 0.02)
+    assert bench.status() == Status.WATCHDOG

@@ -13,6 +13,7 @@
 
 #define SELECT PB2       /* D10, low while a frame lasts */
 #define DATA_OUT PB3     /* D11 */
+#define DATA_IN PB4      /* D12, pulled up: a line that nobody drives says 1 */
 #define DATA_CLOCK PB5   /* D13 */
 #define DRIVERS_ALIVE PD4 /* D4, low resets the drivers */
 #define TICKS_A_MS (F_CPU / 64 / 1000)
@@ -45,9 +46,14 @@ void port_exchange(uint8_t *bytes)
     _delay_us(1); /* the drivers need 800 ns */
 }
 
-void port_reset_drivers(void)
+void port_hold_drivers(void)
 {
     PORTD &= (uint8_t)~(1 << DRIVERS_ALIVE);
+}
+
+void port_reset_drivers(void)
+{
+    port_hold_drivers();
     _delay_ms(1);
     PORTD |= 1 << DRIVERS_ALIVE;
     _delay_ms(2);
@@ -58,7 +64,7 @@ static void start_pins(void)
 {
     PORTD |= 1 << DRIVERS_ALIVE;
     DDRD |= 1 << DRIVERS_ALIVE;
-    PORTB |= 1 << SELECT;
+    PORTB |= (1 << SELECT) | (1 << DATA_IN);
     DDRB |= (1 << SELECT) | (1 << DATA_OUT) | (1 << DATA_CLOCK);
     SPCR = (1 << SPE) | (1 << MSTR) | (1 << CPOL) | (1 << CPHA); /* 4 MHz, mode 3 */
 }

@@ -1,0 +1,82 @@
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "control.h"
+#include "emulator.h"
+#include "say.h"
+
+static const char *const help =
+    "usage: rig-emulator [OPTION...] gantry.elf\n\n"
+    "Runs the gantry's firmware on an emulated ATmega328P, with models of its four L6470 drivers and of the rig. Its\n"
+    "serial port is a pseudo terminal. Standard output gets a JSON object a line: {\"ready\": true, \"port\": ...},\n"
+    "the true pose {\"t\": s, \"x\": m, \"y\": m, \"yaw\": rad, ...}, {\"event\": ...}. Standard input takes orders.\n\n"
+    "  --link PATH        make PATH a symbolic link to the terminal\n"
+    "  --pose-rate HZ     of the true pose (100); 0 for none\n"
+    "  --publish PATH     send each line to this Unix datagram socket as well\n"
+    "  --start X,Y,YAW    where the rig stands at first, m and degrees (0.1,-0.1,11)\n"
+    "  --boot S           a boot loader's time after a reset, which a firmware from a programmer has not (0)\n"
+    "  --fast             as fast as possible instead of in real time\n"
+    "  --stepped          time passes only by the order `run S`\n"
+    "  --help\n\n"
+    "orders, a line each, answered by {\"done\": true, \"sent\": bytes so far} or {\"error\": ...}:\n" CONTROL_HELP
+    "  run S               with --stepped: let S seconds pass\n"
+    "  await N             wait, while no time passes, until the client's next N bytes are there\n"
+    "  unplug [power]      pull the USB cable, and with `power` the controller's power with it\n"
+    "  plug                plug it in again, with power\n"
+    "  noise N             of a thousand bytes N have a wrong bit\n"
+    "  reset               press the reset button\n"
+    "  hold on|off         keep the controller in reset, as a broken one\n"
+    "  hang                let the firmware hang\n"
+    "  lose                the receiver loses the next byte\n"
+    "  times               longest time round the firmware's loop and until an answer begins, s, since the last time\n"
+    "  overruns            bytes that the controller's receiver lost\n"
+    "  lateness            s that real time was missed by, together\n"
+    "  quit\n"
+    "It ends with `quit`, on SIGTERM, and when standard input is a pipe that ends.\n\n"
+    "example: rig-emulator --link /tmp/rig build/firmware/gantry.elf\n";
+
+static bool place_of(const char *text)
+{
+    double degrees;
+    char rest;
+    if (sscanf(text, "%lf,%lf,%lf%c", &self.place[0], &self.place[1], &degrees, &rest) != 3)
+        return false;
+    self.place[2] = degrees * 3.14159265358979323846 / 180;
+    return true;
+}
+
+static bool option(int which, const char *value)
+{
+    switch (which) {
+    case 'l': self.link = value; return true;
+    case 'r': self.rate = strtod(value, NULL); return self.rate >= 0;
+    case 'p': return say_to(value) == 0;
+    case 's': return place_of(value);
+    case 'b': self.boot = strtod(value, NULL); return self.boot >= 0;
+    case 'f': self.pace = FAST; return true;
+    case 't': self.pace = STEPPED; return true;
+    default: return false;
+    }
+}
+
+const char *options_read(int argc, char **argv)
+{
+    static const struct option all[] = {
+        {"link", required_argument, NULL, 'l'},    {"pose-rate", required_argument, NULL, 'r'},
+        {"publish", required_argument, NULL, 'p'}, {"start", required_argument, NULL, 's'},
+        {"boot", required_argument, NULL, 'b'},    {"fast", no_argument, NULL, 'f'},
+        {"stepped", no_argument, NULL, 't'},       {"help", no_argument, NULL, 'h'},
+        {NULL, 0, NULL, 0},
+    };
+    int which;
+    while ((which = getopt_long(argc, argv, "h", all, NULL)) != -1) {
+        if (which == 'h') {
+            fputs(help, stdout);
+            exit(0);
+        }
+        if (!option(which, optarg))
+            return NULL;
+    }
+    return optind == argc - 1 ? argv[optind] : NULL;
+}
