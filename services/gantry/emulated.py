@@ -21,6 +21,7 @@ START = "-0.89,-0.69,-150"
 
 _START_PATIENCE = 10.0
 _HIGH_PRIORITY = -10
+_LONGEST = 200
 
 
 class EmulatedRig:
@@ -31,7 +32,7 @@ class EmulatedRig:
         folder = folder or _folder()
         self.port = ""
         self._true: Position | None = None
-        self._late = ""
+        self._fault = ""
         self._watched = False
         self._ready = threading.Event()
         self._process = subprocess.Popen(
@@ -54,8 +55,8 @@ class EmulatedRig:
         """Where the rig truly is by now, in its frame (m, rad); raises RigError when it was late or has ended."""
         if self._process.poll() is not None:
             raise RigError(f"the emulated rig ended with exit code {self._process.returncode}")
-        if self._late:
-            raise RigError(self._late)
+        if self._fault:
+            raise RigError(self._fault)
         return self._true
 
     def close(self) -> None:
@@ -82,8 +83,11 @@ class EmulatedRig:
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
-                with contextlib.suppress(ValueError, KeyError):
+                try:
                     self._take(json.loads(line))
+                except (ValueError, KeyError, TypeError, AttributeError):
+                    text = line.decode(errors="replace").strip()[:_LONGEST]
+                    self._fault = f"the emulated rig said what cannot be read: {text}"
         self._ready.set()
 
     def _take(self, said: dict[str, Any]) -> None:
@@ -91,7 +95,7 @@ class EmulatedRig:
             self.port = str(said["port"])
             self._ready.set()
         elif said.get("event") == "late" and self._watched:
-            self._late = f"the emulated rig could not keep real time: it was {said['late']:.3f} s late"
+            self._fault = f"the emulated rig could not keep real time: it was {said['late']:.3f} s late"
         elif "x" in said:
             self._true = Position(said["x"], said["y"], said["yaw"])
 

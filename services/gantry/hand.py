@@ -1,7 +1,8 @@
 """The rig by hand: ``python -m services.gantry.hand --serial=PORT ACTION``, which prints one JSON object.
 
 Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is told to stop
-on every way out. Exit codes: 0 done, 1 the rig cannot (``error`` says why), 2 usage.
+on every way out, unless a fault has stopped it: that is left to be seen, and ``calibrate`` acknowledges it. Exit codes:
+0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.
 """
 
 import json
@@ -21,7 +22,7 @@ from services.gantry.emulated import EmulatedRig
 from services.gantry.link import Link, RigError
 from services.gantry.motion import Limits, box
 from services.gantry.port import SerialPort, checked
-from services.gantry.protocol import SENTENCES, Position, Status
+from services.gantry.protocol import Position, Status
 from services.gantry.service import EMULATED, describe, place
 
 ACTIONS = {"status": 0, "home": 0, "goto": 3, "calibrate": 0, "check": 0}
@@ -95,15 +96,16 @@ def _done(flags: Flags, action: str, goal: Position | None, limits: Limits) -> t
         target = checked(emulated.port if emulated else flags["serial"])
         link = Link(target, lambda: SerialPort(target))
         resources.callback(link.close)
-        status = start.find(link)
         if action == "check":
             tried = trial.tried(link, limits, patience)
-            return {**_where(link), **tried}, DONE if tried["ok"] else BROKEN
+            return {**tried, **(_where(link) if tried["ok"] else {})}, DONE if tried["ok"] else BROKEN
+        status = start.find(link)
         if action == "calibrate" or (emulated and goal):
             start.calibrate(link, patience)
-        elif goal and status in SENTENCES and status != Status.WATCHDOG:
-            raise RigError(f"the rig at {target} {SENTENCES[status]} (status {int(status)})")
+        elif goal and status == Status.NOT_CALIBRATED:
+            raise RigError(start.trouble(link, status))
         if goal:
+            start.settle(link, status)
             start.go(link, goal, patience)
         return _where(link), DONE
 

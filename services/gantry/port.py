@@ -1,6 +1,8 @@
 """The serial port to the rig's Arduino."""
 
 import contextlib
+import fcntl
+import logging
 import os
 import re
 import select
@@ -15,6 +17,7 @@ from services.gantry.protocol import BAUD
 
 WRITE_PATIENCE = 0.2
 
+_log = logging.getLogger(__name__)
 _SOCKET = re.compile(r"socket://(127\.0\.0\.1|localhost|\[::1\]):[0-9]{1,5}")
 
 
@@ -50,7 +53,7 @@ class SerialPort:
             )
         except termios.error as error:
             raise OSError(f"{target} is no serial port: {error.args[-1]}") from None
-        _stay_up(self._port)
+        _keep(target, self._port)
 
     def write(self, data: bytes) -> None:
         with _as_os_errors():
@@ -92,9 +95,17 @@ def _as_os_errors() -> Iterator[None]:
         raise OSError(f"the port is gone: {error}") from None
 
 
-def _stay_up(port: serial.SerialBase) -> None:
-    """Keep DTR up when the port is closed: its fall and rise would reset the Arduino, which forgets where it is."""
-    with contextlib.suppress(OSError, termios.error, AttributeError, ValueError):
+def _keep(target: str, port: serial.SerialBase) -> None:
+    """Nobody else opens the device, from a container neither, where pyserial's lock on the file does not reach.
+
+    DTR stays up when the port is closed: its fall and rise would reset the Arduino.
+    """
+    if _SOCKET.fullmatch(target):
+        return
+    try:
+        fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
         attributes = termios.tcgetattr(port.fileno())
         attributes[2] &= ~termios.HUPCL
         termios.tcsetattr(port.fileno(), termios.TCSANOW, attributes)
+    except (OSError, termios.error) as error:
+        _log.warning("%s may reset the rig when it is closed, and is not locked: %s", target, error)

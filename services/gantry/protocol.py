@@ -1,6 +1,7 @@
 """The rig's serial protocol (Table 4.1): ``$COMMAND:ARG1,ARG2,...`` out, ``$ARG1,ARG2,...`` back, a line each.
 
-Numbers are in SI units and radians. Answers do not say to what: three numbers are POSITION's, one is STATUS's.
+Numbers are in SI units and radians. Answers do not say to what: three numbers are POSITION's, one is STATUS's, and
+``$ERROR:code`` says why a line was not obeyed.
 """
 
 import math
@@ -8,9 +9,9 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from services.gantry.table import BAUD, Status
+from services.gantry.table import BAUD, Error, Status
 
-__all__ = ["BAUD", "SENTENCES", "Lines", "Position", "Status", "Word", "command"]
+__all__ = ["BAUD", "LATCHED", "SENTENCES", "Error", "Lines", "Position", "Refusal", "Status", "Word", "command"]
 
 LONGEST = 96
 """Bytes of the longest line that can be an answer."""
@@ -19,6 +20,7 @@ FARTHEST = 10.0
 
 _NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{1,9})?(?:[eE][-+]?[0-9]{1,2})?"
 _ANSWER = re.compile(rf"\$(?P<numbers>{_NUMBER}(?:,{_NUMBER}){{0,3}})\r?")
+_REFUSAL = re.compile(r"\$ERROR:(?P<code>[0-9]{1,3})\r?")
 
 
 class Word(StrEnum):
@@ -41,6 +43,8 @@ SENTENCES = {
     Status.FAULT: "reports a fault",
 }
 """What a status means that ends a test, with the rig as subject."""
+LATCHED = frozenset({Status.LIMIT, Status.STALL, Status.HOT, Status.FAULT})
+"""Faults for which the firmware has stopped the rig; it refuses to move, and says so, until STOP acknowledges them."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,23 @@ class Position:
     yaw: float
 
 
-Answer = Position | Status
+@dataclass(frozen=True)
+class Refusal:
+    """Why a line was not obeyed, as firmware/protocol.yml numbers it."""
+
+    code: int
+
+    @property
+    def is_garbled(self) -> bool:
+        """Whether the line came damaged, which noise on it explains."""
+        return self.code in (Error.UNKNOWN, Error.COUNT, Error.NUMBER, Error.DAMAGED)
+
+    def __str__(self) -> str:
+        names = [error.name for error in Error if error == self.code]
+        return f"$ERROR:{self.code} ({names[0] if names else 'which this version does not know'})"
+
+
+Answer = Position | Status | Refusal
 
 
 def command(word: Word, *arguments: float) -> bytes:
@@ -65,6 +85,9 @@ def command(word: Word, *arguments: float) -> bytes:
 
 def answer(line: str) -> Answer | None:
     """What a line without its end says; None for one that is no answer."""
+    refusal = _REFUSAL.fullmatch(line)
+    if refusal is not None:
+        return Refusal(int(refusal["code"]))
     match = _ANSWER.fullmatch(line)
     if match is None:
         return None

@@ -1,7 +1,8 @@
 """The gantry on the bus: hears how the vehicle moves, moves the rig so, and says where the rig is."""
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from google.protobuf.message import Message
@@ -10,15 +11,18 @@ from services.base import Context, Flags, Output, Service, period_of
 from services.base.signals import interruptible
 from services.gantry import start
 from services.gantry.emulated import EmulatedRig
-from services.gantry.link import Link, RigError
+from services.gantry.link import ASKING, Link, RigError
+from services.gantry.meter import Meter
 from services.gantry.motion import Limits, Shaper, Velocity, box
 from services.gantry.port import PortError, SerialPort, checked
-from services.gantry.protocol import SENTENCES, Position, Status, Word, command
+from services.gantry.protocol import SENTENCES, Position, Refusal, Status, Word, command
 
 EMULATED = "emulated"
 MICROSECONDS = 1_000_000
-STALE = 500_000
-"""us without a kinematic state after which the vehicle counts as standing."""
+STALE, SILENT = 0.45, 1.0
+"""s without a kinematic state after which the vehicle counts as standing, and after which it has no more to say."""
+RUNNER_SILENT = 3.0
+"""s without a sign of life of the runner, once it gave one, after which it counts as killed."""
 TRUTH_PERIOD = 10_000
 """us between two messages of where an emulated rig truly is."""
 LOST = 300_000
@@ -30,8 +34,16 @@ class Gantry(Service):
 
     period: int
 
-    def __init__(self, context: Context, link: Link, emulated: EmulatedRig | None = None) -> None:
+    def __init__(
+        self,
+        context: Context,
+        link: Link,
+        emulated: EmulatedRig | None = None,
+        wall: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``wall`` in s: what hangs is noticed in real time."""
         flags = context.flags
+        self._wall = wall
         self._log = context.log
         self._turn = round(period_of(flags["freq"]))
         self._emulated = emulated
@@ -41,15 +53,22 @@ class Gantry(Service):
         self.link = link
         self.ended = False
         self._patience = min(0.4 * self._turn / MICROSECONDS, 0.05)
-        self._state, self._age, self._rejected = Velocity(), STALE, 0
+        self._state, self._rejected = Velocity(), 0
+        self._heard: float | None = None
+        self._alive: float | None = None
+        self.meter = Meter(self._turn / MICROSECONDS)
         self._at: Position | None = None
         self._blind = 0
+        self._moved = False
         self._status: Status | None = None
         self._origin = flags["origin-x"], flags["origin-y"], math.radians(flags["origin-yaw"])
         self._frame = context.messages.type("opendlv.sim.Frame")
         self._report = context.messages.type("opendlv.system.SystemStatusMessage")
         self._frame_id, self._status_id, self._truth_id = (flags[f"{name}-id"] for name in ("frame", "status", "truth"))
-        self.inputs = {("opendlv.sim.KinematicState", self._frame_id): self._feed}
+        self.inputs = {
+            ("opendlv.sim.KinematicState", self._frame_id): self._feed,
+            ("dodo.Alive", None): self._hear_runner,
+        }
 
     def update(self, now: int) -> Iterator[Output]:
         if now >= self._due:
@@ -60,14 +79,17 @@ class Gantry(Service):
             yield Output(self._where(true), self._truth_id)
 
     def _exchange(self) -> Iterator[Output]:
-        at, status = self.link.exchange(self._command() + start.ASKING, self._patience)
-        self._age += self._turn
+        self._supervise()
+        begin = self._wall()
+        at, status, refusals = self.link.exchange(self._command() + ASKING, self._patience)
+        self.meter.note(begin, self._wall() if at is not None else None)
         self._at, self._blind = (self._at, self._blind + self._turn) if at is None else (at, 0)
         if status is not None:
             self._judge(status)
             if status != self._status and self._status_id is not None:
                 yield Output(self._report(code=int(status), description=describe(status)), self._status_id)
             self._status = status
+        self._listen(refusals)
         if at is not None:
             yield Output(self._where(at), self._frame_id)
 
@@ -79,21 +101,40 @@ class Gantry(Service):
         self.ended = True
 
     def _command(self) -> bytes:
+        """RUN, or STOP once: it also acknowledges a fault, which is to be read first."""
         if self.ended or self._at is None or self._blind > LOST:
             self.shaper.halt()
-            return command(Word.STOP)
-        body = self._state if self._age <= STALE else Velocity()
+            moved, self._moved = self._moved, False
+            return command(Word.STOP) if moved else b""
+        self._moved = True
+        body = self._state if self._age(self._heard) <= STALE else Velocity()
         cut = self.shaper.cut
         told = self.shaper.step(body, self._at, self._turn / MICROSECONDS)
         if self.shaper.cut == 1 and not cut:
             self._log.warning("the vehicle drives to the edge of the rig, which stops there: %s", place(self._at))
         return command(Word.RUN, told.x, told.y, told.yaw)
 
+    def _age(self, since: float | None) -> float:
+        return math.inf if since is None else self._wall() - since
+
+    def _supervise(self) -> None:
+        """Raises RigError when who moved the vehicle, or who started all this, hangs or is gone."""
+        if self._heard is not None and not self.ended and self._age(self._heard) > SILENT:
+            raise RigError(f"no KinematicState of the vehicle has come for {SILENT:g} s, and they came before")
+        if self._alive is not None and self._age(self._alive) > RUNNER_SILENT:
+            raise RigError(f"the runner has given no sign of life for {RUNNER_SILENT:g} s")
+
     def _judge(self, status: Status) -> None:
-        if status not in SENTENCES or (status == Status.WATCHDOG and self.link.fresh):
-            return
-        where = f", {place(self._at)}" if self._at else ""
-        raise RigError(f"the rig at {self.link.name} {SENTENCES[status]}{where} (status {int(status)})")
+        if status in SENTENCES:
+            where = f", {place(self._at)}" if self._at else ""
+            raise RigError(f"the rig at {self.link.name} {SENTENCES[status]}{where} (status {int(status)})")
+
+    def _listen(self, refusals: tuple[Refusal, ...]) -> None:
+        """A line that came damaged is said again soon; any other refusal means that the rig is not as it should be."""
+        for refusal in refusals:
+            if not refusal.is_garbled:
+                raise RigError(f"the rig at {self.link.name} refuses to move: {refusal}")
+            self._log.warning("the rig at %s got a damaged line: %s", self.link.name, refusal)
 
     def _where(self, at: Position) -> Message:
         x, y, yaw = self._origin
@@ -105,11 +146,14 @@ class Gantry(Service):
     def _feed(self, state: Any, _sample_time: int) -> None:
         velocity = Velocity(state.vx, state.vy, state.yawRate)
         if all(map(math.isfinite, (velocity.x, velocity.y, velocity.yaw))):
-            self._state, self._age = velocity, 0
+            self._state, self._heard = velocity, self._wall()
             return
         self._rejected += 1
         if self._rejected == 1:
             self._log.warning("a KinematicState of %s is ignored, as all that are not finite will be", velocity)
+
+    def _hear_runner(self, _message: Any, _sample_time: int) -> None:
+        self._alive = self._wall()
 
 
 def place(at: Position) -> str:
@@ -147,10 +191,12 @@ def build(context: Context) -> Service:
     context.resources.callback(link.close)
     with interruptible():
         status = start.find(link)
+        start.settle(link, status)
         if flags["calibrate"] or emulated:
             start.calibrate(link, flags["patience"])
-        elif status in SENTENCES and status != Status.WATCHDOG:
-            hint = "; --calibrate lets it find its home" if status == Status.NOT_CALIBRATED else ""
-            raise PortError(f"the rig at {target} {SENTENCES[status]} (status {int(status)}){hint}")
+        elif status == Status.NOT_CALIBRATED:
+            raise PortError(f"{start.trouble(link, status)}; --calibrate lets it find its home")
         start.go(link, goal, flags["patience"])
-    return Gantry(context, link, emulated)
+    gantry = Gantry(context, link, emulated)
+    context.resources.callback(lambda: context.log.info("%s", gantry.meter))
+    return gantry

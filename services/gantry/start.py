@@ -4,33 +4,69 @@ import math
 import time
 from collections.abc import Callable
 
-from services.gantry.link import Link, RigError
-from services.gantry.protocol import SENTENCES, Position, Status, Word, command
+from services.gantry.link import ASKING, Link, RigError
+from services.gantry.protocol import LATCHED, SENTENCES, Position, Status, Word, command
 
 NEAR, NEAR_YAW = 0.005, math.radians(1.5)
 """m and rad within which the rig has reached a place: 1.5 degrees are less than a full step of the turn."""
 POLL = 0.05
-ASKING = command(Word.POSITION) + command(Word.STATUS)
+ANSWER = 0.25
+"""s that the rig has to obey or refuse an order."""
+_BEGIN = 1.0
+"""s within which the rig has to say that it looks for home."""
 
 
 def find(link: Link) -> Status:
-    """The rig's status, as soon as it answers; raises RigError when it does not."""
+    """The rig's status, as soon as it answers, with any fault still latched; raises RigError when it does not."""
     while True:
-        _, status = link.exchange(ASKING, POLL)
+        status = link.exchange(ASKING, POLL).status
         if status is not None:
             return status
         time.sleep(POLL)
 
 
-def calibrate(link: Link, patience: float) -> None:
-    """Let the rig find its home; raises RigError when it has not after ``patience`` s."""
-    link.exchange(command(Word.CALIBRATE) + ASKING, POLL)
-    _wait(link, patience, lambda _, status: status == Status.IDLE, "is not calibrated", (Status.NOT_CALIBRATED,))
+def settle(link: Link, status: Status) -> None:
+    """Stop whatever the rig still does, and acknowledge that it braked or started anew before.
+
+    Raises RigError for a fault, which only CALIBRATE by hand ends.
+    """
+    if status in LATCHED:
+        raise RigError(trouble(link, status))
+    order(link, Word.STOP)
+
+
+def trouble(link: Link, status: Status) -> str:
+    """A sentence on a status that ends a test."""
+    return f"the rig at {link.name} {SENTENCES[status]} (status {int(status)})"
+
+
+def order(link: Link, word: Word, *arguments: float) -> Status | None:
+    """Give a command; the status after it, None when that did not come. Raises RigError when it is refused."""
+    heard = link.exchange(command(word, *arguments) + command(Word.STATUS), ANSWER)
+    if heard.refusals:
+        raise RigError(f"the rig at {link.name} refuses {word}: {heard.refusals[0]}")
+    return heard.status
+
+
+def calibrate(link: Link, patience: float, poll: float = POLL) -> float:
+    """Let the rig find its home; how long that took, in s. Raises RigError when it has not after ``patience`` s."""
+    begin = time.monotonic()
+    homing = order(link, Word.CALIBRATE) == Status.HOMING
+
+    def done(_: Position | None, status: Status | None) -> bool:
+        nonlocal homing
+        homing |= status == Status.HOMING
+        if not homing and time.monotonic() - begin > _BEGIN:
+            raise RigError(f"the rig at {link.name} was told to find its home and does not look for it")
+        return homing and status == Status.IDLE
+
+    _wait(link, patience, done, "has not found its home", command(Word.STATUS), poll)
+    return time.monotonic() - begin
 
 
 def go(link: Link, goal: Position, patience: float) -> None:
     """Drive the rig to a place; raises RigError when it is not there after ``patience`` s."""
-    link.exchange(command(Word.GOTO, goal.x, goal.y, goal.yaw) + ASKING, POLL)
+    order(link, Word.GOTO, goal.x, goal.y, goal.yaw)
     place = f"x = {goal.x:g} m, y = {goal.y:g} m, yaw = {math.degrees(goal.yaw):g} degrees"
     _wait(link, patience, lambda at, status: status == Status.IDLE and near(at, goal), f"has not reached {place}")
 
@@ -45,14 +81,15 @@ def _wait(
     patience: float,
     done: Callable[[Position | None, Status | None], bool],
     what: str,
-    still: tuple[Status, ...] = (),
+    asking: bytes = ASKING,
+    poll: float = POLL,
 ) -> None:
     end = time.monotonic() + patience
     while time.monotonic() < end:
-        at, status = link.exchange(ASKING, POLL)
+        at, status, _ = link.exchange(asking, ANSWER)
         if done(at, status):
             return
-        if status in SENTENCES and status not in still:
-            raise RigError(f"the rig at {link.name} {SENTENCES[status]} (status {int(status)})")
-        time.sleep(POLL)
+        if status in SENTENCES:
+            raise RigError(trouble(link, status))
+        time.sleep(poll)
     raise RigError(f"the rig at {link.name} {what} after {patience:g} s")

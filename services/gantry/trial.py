@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from services.gantry import start
-from services.gantry.link import Link, RigError
+from services.gantry.link import ASKING, Link, RigError
 from services.gantry.motion import Limits
-from services.gantry.protocol import SENTENCES, Position, Status, Word, command
+from services.gantry.protocol import Position, Status
 
 ROUNDS = 20
 ANSWER = 0.25
@@ -25,7 +25,6 @@ REPEATS = {"x": 0.005, "y": 0.005, "yaw": math.radians(2.5)}
 DECIMAL = 1e-4
 TRIES = 3
 """For each axis, as a busy machine looks at the clock too late at times."""
-_BEGIN = 1.0
 _POLL = 0.005
 
 Check = dict[str, Any]
@@ -39,18 +38,26 @@ def home(limits: Limits) -> Position:
 def asked(link: Link) -> tuple[Position | None, Status]:
     """Position and status; a rig that is not calibrated has no position. Raises RigError when no answer comes."""
     for _ in range(ROUNDS):
-        at, status = link.exchange(start.ASKING, ANSWER)
-        if status is not None and (at is not None or status == Status.NOT_CALIBRATED):
+        at, status, refusals = link.exchange(ASKING, ANSWER)
+        if status is not None and (at is not None or refusals):
             return at, status
     raise RigError(f"the rig at {link.name} does not say where it is")
 
 
 def tried(link: Link, limits: Limits, patience: float) -> dict[str, Any]:
-    """``ok``, the ``reason`` when it is not, and the ``checks``; the rig moves, and ends at home."""
-    start.calibrate(link, patience)
-    checks = _answers(link)
-    if all(check["ok"] for check in checks):
-        checks += _homing(link, limits, patience)
+    """``ok``, the ``reason`` when it is not, and the ``checks``; the rig moves, and ends at home.
+
+    A rig that cannot, or still reports a fault from before, is not fit.
+    """
+    checks: list[Check] = []
+    try:
+        start.settle(link, start.find(link))
+        start.calibrate(link, patience)
+        checks += _answers(link)
+        if all(check["ok"] for check in checks):
+            checks += _homing(link, limits, patience)
+    except RigError as error:
+        return {"ok": False, "reason": str(error), "checks": checks}
     bad = [check for check in checks if not check["ok"]]
     return {"ok": not bad, "reason": _reason(bad[0]) if bad else "", "checks": checks}
 
@@ -70,7 +77,7 @@ def _answers(link: Link) -> list[Check]:
     took = []
     for _ in range(ROUNDS):
         begin = time.monotonic()
-        at, status = link.exchange(start.ASKING, ANSWER)
+        at, status, _ = link.exchange(ASKING, ANSWER)
         if at is not None and status is not None:
             took.append(time.monotonic() - begin)
     middle = statistics.median(took) if took else ANSWER
@@ -104,20 +111,5 @@ def _difference(link: Link, limits: Limits, axis: str, patience: float) -> float
     took = []
     for times in (1, 2):
         start.go(link, replace(home(limits), **{axis: low + times * way}), patience)
-        took.append(_way_home(link, patience))
+        took.append(start.calibrate(link, patience, _POLL))
     return abs((took[1] - took[0]) * SPEEDS[axis] - way)
-
-
-def _way_home(link: Link, patience: float) -> float:
-    """Looks for home; how long that took, in s."""
-    begin, homing = time.monotonic(), False
-    link.exchange(command(Word.CALIBRATE) + command(Word.STATUS), ANSWER, Status)
-    while (took := time.monotonic() - begin) < patience:
-        _, status = link.exchange(command(Word.STATUS), ANSWER, Status)
-        homing |= status == Status.HOMING
-        if status == Status.IDLE and (homing or took > _BEGIN):
-            return took
-        time.sleep(_POLL)
-        if status in SENTENCES and status != Status.NOT_CALIBRATED:
-            raise RigError(f"the rig at {link.name} {SENTENCES[status]} (status {int(status)})")
-    raise RigError(f"the rig at {link.name} has not found its home after {patience:g} s")

@@ -1,4 +1,7 @@
-"""A rig on a pseudo terminal that speaks the protocol and moves, in a thread; it can misbehave."""
+"""A rig on a pseudo terminal that obeys the protocol and moves, in a thread; it can misbehave.
+
+What it cannot do (accelerate, reset, lose power) is tried on the emulated rig.
+"""
 
 import math
 import os
@@ -10,11 +13,15 @@ import time
 import tty
 from pathlib import Path
 
+from services.gantry.table import SPEED, Error
+
 COMMAND = re.compile(r"\$([A-Z]+):?([-+0-9.,]*)")
 WATCHDOG = 0.5
 TICK = 0.004
 QUICK = (8.0, 8.0, 40.0)
 HOME, HOMING = (-0.9, -0.7, -2.63385), (0.1, 0.1, 0.35)
+LEAST_HOMING = 0.1
+TROUBLE = (3, 4, 5, 7, 8)
 
 
 class FakeRig:
@@ -25,6 +32,9 @@ class FakeRig:
         self.at = [0.1, -0.1, 0.0]
         self.velocity = [0.0, 0.0, 0.0]
         self.status = 0
+        """What it says; a fault is latched until STOP or CALIBRATE acknowledge it."""
+        self.restarted: int | None = None
+        """The error's code with which it answers RUN until STOP, as after a reset."""
         self.calibrated = True
         self.silent = False
         self.homes_slowly = False
@@ -102,26 +112,49 @@ class FakeRig:
         assert match is not None, line
         word, arguments = match[1], tuple(float(a) for a in match[2].split(",") if a)
         self.heard.append((word, arguments))
-        if word == "RUN":
+        error = self._refusal(word, arguments)
+        if error is not None:
+            self._answer(f"ERROR:{int(error)}")
+        elif word == "RUN":
             self.velocity, self._last_run = list(arguments), time.monotonic()
         elif word == "STOP":
-            self.velocity, self._goal = [0.0, 0.0, 0.0], None
-            self.status = 0 if self.status == 7 else self.status
+            self.velocity, self._goal, self.restarted = [0.0, 0.0, 0.0], None, None
+            self._acknowledge()
         elif word == "GOTO":
+            self._acknowledge()
             self._goal = list(arguments)
         elif word == "CALIBRATE":
+            self._acknowledge()
             self._home()
         elif word == "POSITION":
             self._answer(",".join(f"{value:.5f}" for value in self.at))
         elif word == "STATUS":
             self._answer(str(self._said()))
 
+    def _refusal(self, word: str, arguments: tuple[float, ...]) -> int | None:
+        homing = time.monotonic() < self._home_at
+        if word == "POSITION" and (homing or not self.calibrated):
+            return Error.UNCALIBRATED
+        if homing and word in ("RUN", "GOTO", "CALIBRATE"):
+            return Error.HOMING
+        if word not in ("RUN", "GOTO"):
+            return None
+        if self.status in TROUBLE and not (word == "GOTO" and self.status == 7):
+            return Error.TROUBLE
+        if word == "RUN" and self.restarted:
+            return self.restarted
+        too_fast = word == "RUN" and any(abs(a) > s for a, s in zip(arguments, SPEED.values(), strict=True))
+        return None if self.calibrated and not too_fast else Error.BOUNDS if too_fast else Error.UNCALIBRATED
+
+    def _acknowledge(self) -> None:
+        self.status = 0 if self.status in TROUBLE else self.status
+
     def _home(self) -> None:
         ways = [abs(a - h) for a, h in zip(self.at, HOME, strict=True)]
         self._homed += 1
         lost = self.lost * self._homed
         took = max(way / speed for way, speed in zip([ways[0] + lost, *ways[1:]], HOMING, strict=True))
-        self._home_at = time.monotonic() + took * self.homes_slowly
+        self._home_at = time.monotonic() + max(LEAST_HOMING, took * self.homes_slowly)
         self.calibrated, self.at = True, list(HOME)
 
     def _said(self) -> int:
@@ -140,7 +173,9 @@ class FakeRig:
 
     def _move(self, dt: float, now: float) -> None:
         if any(self.velocity) and now - self._last_run > WATCHDOG:
-            self.velocity, self.status = [0.0, 0.0, 0.0], 7
+            self.status = 7
+        if self.status in TROUBLE:
+            self.velocity, self._goal = [0.0, 0.0, 0.0], None
         self.at = [a + v * dt for a, v in zip(self.at, self.velocity, strict=True)]
         if self._goal is not None:
             way = [goal - a for a, goal in zip(self.at, self._goal, strict=True)]

@@ -4,21 +4,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.gantry.protocol import LONGEST, Lines, Position, Status, Word, answer, command
+from services.gantry.protocol import LONGEST, Answer, Lines, Position, Refusal, Status, Word, answer, command
 from tests.services.gantry.fakerig import COMMAND
 
 numbers = st.floats(-10, 10)
 positions = st.builds(Position, numbers, numbers, numbers)
-answers = positions | st.sampled_from(Status)
+answers = positions | st.sampled_from(Status) | st.builds(Refusal, st.integers(0, 99))
 
 
-def line(one: Position | Status) -> bytes:
+def line(one: Answer) -> bytes:
     """As a firmware prints it."""
+    if isinstance(one, Refusal):
+        return f"$ERROR:{one.code}\n".encode()
     text = f"{one.x:.6f},{one.y:.6f},{one.yaw:.6f}" if isinstance(one, Position) else str(int(one))
     return f"${text}\n".encode()
 
 
-def same(a: Position | Status, b: Position | Status) -> bool:
+def same(a: Answer, b: Answer) -> bool:
     if isinstance(a, Position) and isinstance(b, Position):
         return (a.x, a.y, a.yaw) == pytest.approx((b.x, b.y, b.yaw), abs=1e-6)
     return a == b
@@ -58,6 +60,11 @@ def test_commands_are_finite(value: float) -> None:
         ("$0", Status.IDLE),
         ("$8\r", Status.FAULT),
         ("$9", None),
+        ("$ERROR:8", Refusal(8)),
+        ("$ERROR:10\r", Refusal(10)),
+        ("$ERROR:", None),
+        ("$ERROR:8,1", None),
+        ("$ERROR:-1", None),
         ("$-1", None),
         ("$1.0", None),
         ("$01", None),
@@ -74,12 +81,12 @@ def test_commands_are_finite(value: float) -> None:
         ("$\u0661", None),
     ],
 )
-def test_answers(text: str, found: Position | Status | None) -> None:
+def test_answers(text: str, found: Position | Status | Refusal | None) -> None:
     assert answer(text) == found
 
 
 @given(st.lists(answers, max_size=8), st.lists(st.integers(1, 20), min_size=1))
-def test_answers_come_through_however_they_are_cut(sent: list[Position | Status], cuts: list[int]) -> None:
+def test_answers_come_through_however_they_are_cut(sent: list[Answer], cuts: list[int]) -> None:
     data, lines, found = b"".join(map(line, sent)), Lines(), []
     index = 0
     while data:
@@ -91,7 +98,7 @@ def test_answers_come_through_however_they_are_cut(sent: list[Position | Status]
 
 
 @given(st.binary(max_size=300).map(lambda noise: noise.replace(b"$", b"!")), answers)
-def test_noise_before_an_answer_does_not_hide_it(noise: bytes, sent: Position | Status) -> None:
+def test_noise_before_an_answer_does_not_hide_it(noise: bytes, sent: Answer) -> None:
     lines = Lines()
     found = lines.feed(noise) + lines.feed(b"\n" + line(sent))
     assert len(found) == 1 and same(found[0], sent)

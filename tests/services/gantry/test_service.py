@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import re
 import signal
 import subprocess
 import time
@@ -15,9 +16,11 @@ from dodo_dsl.opendlv.session import Session
 from services.base import Context
 from services.base.flags import parse
 from services.base.manifest import load_manifest
-from services.gantry.link import Link
+from services.gantry import start
+from services.gantry.link import Link, RigError
 from services.gantry.port import SerialPort
 from services.gantry.service import Gantry
+from services.gantry.table import Error
 from tests.services.gantry.fakerig import FakeRig
 from tests.services.process import PATIENCE, ROOT, hear, launch, running, say
 
@@ -115,7 +118,14 @@ def test_a_status_that_ends_the_test(cid: int, rig: FakeRig, status: int, words:
         assert process.stderr is not None
         error = process.stderr.read()
         assert words in error and f"(status {status})" in error and "at x = 0.000 m" in error and "Trace" not in error
-        assert rig.last() == "STOP"
+        assert rig.status == status and not any(rig.velocity), "the fault is left to be seen"
+
+
+@pytest.mark.parametrize(("status", "words"), [(3, "touched a limit switch"), (4, "a motor stalled"), (8, "a fault")])
+def test_a_fault_from_before_is_seen_and_not_erased(cid: int, rig: FakeRig, status: int, words: str) -> None:
+    rig.status = status
+    assert words in refused(cid, rig, f"--serial={rig.path}", "--calibrate")
+    assert rig.status == status and not rig.commands("STOP") and not rig.commands("CALIBRATE")
 
 
 def test_a_watchdog_of_its_own_accord_ends_the_test(cid: int, rig: FakeRig) -> None:
@@ -136,24 +146,37 @@ def test_garbage_and_lines_in_parts_do_no_harm(cid: int, rig: FakeRig) -> None:
         assert abs(frame.x) < 1
 
 
-def test_it_comes_back_when_the_cable_does(cid: int, rig: FakeRig) -> None:
+@pytest.mark.parametrize(("code", "name"), [(9, "BLOCKED"), (99, "which this version does not know")])
+def test_a_rig_that_refuses_to_move_ends_the_test(cid: int, rig: FakeRig, code: int, name: str) -> None:
+    with Session(cid) as session, gantry(cid, rig) as process:
+        drive(session, lambda: any(rig.velocity), vx=0.2)
+        rig.restarted = code
+        assert process.wait(PATIENCE) == 1
+        assert process.stderr is not None
+        assert f"refuses to move: $ERROR:{code} ({name})" in process.stderr.read()
+        assert rig.last() == "STOP" and not any(rig.velocity)
+
+
+def test_a_line_that_comes_damaged_is_said_again(cid: int, rig: FakeRig) -> None:
+    with Session(cid) as session, gantry(cid, rig) as process:
+        drive(session, lambda: any(rig.velocity), vx=0.2)
+        rig.restarted = int(Error.DAMAGED)
+        time.sleep(0.1)
+        rig.restarted = None
+        drive(session, lambda: rig.at[0] > 0.05, vx=0.2)
+        process.send_signal(signal.SIGTERM)
+        assert "got a damaged line: $ERROR:5 (DAMAGED)" in process.communicate(timeout=PATIENCE)[1]
+
+
+def test_an_outage_of_the_line_ends_the_test(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         drive(session, lambda: any(rig.velocity), vx=0.2)
         rig.unplug()
-        rig.status = 7
         time.sleep(0.3)
         rig.plug()
-        drive(session, lambda: any(rig.velocity), vx=0.2)
-        assert process.poll() is None
-        hear(session, FRAME)
-
-
-def test_a_rig_that_stays_away_ends_the_test(cid: int, rig: FakeRig) -> None:
-    with gantry(cid, rig) as process:
-        rig.unplug()
         assert process.wait(PATIENCE) == 1
         assert process.stderr is not None
-        assert f"the rig at {rig.path} has been away for 5 s" in process.stderr.read()
+        assert f"the line to the rig at {rig.path} is lost: " in process.stderr.read()
 
 
 def test_a_rig_that_falls_silent_ends_the_test_and_is_told_to_stop(cid: int, rig: FakeRig) -> None:
@@ -161,8 +184,47 @@ def test_a_rig_that_falls_silent_ends_the_test_and_is_told_to_stop(cid: int, rig
         rig.silent = True
         assert process.wait(PATIENCE) == 1
         assert process.stderr is not None
-        assert "has been away for 5 s: it does not answer" in process.stderr.read()
+        assert "is lost: it does not answer" in process.stderr.read()
         assert rig.last() == "STOP"
+
+
+def test_a_rig_that_never_answers(cid: int, rig: FakeRig) -> None:
+    rig.silent = True
+    assert f"the rig at {rig.path} has been away for 5 s: it does not answer" in refused(cid, rig)
+
+
+def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: FakeRig) -> None:
+    flags = parse(MANIFEST, ["--cid=1", f"--serial={rig.path}", "--freq=10"])
+    link, now = Link(str(rig.path), lambda: SerialPort(str(rig.path))), [100.0]
+    with contextlib.closing(link):
+        start.settle(link, start.find(link))
+        model = Gantry(Context("gantry", flags, MessageSet.standard()), link, wall=lambda: now[0])
+        state = MessageSet.standard().type(STATE)(vx=0.2)
+        for name, patience, words in (
+            (STATE, 1.0, "no KinematicState"),
+            ("dodo.Alive", 3.0, "the runner has given no"),
+        ):
+            (hear_it,) = (handler for (message, _), handler in model.inputs.items() if message == name)
+            now[0] += 10  # never heard, never missed
+            list(model.update(round(now[0] * 1e6)))
+            hear_it(state, 0)
+            now[0] += patience - 0.01
+            list(model.update(round(now[0] * 1e6)))
+            now[0] += 0.2
+            with pytest.raises(RigError, match=words):
+                list(model.update(round(now[0] * 1e6)))
+            model.end_of_input(0)  # nothing more is expected to come
+
+
+def test_the_log_tells_jitter_and_latency(cid: int, rig: FakeRig) -> None:
+    with Session(cid) as session, gantry(cid, rig) as process:
+        for _ in range(20):
+            hear(session, FRAME)
+        process.send_signal(signal.SIGTERM)
+        log = process.communicate(timeout=PATIENCE)[1]
+    assert re.search(
+        r"INFO: \d+ turns of 20 ms, \d+ without an answer; jitter median [0-9.]+ ms, 95 % [0-9.]+ ms,", log
+    )
 
 
 def refused(cid: int, rig: FakeRig, *flags: str) -> str:
