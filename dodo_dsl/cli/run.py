@@ -17,6 +17,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.write import Drawable, forget, write_report
+from dodo_dsl.run import rigs
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
 from dodo_dsl.run.history import History
 from dodo_dsl.run.runner import Policy, Runner, default_backend
@@ -93,6 +94,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     with work_folder() as folder:
         try:
             jobs, deployment = prepare(options, folder.path, stdout)
+            _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
             runner = _runner(options, jobs, deployment, stdout, folder.lease.descriptor)
         except (Usage, selection.NoSuchTest) as error:
             stderr.write(f"dodo run: {error}\n")
@@ -102,6 +104,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
     return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
+
+
+def _refuse_to_keep(plans: Sequence[Plan]) -> None:
+    for plan in plans:
+        if rigs.is_real(plan):
+            raise Usage(f"{plan.name} runs on rig '{plan.rig}', which --keep would leave driven: run it without")
 
 
 def _runner(

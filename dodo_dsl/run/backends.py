@@ -97,9 +97,9 @@ class Processes:
         async with (
             self._turn(plan),
             lanes.host_lane(plan, () if rigs.is_real(plan) else self._cids, say, keep) as leased,
+            rigs.attended(plan, leased.cid, leased.descriptors, say) as descriptors,
         ):
-            await rigs.examine(plan, say)
-            lane = replace(leased, descriptors=(*leased.descriptors, *self._descriptors))
+            lane = replace(leased, descriptors=(*descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
 
 
@@ -144,8 +144,10 @@ class Containers:
             if plan.isolation == "network" and not rigs.is_real(plan):
                 yield backend
             else:
-                async with lanes.host_lane(replace_flags(plan), (plan.cid,), say):
-                    await rigs.examine(plan, say)
+                async with (
+                    lanes.host_lane(replace_flags(plan), (plan.cid,), say) as lane,
+                    rigs.attended(plan, lane.cid, lane.descriptors, say),
+                ):
                     yield backend
         finally:
             lease.leave() if backend.left_behind else lease.release()

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import os
-import socket
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 from dodo_dsl.plan.application import SANDBOX
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import lines
-from dodo_dsl.run.announce import begin_frame
+from dodo_dsl.run.announce import begin_frame, send_on_host
 from dodo_dsl.run.client import said
 from dodo_dsl.run.compose import Compose
 from dodo_dsl.run.copies import copy_out
@@ -147,8 +146,10 @@ class DockerBackend:
     async def begin(self) -> None:
         frame, group = begin_frame(self.plan.seed), f"225.0.0.{self.cid}"
         if SANDBOX not in self._containers:
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
-                sender.sendto(frame, (group, _PORT))
+            try:
+                send_on_host(self.cid, frame)
+            except OSError as error:
+                raise BackendError(f"the test's bus cannot be told that the test begins: {error}") from error
             return
         escaped = "".join(f"\\x{byte:02x}" for byte in frame)
         words = ["bash", "-c", _TELL, "tell", escaped, group, str(_PORT)]

@@ -22,7 +22,7 @@ from dodo_dsl.run.process import Lane
 PROBE_S = 0.3
 LANE = re.compile(r"dodo-[0-9a-f]{8}-")
 _PORT = 12175
-_KILL_S = 2.0
+_END_S, _KILL_S = 3.0, 2.0
 
 
 def namespaces_refusal() -> str:
@@ -74,6 +74,8 @@ async def host_lane(
     except leases.LeaseTimeout as error:
         raise BackendError(str(error)) from error
     finally:
+        if not keep:
+            await asyncio.shield(asyncio.to_thread(end_lane, name))  # what outlived its sandbox ends before its lease
         for held_lease in reversed(held):
             held_lease.leave() if keep else held_lease.release()
         if not keep:
@@ -106,7 +108,7 @@ def reap() -> list[str]:
     for lease, about in leases.orphans("cid-"):
         lane = str(about.get("lane", ""))
         if LANE.fullmatch(lane):
-            killed = _kill_lane(lane)
+            killed = end_lane(lane)
             memories = remove_memories(lane)
             if killed or memories:
                 removed.append(f"{about.get('test', '?')}: {killed} processes and {memories} shared memories")
@@ -114,20 +116,30 @@ def reap() -> list[str]:
     return removed
 
 
-def _kill_lane(lane: str) -> int:
-    """Ends the processes whose environment names the lane."""
+def end_lane(lane: str) -> int:
+    """Ends the processes whose environment names the lane, which may be moving a rig; says how many there were."""
+    ended = _signal_lane(lane, signal.SIGTERM)
+    _wait_for(ended, _END_S)
+    _wait_for(_signal_lane(lane, signal.SIGKILL) if ended else [], _KILL_S)
+    return len(ended)
+
+
+def _signal_lane(lane: str, number: signal.Signals) -> list[Path]:
     mark = f"DODO_LANE={lane}\0".encode()
-    killed: list[Path] = []
+    told: list[Path] = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
             with contextlib.suppress(OSError):
                 if mark in (entry / "environ").read_bytes() + b"\0":
-                    os.kill(int(entry.name), signal.SIGKILL)
-                    killed.append(entry)
-    deadline = time.monotonic() + _KILL_S
-    while any(_lives(entry) for entry in killed) and time.monotonic() < deadline:
+                    os.kill(int(entry.name), number)
+                    told.append(entry)
+    return told
+
+
+def _wait_for(processes: list[Path], seconds: float) -> None:
+    deadline = time.monotonic() + seconds
+    while any(_lives(entry) for entry in processes) and time.monotonic() < deadline:
         time.sleep(0.01)
-    return len(killed)
 
 
 def _lives(process: Path) -> bool:

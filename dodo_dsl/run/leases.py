@@ -143,7 +143,7 @@ async def lease_any(
 
 
 def _kind(names: Sequence[str]) -> str:
-    return names[0].rpartition("-")[0] or names[0]
+    return names[0].partition("-")[0]
 
 
 def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:

@@ -7,6 +7,7 @@ in ``/tmp`` stay visible, so that programs and specs kept there still run.
 import contextlib
 import ctypes
 import os
+import signal
 import socket
 import struct
 from pathlib import Path
@@ -33,6 +34,13 @@ def _call(name: str, *arguments: object) -> None:
 def die_with_parent(signal_number: int) -> None:
     """This process gets a signal when its parent dies, however it dies."""
     _call("prctl", _PR_SET_PDEATHSIG, signal_number, 0, 0, 0)
+
+
+def end_with(parent: int) -> None:
+    """Between fork and exec of a child: it gets SIGTERM when its parent dies, and ends at once if that has happened."""
+    die_with_parent(signal.SIGTERM)
+    if os.getppid() != parent:
+        os._exit(128 + signal.SIGTERM)
 
 
 def adopt_orphans() -> None:

@@ -6,13 +6,15 @@ import json
 import os
 import re
 import signal
+import stat
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
+from dodo_dsl.run.announce import signs_of_life
 from dodo_dsl.run.environment import base_environment
 from dodo_dsl.run.events import BackendError
 from dodo_dsl.run.process import package_path
@@ -20,6 +22,8 @@ from dodo_dsl.spec.rig import EMULATED
 
 FOLDER_VARIABLE = "DODO_RIGS"
 PATIENCE_S = 180.0
+CHECK_PATIENCE_S, CHECK_TRIES = 90.0, 2
+"""s: from the far corner the rig looks for its home for 20 s, and for most of a minute when it does so three times."""
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 _END_S = 5.0
 
@@ -34,6 +38,10 @@ class RigProblem(Exception):
 
 class NoAnswer(RigProblem):
     """The rig's program did not run as it should, which says nothing about the rig."""
+
+
+class Silence(NoAnswer):
+    """The rig's program hung, as it does when the rig does."""
 
 
 def folder() -> Path:
@@ -82,20 +90,41 @@ def clear(rig: str) -> bool:
 
 @contextlib.asynccontextmanager
 async def leased(
-    cid: int | None, what: str, say: Callable[[str], None], patience_s: float = leases.DEFAULT_PATIENCE_S
+    cid: int | None,
+    what: str,
+    say: Callable[[str], None],
+    patience_s: float = leases.DEFAULT_PATIENCE_S,
+    devices: Sequence[str] = (),
 ) -> AsyncIterator[tuple[int, ...]]:
-    """The lease that tests on the rig take, too: that of its CID. The emulated rig has none, as everyone has their own.
+    """The leases that tests on the rig take, too: of its CID and its devices. The emulated rig has none.
 
-    Gives the descriptors by which a program holds it, too. Raises LeaseTimeout when it does not come free.
+    Gives the descriptors by which a program holds them, too. Raises LeaseTimeout when one does not come free.
     """
-    if cid is None:
-        yield ()
-        return
-    lease = await leases.lease_any([f"cid-{cid}"], {"test": what}, say, patience_s=patience_s)
+    names = [] if cid is None else [f"cid-{cid}"]
+    held: list[leases.Lease] = []
     try:
-        yield (lease.descriptor,)
+        for name in [*names, *device_leases(devices)]:
+            held.append(await leases.lease_any([name], {"test": what}, say, patience_s=patience_s))
+        yield tuple(lease.descriptor for lease in held)
     finally:
-        lease.release()
+        for lease in reversed(held):
+            lease.release()
+
+
+def devices_in(words: Iterable[str]) -> list[str]:
+    """The hardware that a program's flags name."""
+    return [value for flag, _, value in (word.partition("=") for word in words) if flag in DEVICES]
+
+
+def device_leases(devices: Sequence[str]) -> list[str]:
+    """A lease's name for each device that is there, by its number: two rigs that name one exclude each other."""
+    names = set()
+    for device in devices:
+        with contextlib.suppress(OSError, ValueError):
+            found = Path(device).stat()
+            if device.startswith("/") and stat.S_ISCHR(found.st_mode):
+                names.add(f"device-{os.major(found.st_rdev)}-{os.minor(found.st_rdev)}")
+    return sorted(names)
 
 
 async def ask(
@@ -117,7 +146,7 @@ async def ask(
         async with asyncio.timeout(patience_s):
             out, err = await process.communicate()
     except TimeoutError:
-        raise NoAnswer(f"the rig's program gave no answer within {patience_s:g} s") from None
+        raise Silence(f"the rig's program gave no answer within {patience_s:g} s") from None
     finally:
         await _ended(process)
     try:
@@ -158,7 +187,7 @@ async def _ask_alone(
     assert task is not None
     for number in (signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, task.cancel)
-    async with leased(cid, what, say, patience_s) as descriptors:
+    async with leased(cid, what, say, patience_s, devices_in(question[1])) as descriptors:
         return await ask(*question, descriptors=descriptors)
 
 
@@ -179,26 +208,50 @@ def is_real(plan: Plan) -> bool:
     return bool(plan.rig) and plan.rig != EMULATED
 
 
-async def examine(plan: Plan, say: Callable[[str], None]) -> None:
-    """Before a test on a real rig: BackendError when it is in quarantine, or fails its check and is put there."""
+@contextlib.asynccontextmanager
+async def attended(
+    plan: Plan, cid: int, descriptors: tuple[int, ...], say: Callable[[str], None]
+) -> AsyncIterator[tuple[int, ...]]:
+    """A real rig's devices leased and checked, and its services told that the runner lives; of others nothing is done.
+
+    ``descriptors`` are those of the lease of its CID; gives all by which a program holds the rig. Raises BackendError
+    when it is in use, in quarantine, or fails its check.
+    """
     if not is_real(plan):
+        yield descriptors
         return
+    devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
+    async with contextlib.AsyncExitStack() as stack:
+        try:
+            more = await stack.enter_async_context(leased(None, plan.slug, say, devices=devices))
+        except leases.LeaseTimeout as error:
+            raise BackendError(str(error)) from error
+        await examine(plan, say, (*descriptors, *more))
+        await stack.enter_async_context(signs_of_life(cid))
+        yield (*descriptors, *more)
+
+
+async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...]) -> None:
+    """Before a test on a real rig: BackendError when it is in quarantine, cannot be checked, or fails and is put there.
+
+    ``descriptors`` hold the rig's leases, which its checks go on to hold should this process be killed.
+    """
     try:
         reason = quarantined(plan.rig)
         if not reason:
             say(f"checking rig {plan.rig}")
-            reason = await _fault(plan)
+            reason = await _fault(plan, descriptors)
             if reason:
                 quarantine(plan.rig, reason)
     except RigProblem as problem:
-        raise BackendError(str(problem)) from problem
+        raise BackendError(f"rig {plan.rig} cannot be checked: {problem}") from problem
     if reason:
         clearing = f"`dodo rig clear {plan.rig}` ends that"
         raise BackendError(f"rig {plan.rig} is in quarantine: {reason} ({clearing})")
 
 
-async def _fault(plan: Plan) -> str:
-    """What a check of the rig's gantry and camera finds; empty when both are fit."""
+async def _fault(plan: Plan, descriptors: tuple[int, ...]) -> str:
+    """What a check of the rig's gantry and camera finds unfit; empty when both are fit. Raises RigProblem."""
     for service in plan.services:
         program = CHECKS.get(service.uses)
         if program is None:
@@ -208,17 +261,25 @@ async def _fault(plan: Plan) -> str:
             continue  # a file is alive
         words = [f"--{flag.name}={flag.value}" for flag in service.flags if flag.name in names]
         try:
-            said = await ask(("python", "-m", module), [*words, *action])
-        except NoAnswer:
-            raise
-        except RigProblem as problem:
-            return str(problem)
+            said = await _checked(("python", "-m", module), [*words, *action], descriptors)
+        except Silence as silence:
+            return f"its check hung {CHECK_TRIES} times: {silence}"
         if not said.get("ok"):
             return str(said.get("reason") or "its check failed")
     return ""
 
 
+async def _checked(program: Sequence[str], words: Sequence[str], descriptors: tuple[int, ...]) -> dict[str, Any]:
+    """What a check says; one that hangs is tried again, and raises Silence at last."""
+    for _ in range(CHECK_TRIES - 1):
+        with contextlib.suppress(Silence):
+            return await ask(program, words, CHECK_PATIENCE_S, descriptors)
+    return await ask(program, words, CHECK_PATIENCE_S, descriptors)
+
+
 HAND = ("python", "-m", "services.gantry.hand")
+DEVICES = ("--serial", "--source")
+"""Flags that name hardware."""
 RANGES = ("range-x", "range-y", "range-yaw")
 CHECKS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "gantry": ("services.gantry.hand", ("check",), ("serial", *RANGES)),

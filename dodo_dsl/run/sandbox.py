@@ -1,7 +1,8 @@
 """The sandbox of one test: a small process that starts, watches and ends the test's processes.
 
 It is process 1 of namespaces of its own (``network``), or their parent on the host (``host``). The runner talks to it
-over a socket; when that closes, whatever closed it, the sandbox ends everything that it started, and itself.
+over a socket; when that closes, whatever closed it, the sandbox ends everything that it started, and itself. Should it
+be killed, the kernel asks what it started to end. It has one thread: the kernel's promise is about that.
 
     runner to sandbox   {"do": "start", "id", "argv", "env", "cwd", "fork"} with the output's descriptor,
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
@@ -11,6 +12,7 @@ over a socket; when that closes, whatever closed it, the sandbox ends everything
 """
 
 import contextlib
+import functools
 import json
 import os
 import select
@@ -111,8 +113,9 @@ class Sandbox:
                 stdout=output,
                 stderr=output,
                 start_new_session=True,
+                preexec_fn=functools.partial(namespaces.end_with, os.getpid()),  # noqa: PLW1509  (it has one thread)
             )
-        except (OSError, ValueError) as error:
+        except (OSError, subprocess.SubprocessError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error)
             self.tell(unstartable=name, why=f"{getattr(error, 'filename', None) or order['argv'][0]}: {why}")
 
