@@ -1,19 +1,22 @@
 """The judge on the bus."""
 
 import math
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from google.protobuf.message import Message
 
-from services.base import Context, Flags, Handler, Output, Service
+from services.base import Context, Flags, Handler, Output, RealTimeClock, Service
 from services.collision.geometry import Box, Pose, heading_of
-from services.collision.model import REQUESTS, Judge
+from services.collision.model import REQUESTS, Judge, UnjudgeableError
 from services.collision.obstacles import load, pick
 from services.collision.track import Track
 
 PERIOD = 10_000  # us
+SILENCE, GAPS = 2.0, 3.0
+"""s without a frame, and how often the longest time between two of them, after which whoever sent them hangs."""
 
 
 class Collision(Service):
@@ -21,7 +24,12 @@ class Collision(Service):
 
     period = PERIOD
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, wall: Callable[[], float] = time.monotonic) -> None:
+        """``wall`` in s: in real time a vehicle that vanishes is noticed."""
+        self._wall = wall
+        self._is_realtime = isinstance(context.clock, RealTimeClock)
+        self._seen: float | None = None
+        self._gap = math.inf
         self._log = context.log
         flags = context.flags
         self.judge = Judge(track(flags), Box(flags["length"], flags["width"]))
@@ -36,7 +44,14 @@ class Collision(Service):
     def update(self, now: int) -> Iterable[Message | Output]:
         self.judge.update(now)
         self.verdict = self.judge.verdict
+        if self.verdict is None and self._is_realtime and self._seen is not None:
+            self._miss(self._wall() - self._seen)
         return ()
+
+    def _miss(self, silent: float) -> None:
+        """Raises UnjudgeableError when frames that came have stopped: the application is not to blame for that."""
+        if silent > max(SILENCE, GAPS * self._gap):
+            raise UnjudgeableError(f"no Frame of the vehicle has come for {silent:.0f} s, and they came before")
 
     def end_of_input(self, now: int) -> None:
         self.judge.end(now)
@@ -46,6 +61,11 @@ class Collision(Service):
         return lambda _message, _sample_time: self.judge.request(name)
 
     def _look(self, frame: Any, sample_time: int) -> None:
+        now = self._wall()
+        if self._seen is not None:
+            longest = 0.0 if math.isinf(self._gap) else self._gap
+            self._gap = max(longest, now - self._seen)
+        self._seen = now
         heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
         if heading is None or not math.isfinite(frame.x + frame.y):
             self.rejected += 1

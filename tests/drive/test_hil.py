@@ -2,8 +2,6 @@
 
 import json
 import math
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
-from tests.drive.applications import BLIND, ROOT, dodo, kiwi, results
+from tests.drive.applications import BLIND, dodo, kiwi, results
 
 SPEC = """
 dodo: 1
@@ -41,11 +39,7 @@ MICROSTEP, MICROSTEP_YAW = 2.36e-6, 0.000248
 MEASURED, TRUE = 0, 1
 
 
-@pytest.fixture(scope="module", autouse=True)
-def firmware() -> None:
-    if shutil.which("avr-gcc") is None:
-        pytest.skip("avr-gcc is missing: scripts/install-firmware-tools installs it on Debian")
-    subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), "firmware", "emulator"], check=True)
+pytestmark = pytest.mark.usefixtures("firmware")
 
 
 def run(report: Path, *words: str, code: int) -> dict[str, Any]:

@@ -2,7 +2,8 @@ import json
 import math
 import re
 import subprocess
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags
+from services.collision.model import UnjudgeableError
 from services.collision.service import Collision
 from tests.services.process import PATIENCE, launch, running, say
 
@@ -31,7 +33,7 @@ def lane(tmp_path: Path) -> Iterator[Path]:
     yield tmp_path
 
 
-def service(lane: Path, **changes: Any) -> Collision:
+def service(lane: Path, wall: Callable[[], float] = time.monotonic, **changes: Any) -> Collision:
     flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
     none: dict[str, Any] = {"gates": [], "min-margin": 0.0}
     return Collision(
@@ -39,7 +41,8 @@ def service(lane: Path, **changes: Any) -> Collision:
             "collision",
             Flags({**flags, **none, "map-path": str(lane), "frame-id": 2, **changes}),
             MessageSet.standard(),
-        )
+        ),
+        wall,
     )
 
 
@@ -82,6 +85,35 @@ def test_a_frame_without_an_attitude_is_no_sample(lane: Path, caplog: pytest.Log
     assert judge.rejected == 3 and len(caplog.records) == 1
     with pytest.raises(Exception, match=r"no opendlv.sim.Frame of the vehicle came before the input ended"):
         judge.end_of_input(START + 1)
+
+
+def test_frames_that_stop_are_no_verdict_about_the_application(lane: Path) -> None:
+    now = [100.0]
+    judge = service(lane, wall=lambda: now[0])
+    judge.begin(START)
+    look = judge.inputs[FRAME, 2]
+    for count in range(3):
+        look(frame(0, 0), START + count)
+        now[0] += 0.5
+    now[0] += 1.4
+    judge.update(START + 10)
+    now[0] += 0.2
+    with pytest.raises(UnjudgeableError, match="no Frame of the vehicle has come for 2 s, and they came before"):
+        judge.update(START + 20)
+
+
+def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
+    now = [100.0]
+    judge = service(lane, wall=lambda: now[0])
+    judge.begin(START)
+    look = judge.inputs[FRAME, 2]
+    look(frame(0, 0), START)
+    now[0] += 5
+    judge.update(START + 1)
+    look(frame(0, 0), START + 2)
+    now[0] += 14
+    judge.update(START + 3)
+    assert judge.verdict is None
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,219 @@
+"""Eight ways of pulling the plug in mid test, and two more: the outcome is error, and the rig comes to rest in time.
+
+The whole stack runs: `dodo run` of hil-dynamic with the example application on the firmware's binary. The emulator is
+the test's own, so that it goes on when those who use it are killed.
+"""
+
+import contextlib
+import itertools
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from services.gantry.table import ACCELERATION, Error
+from tests.drive.applications import KIWI, ROOT, results
+from tests.drive.rig import Hardware, Pose
+
+BEGIN, AT_ONCE, REST, REST_YAW = 0.55, 0.1, 0.005, 0.05
+"""s until braking begins, s in which a rig without current stands, m/s and rad/s below which it does (rotors swing)."""
+SLACK = 0.05
+"""s that this machine may be late with what it does and sees."""
+
+
+@dataclass
+class Run:
+    """`dodo run` of the one test in a folder, on a rig."""
+
+    folder: Path
+    rig: Hardware
+    runner: "subprocess.Popen[str]"
+
+    def find(self, word: str) -> int:
+        """The process of this run whose command line has a word."""
+        mine = f"--serial={self.rig.path}" if word == "services.gantry" else ""
+        for entry in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                words = (entry / "cmdline").read_bytes().decode().split("\0")
+                if word in words and (mine in words or self._is_mine(entry)):
+                    return int(entry.name)
+        raise AssertionError(f"no process {word}")
+
+    def _is_mine(self, entry: Path) -> bool:
+        return str(self.folder).encode() in (entry / "environ").read_bytes()
+
+    def kill(self, word: str, number: signal.Signals = signal.SIGKILL) -> None:
+        os.kill(self.find(word), number)
+
+
+def unplug(run: Run) -> None:
+    run.rig.order("unplug")
+
+
+def unplug_with_power(run: Run) -> None:
+    run.rig.order("unplug power")
+
+
+def kill_rig(run: Run) -> None:
+    run.rig.process.kill()
+
+
+def reset(run: Run) -> None:
+    run.rig.order("reset")
+
+
+def kill_gantry(run: Run) -> None:
+    run.kill("services.gantry")
+
+
+def stop_gantry(run: Run) -> None:
+    run.kill("services.gantry", signal.SIGSTOP)
+
+
+def kill_model(run: Run) -> None:
+    run.kill("services.dynamic_model")
+
+
+def stop_model(run: Run) -> None:
+    run.kill("services.dynamic_model", signal.SIGSTOP)
+
+
+def kill_sandbox(run: Run) -> None:
+    run.kill("dodo_dsl.run.sandbox")
+
+
+def kill_runner(run: Run) -> None:
+    run.runner.kill()
+
+
+@dataclass(frozen=True)
+class Way:
+    """What is done, and what is said then; a killed runner says nothing."""
+
+    pull: Callable[[Run], None]
+    reason: str
+    isolation: str = "network"
+    begin: float = BEGIN
+    """s until braking begins, or the rig stands."""
+
+
+WAYS = (
+    Way(unplug, "is lost: "),
+    Way(unplug_with_power, "is lost: ", begin=AT_ONCE),
+    Way(kill_rig, "is lost: "),
+    Way(reset, "RESTARTED"),
+    Way(kill_gantry, "service 'pose' of layer action was killed by SIGKILL"),
+    Way(stop_gantry, "no Frame of the vehicle has come for 2 s"),
+    Way(kill_model, "service 'vehicle' of layer action was killed by SIGKILL"),
+    Way(stop_model, "no KinematicState of the vehicle has come for 1 s"),
+    Way(kill_sandbox, "the test's sandbox ended unexpectedly", isolation="host"),
+    Way(kill_runner, ""),
+    Way(kill_runner, "", isolation="host"),
+)
+
+
+@pytest.fixture
+def rig(tmp_path: Path, firmware: None) -> Iterator[Hardware]:
+    with Hardware(tmp_path / "port") as one:
+        one.until(lambda _: True, 5)
+        yield one
+
+
+@contextlib.contextmanager
+def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
+    """hil-dynamic on a rig as if it were the emulated one, which needs no check of a quarter of a minute."""
+    for name in ("maps", "sil-closed-straight", "hil-dynamic"):
+        shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)
+    spec = {
+        "dodo": 1,
+        "name": "unplugged",
+        "extends": "../hil-dynamic/hil-dynamic.dodo.yml",
+        "isolation": isolation,
+        "environment": {"camera": {"with": {"frame-id": 0}}},
+        "action": {"pose": {"with": {"serial": str(rig.path), "calibrate": True, "truth-id": None}}},
+    }
+    (folder / "tests" / "unplugged").mkdir()
+    (folder / "tests" / "unplugged" / "unplugged.dodo.yml").write_text(yaml.safe_dump(spec))
+    (folder / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"]}))
+    words = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder / "leases")}
+    runner = subprocess.Popen(
+        [sys.executable, "-m", "dodo_dsl", *words],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        yield Run(folder, rig, runner)
+    finally:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            runner.communicate(timeout=30)
+        runner.kill()
+        runner.communicate()
+
+
+def brakes(before: Pose, poses: list[Pose], begin: float) -> None:
+    """From ``begin`` s on it gets only slower, and it stands v / a later."""
+    first = next(pose for pose in poses if pose.t >= before.t + begin + SLACK)
+    for axis in ("vx", "vy"):
+        speeds = [abs(getattr(pose, axis)) for pose in poses if pose.t >= first.t]
+        assert all(after <= speed + 0.01 for speed, after in itertools.pairwise(speeds)), axis
+    rests = max(first.speed / ACCELERATION["x"], abs(first.vyaw) / ACCELERATION["yaw"])
+    last = next(pose for pose in poses if pose.t >= first.t + rests + SLACK)
+    assert abs(last.vyaw) < REST_YAW
+    assert last.speed < REST and (begin == BEGIN or first.speed < REST), (before, first, last)
+
+
+def pulled(run: Run, way: Way) -> tuple[Pose, list[Pose]]:
+    """The pose at which the plug was pulled, and those of the time in which the rig has to come to rest."""
+    run.rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 40)
+    before = run.rig.until(lambda pose: pose.vx > 0.2, 20)
+    seen = len(run.rig.poses)
+    way.pull(run)
+    if way.pull is not kill_rig:
+        run.rig.until(lambda pose: pose.t > before.t + BEGIN + 1.5, 10)
+    return before, run.rig.poses[seen - 1 :]
+
+
+def judged(run: Run) -> dict[str, Any]:
+    output = run.runner.communicate(timeout=30)[0]
+    assert run.runner.returncode == 3 and "Traceback" not in output, output
+    (test,) = results(run.folder / "dodo-report").values()
+    return test
+
+
+def nothing_is_left(run: Run) -> bool:
+    end = time.monotonic() + 10
+    while time.monotonic() < end:
+        try:
+            run.find("services.gantry")
+        except AssertionError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way.pull.__name__}-{way.isolation}")
+def test_the_outcome_is_error_and_the_rig_comes_to_rest(tmp_path: Path, rig: Hardware, way: Way) -> None:
+    if way.reason == "RESTARTED" and "RESTARTED" not in Error.__members__:
+        pytest.skip("this firmware does not say that it was reset")
+    with running(tmp_path, rig, way.isolation) as run:
+        before, poses = pulled(run, way)
+        if way.pull is not kill_rig:
+            brakes(before, poses, way.begin)
+        if way.reason:
+            test = judged(run)
+            assert test["outcome"] == "error"
+            assert way.reason in test["reason"] + "\n".join(test["last_lines"]), test
+        assert nothing_is_left(run)
