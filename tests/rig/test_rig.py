@@ -1,20 +1,31 @@
 """Rigs of a dodo.yml: by hand, under test and in quarantine, with a rig on a pseudo terminal as the hardware."""
 
+import asyncio
+import contextlib
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from dodo_dsl.cli.main import main
+from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.plan.model import from_json
+from dodo_dsl.run import rigs
+from dodo_dsl.run.events import BackendError
+from services.gantry.port import SerialPort
 from tests.drive.applications import KIWI, ROOT, results
 from tests.services.gantry.fakerig import FakeRig
 
@@ -112,16 +123,121 @@ def test_one_user_at_a_time(place: Place) -> None:
     assert place.rig.last() == "STOP"
 
 
+def test_two_repositories_that_name_one_port_exclude_each_other(place: Place, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    rigs = {"theirs": {"kind": "dynamic", "cid": 3, "serial": str(place.rig.path.resolve())}}
+    (other / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "rigs": rigs}))
+    place.rig.status = 2
+    first = subprocess.Popen(place.command("rig", "goto", "theirs", "0", "0", "0"), cwd=other, env=place.environment)
+    while not place.rig.commands("GOTO"):
+        time.sleep(0.02)
+    said = place.dodo("rig", "status", "fake", "--wait", "0.3", code=3)
+    assert "no device came free within 0.3 s; test 'dodo rig goto'" in said
+    first.terminate()
+    assert first.wait(20) == 130
+
+
+def test_status_shows_a_fault_until_calibrate_acknowledges_it(place: Place) -> None:
+    place.rig.status = 3
+    for _ in range(2):
+        assert "the rig touched a limit switch and stopped" in place.dodo("rig", "status", code=0)
+    assert "touched a limit switch" in place.dodo("rig", "home", "fake", code=3)
+    assert "the rig is idle" in place.dodo("rig", "calibrate", "fake", code=0)
+
+
 def test_a_hil_test_on_a_real_rig(place: Place) -> None:
     test = place.test(code=0)
     assert test["outcome"] == "passed"
     assert len(place.rig.commands("CALIBRATE")) > 1, "the rig was checked"
     assert place.rig.last() == "STOP"
+    alive = MessageSet.standard().id("dodo.Alive")
+    recording = read_envelopes(place.folder / "dodo-report" / "hil-fake" / "test.rec")
+    signs = [envelope.sent for envelope in recording if envelope.data_type == alive]
+    assert len(signs) >= 3 and max(np.diff(signs)) < 2_500_000
+
+
+def test_a_real_rig_is_never_kept_up(place: Place) -> None:
+    application = str(KIWI / "docker-compose.yml")
+    said = place.dodo("run", "hil-fake", "--application", application, "--keep", code=2)
+    assert "hil-fake runs on rig 'fake', which --keep would leave driven" in said
+    assert not place.rig.heard
+
+
+def drive(place: Place) -> "subprocess.Popen[bytes]":
+    """A run whose vehicle moves the rig by now."""
+    words = ("run", "hil-fake", "--application", str(KIWI / "docker-compose.yml"), "--backend", "process")
+    run = subprocess.Popen(place.command(*words), cwd=place.folder, env=place.environment, stdout=subprocess.DEVNULL)
+    while not any(place.rig.velocity):
+        assert run.poll() is None
+        time.sleep(0.02)
+    return run
+
+
+def sandbox(run: "subprocess.Popen[bytes]") -> int:
+    (found,) = (
+        int(name)
+        for name in Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+        if b"dodo_dsl.run.sandbox" in Path(f"/proc/{name}/cmdline").read_bytes()
+    )
+    return found
+
+
+def on_the_rig(place: Place) -> list[str]:
+    """The processes that have to do with the rig's port."""
+    word = f"--serial={place.rig.path}".encode()
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if word in (entry / "cmdline").read_bytes().split(b"\0"):
+                found.append(entry.name)
+    return found
+
+
+@pytest.mark.parametrize("killed", ["sandbox", "runner", "both"])
+def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place, killed: str) -> None:
+    run = drive(place)
+    inner = sandbox(run)
+    if killed != "runner":
+        os.kill(inner, signal.SIGKILL)
+    if killed != "sandbox":
+        run.kill()
+    assert run.wait(20) == (3 if killed == "sandbox" else -signal.SIGKILL)
+    end = time.monotonic() + 10
+    while on_the_rig(place) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not on_the_rig(place)
+    assert place.rig.last() == "STOP" and not any(place.rig.velocity)
+    assert "fake: the rig is idle" in place.dodo("rig", "status", "--wait", "10", code=0)
+    if killed == "sandbox":
+        (test,) = results(place.folder / "dodo-report").values()
+        assert (test["outcome"], test["reason"]) == ("error", "the test's sandbox ended unexpectedly")
+
+
+def test_who_checks_the_rig_holds_its_lease(place: Place) -> None:
+    words = ("run", "hil-fake", "--application", str(KIWI / "docker-compose.yml"), "--backend", "process")
+    run = subprocess.Popen(place.command(*words), cwd=place.folder, env=place.environment, stdout=subprocess.DEVNULL)
+    while not place.rig.commands("CALIBRATE"):
+        time.sleep(0.02)
+    run.kill()
+    run.wait()
+    assert on_the_rig(place), "the check goes on"
+    assert "came free within 0.3 s" in place.dodo("rig", "status", "--wait", "0.3", code=3)
+    assert "the rig is " in place.dodo("rig", "status", "--wait", "60", code=0)
+
+
+def test_what_says_nothing_about_the_rig_does_not_quarantine_it(place: Place) -> None:
+    with contextlib.closing(SerialPort(str(place.rig.path))):
+        reason = place.test(code=3)["reason"]
+    assert reason.startswith("rig fake cannot be checked: the line to the rig at ") and "lock" in reason
+    place.rig.unplug()
+    assert place.test(code=3)["reason"].startswith("rig fake cannot be checked: '")
+    assert not list((place.folder / "state").glob("*"))
 
 
 def test_unplugged_in_mid_test_and_then_quarantined(place: Place) -> None:
     def pull() -> None:
-        while not place.rig.commands("RUN"):
+        while not any(place.rig.velocity):
             time.sleep(0.02)
         place.rig.unplug()
 
@@ -129,14 +245,29 @@ def test_unplugged_in_mid_test_and_then_quarantined(place: Place) -> None:
     puller.start()
     test = place.test(code=3)
     puller.join()
-    assert test["outcome"] == "error" and "has been away for" in test["reason"] + "".join(test["last_lines"])
+    assert test["outcome"] == "error" and "is lost: " in test["reason"] + "".join(test["last_lines"])
     assert not list((place.folder / "state").glob("*"))
-    reason = "is no device"
-    assert reason in place.test(code=3)["reason"]
     place.rig.plug()
-    again = place.test(code=3)
-    assert "rig fake is in quarantine" in again["reason"] and reason in again["reason"]
+    place.rig.status = 4
+    for _ in range(2):
+        reason = place.test(code=3)["reason"]
+        assert "rig fake is in quarantine" in reason and "lost steps" in reason
+    assert place.rig.status == 4
     assert "in quarantine" in place.dodo("rig", "status", code=1)
     assert "PROBLEM  rig fake" in place.dodo("doctor", code=1)
     place.dodo("rig", "clear", "fake", code=0)
     assert "quarantine" not in place.dodo("rig", "status", code=0)
+
+
+def test_a_check_that_hangs_twice_quarantines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "hanging.py").write_text("import time\nopen('tries', 'a').write('.')\ntime.sleep(60)\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path / "state"))
+    monkeypatch.setattr(rigs, "CHECKS", {"gantry": ("hanging", (), ())})
+    monkeypatch.setattr(rigs, "CHECK_PATIENCE_S", 1.0)
+    golden = ROOT / "tests" / "compiler" / "golden" / "hil-dynamic" / "test.json"
+    plan = replace(from_json(golden.read_text()), rig="fake")
+    with pytest.raises(BackendError, match="its check hung 2 times: the rig's program gave no answer within 1 s"):
+        asyncio.run(rigs.examine(plan, lambda _: None, ()))
+    assert (tmp_path / "tries").read_text() == ".." and rigs.quarantined("fake")
