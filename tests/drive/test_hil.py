@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
-from tests.drive.applications import BLIND, dodo, kiwi, results
+from tests.drive.applications import BLIND, ROOT, dodo, kiwi, results
 
 SPEC = """
 dodo: 1
