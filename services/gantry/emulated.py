@@ -39,6 +39,7 @@ class EmulatedRig:
             [folder / "rig-emulator", "--start", START, folder / "gantry.elf"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            process_group=0,  # it outlives a signal to the gantry's group, so that it hears the last STOP
         )
         _hurry(self._process.pid)
         self._reader = threading.Thread(target=self._read, daemon=True)

@@ -2,11 +2,13 @@
 
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.drive.applications import ROOT
+from tests.drive.rig import Hardware
 
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 
@@ -16,3 +18,10 @@ def firmware() -> None:
     if shutil.which("avr-gcc") is None or not SIMAVR.is_file():
         pytest.skip("avr-gcc or simavr is missing: scripts/install-firmware-tools installs them on Debian")
     subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), "firmware", "emulator"], check=True)
+
+
+@pytest.fixture
+def rig(tmp_path: Path, firmware: None) -> Iterator[Hardware]:
+    with Hardware(tmp_path / "port") as one:
+        one.until(lambda _: True, 5)
+        yield one

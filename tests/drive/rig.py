@@ -1,17 +1,27 @@
 """The emulated rig in real time as hardware that a test of DoDo can get at: its port, its orders, its true pose."""
 
+import contextlib
 import json
+import os
+import shutil
+import signal
 import subprocess
+import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+import yaml
+
 from services.gantry.emulated import START
-from tests.drive.applications import ROOT
+from tests.drive.applications import KIWI, ROOT
 
 BUILT = ROOT / "build" / "firmware"
+REST = 0.005
+"""m/s below which a rig stands."""
 
 
 class Pose(NamedTuple):
@@ -37,6 +47,7 @@ class Hardware:
         self.path = path
         self.poses: list[Pose] = []
         self.events: list[dict[str, Any]] = []
+        self._extremes: list[dict[str, Any]] = []
         words = [BUILT / "rig-emulator", "--start", START, "--link", path, BUILT / "gantry.elf"]
         self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -59,6 +70,8 @@ class Hardware:
                 said = json.loads(line)
                 if "x" in said:
                     self.poses.append(Pose(*(float(said[name]) for name in Pose._fields)))
+                elif "ramp" in said:
+                    self._extremes.append(said)
                 elif "event" in said:
                     self.events.append(said)
 
@@ -66,6 +79,13 @@ class Hardware:
         assert self.process.stdin is not None
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
+
+    def ramps(self) -> list[float]:
+        """The largest acceleration of each axis (m/s2, m/s2, rad/s2) since the last order `extremes`."""
+        known = len(self._extremes)
+        self.order("extremes")
+        self.until(lambda _: len(self._extremes) > known, 5)
+        return [float(ramp) for ramp in self._extremes[-1]["ramp"]]
 
     @property
     def late(self) -> bool:
@@ -81,3 +101,69 @@ class Hardware:
             seen = len(self.poses)
             time.sleep(0.01)
         raise AssertionError(f"the rig did not come to do it within {patience:g} s: {self.poses[-1:]}")
+
+
+@dataclass
+class Run:
+    """`dodo run` of the one test in a folder, on a rig."""
+
+    folder: Path
+    rig: Hardware
+    runner: "subprocess.Popen[str]"
+
+    def find(self, word: str) -> int:
+        """The process of this run whose command line has a word."""
+        mine = f"--serial={self.rig.path}" if word == "services.gantry" else ""
+        for entry in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                words = (entry / "cmdline").read_bytes().decode().split("\0")
+                if word in words and (mine in words or self._is_mine(entry)):
+                    return int(entry.name)
+        raise AssertionError(f"no process {word}")
+
+    def _is_mine(self, entry: Path) -> bool:
+        return str(self.folder).encode() in (entry / "environ").read_bytes()
+
+    def kill(self, word: str, number: signal.Signals = signal.SIGKILL) -> None:
+        os.kill(self.find(word), number)
+
+
+@contextlib.contextmanager
+def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
+    """hil-dynamic, as test `unplugged`, on a rig as if it were the emulated one, which needs no check."""
+    for name in ("maps", "sil-closed-straight", "hil-dynamic"):
+        shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)
+    spec = {
+        "dodo": 1,
+        "name": "unplugged",
+        "extends": "../hil-dynamic/hil-dynamic.dodo.yml",
+        "isolation": isolation,
+        "environment": {"camera": {"with": {"frame-id": 0}}},
+        "action": {"pose": {"with": {"serial": str(rig.path), "calibrate": True, "truth-id": None}}},
+    }
+    (folder / "tests" / "unplugged").mkdir()
+    (folder / "tests" / "unplugged" / "unplugged.dodo.yml").write_text(yaml.safe_dump(spec))
+    (folder / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"]}))
+    words = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder / "leases")}
+    runner = subprocess.Popen(
+        [sys.executable, "-m", "dodo_dsl", *words],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        yield Run(folder, rig, runner)
+    finally:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            runner.communicate(timeout=30)
+        runner.kill()
+        runner.communicate()
+
+
+def on_its_way(rig: Hardware) -> Pose:
+    """The pose at which it drives, after it has stood at its start."""
+    rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 40)
+    return rig.until(lambda pose: pose.vx > 0.2, 20)

@@ -2,7 +2,10 @@
 
 import json
 import math
+import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,9 @@ from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
+from services.gantry.table import ACCELERATION, BOUNDS, MICROSTEP
 from tests.drive.applications import BLIND, ROOT, dodo, kiwi, results
+from tests.drive.rig import Hardware, Pose, on_its_way, running
 
 SPEC = """
 dodo: 1
@@ -36,7 +41,8 @@ def boxes(path: Path) -> dict[int, list[tuple[str, float, float, float, float]]]
 
 
 TRUTH = boxes(ROOT / "tests_registry" / "truths" / "static-rig.json")[1]
-MICROSTEP, MICROSTEP_YAW = 2.36e-6, 0.000248
+MICROSTEPS = tuple(1.01 * step for step in MICROSTEP.values())
+"""m, m, rad; a Frame holds 32 bits a number."""
 MEASURED, TRUE = 0, 1
 
 
@@ -60,6 +66,40 @@ def poses(recording: Path, sender: int) -> NDArray[np.float64]:
     return np.array(rows)
 
 
+STEP, SWING = 20, 1.02
+"""Of the rig's poses, of which there are 100 a second, from one to the next of which speeds are taken, and how
+much more than the drivers told them rotors do, as they swing."""
+
+
+def stays_within_limits(poses: list[Pose], ramps: list[float]) -> None:
+    """By the rig's own poses, time, and largest acceleration of each axis, which are exact."""
+    every = np.array(poses)[::STEP]
+    speeds = np.diff(every[:, 1:4], axis=0) / np.diff(every[:, 0])[:, None]
+    changes = np.diff(speeds, axis=0) / np.diff(every[:, 0])[1:, None]
+    (speed, rate), (acceleration, yaw_acceleration) = (
+        (np.hypot(each[:, 0], each[:, 1]).max(), np.abs(each[:, 2]).max()) for each in (speeds, changes)
+    )
+    found = f"{speed:.3f} m/s, {acceleration:.3f} m/s2, {rate:.3f} rad/s, {yaw_acceleration:.3f} rad/s2, ramps {ramps}"
+    print(found)
+    assert 0.3 < speed <= 1.0 and 0.2 < acceleration <= 0.5 * SWING, found
+    assert 0.1 < rate <= 1.0 and 0.2 < yaw_acceleration <= 1.0 * SWING, found
+    assert all(0.2 < ramp <= most for ramp, most in zip(ramps, ACCELERATION.values(), strict=True)), found
+    for (low, high), way in zip(BOUNDS.values(), np.array(poses)[:, 1:4].T, strict=True):
+        assert low <= way.min() and way.max() <= high
+
+
+def measured_by_hand(rig: Hardware) -> NDArray[np.float64]:
+    """Time, x, y and yaw as the rig's own counters have them."""
+    command = [sys.executable, "-m", "services.gantry.hand", f"--serial={rig.path}", "status"]
+    said = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
+    return np.array([0.0, said["x"], said["y"], math.radians(said["yaw"])])
+
+
+def same_at_rest(measured: NDArray[np.float64], true: NDArray[np.float64]) -> None:
+    """A pose is measured to within one microstep."""
+    assert all(abs(m - t) <= step for m, t, step in zip(measured[1:], true[1:], MICROSTEPS, strict=True))
+
+
 def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> None:
     test = run(tmp_path, "hil-dynamic", code=0)
     assert (test["outcome"], test["level"]) == ("passed", "hil")
@@ -67,15 +107,42 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
     measured, true = poses(recording, MEASURED), poses(recording, TRUE)
     assert len(measured) > 40
     assert len(true) > 200
-    assert np.abs(measured[0, 1:3] - true[0, 1:3]).max() <= MICROSTEP
-    assert abs(measured[0, 3] - true[0, 3]) <= MICROSTEP_YAW
+    same_at_rest(measured[0], true[0])
     seen = np.stack([np.interp(measured[:, 0], true[:, 0], true[:, column]) for column in (1, 2, 3)], axis=1)
     assert np.abs(measured[:, 1:] - seen)[:, :2].max() < 0.02  # one message is up to 30 ms older than the other
-    every = true[::10]
-    speeds = np.diff(every[:, 1:], axis=0) / np.diff(every[:, 0])[:, None]
-    assert 0.3 < np.hypot(speeds[:, 0], speeds[:, 1]).max() < 1.0
-    assert np.abs(speeds[:, 2]).max() < 1.0
-    assert true[:, 1].max() < 0.95
+    assert np.hypot(*np.gradient(true[::10, 1:3], true[::10, 0], axis=0).T).max() < 1
+    for column, (low, high) in enumerate(BOUNDS.values(), start=1):
+        assert low <= true[:, column].min() and true[:, column].max() <= high
+    log = (tmp_path / "hil-dynamic" / "logs" / "action.pose.log").read_text()
+    assert re.search(r"turns of 50 ms, \d+ without an answer; jitter median .* ms; position after median .* ms", log)
+
+
+def test_the_rig_itself_saw_no_limit_passed_and_knows_where_it_stands(tmp_path: Path, rig: Hardware) -> None:
+    with running(tmp_path, rig, "network") as run:
+        before = on_its_way(rig)
+        rig.order("extremes")  # anew from here on
+        start = next(pose for pose in reversed(rig.poses) if pose.t < before.t - 1)
+        output = run.runner.communicate(timeout=60)[0]
+        assert run.runner.returncode == 0 or rig.late, output
+    rig.until(lambda pose: pose.speed < 1e-4 and abs(pose.vyaw) < 1e-3, 10)
+    stays_within_limits([pose for pose in rig.poses if pose.t > start.t], rig.ramps())
+    (first, *_), (end, *_) = (poses(tmp_path / "dodo-report" / "unplugged" / "test.rec", MEASURED), rig.poses[-1:])
+    same_at_rest(first, np.array(start)[:4])
+    same_at_rest(measured_by_hand(rig), np.array(end)[:4])
+
+
+def test_the_rig_goes_its_way_whatever_the_application_does(tmp_path: Path) -> None:
+    test = run(tmp_path / "good", "hil-open-straight", code=0)
+    assert (test["outcome"], test["kind"]) == ("passed", "open-loop")
+    recording = tmp_path / "good" / "hil-open-straight" / "test.rec"
+    measured, true = poses(recording, MEASURED), poses(recording, TRUE)
+    same_at_rest(measured[0], true[0])
+    same_at_rest(measured[-1], true[-1])
+    way = np.loadtxt(ROOT / "tests_registry" / "targets" / "rig-straight.csv", delimiter=",", skiprows=1)
+    assert np.abs(true[[0, -1], 1:3] - way[[0, -1], 1:3]).max() < 0.02
+    application = kiwi(tmp_path / "app", None, steering="--reverse")
+    test = run(tmp_path / "bad", "hil-open-straight", "--application", str(application), code=1)
+    assert test["reason"].startswith("the mean distance is ")
 
 
 def test_a_reversed_application_hits_the_wall_on_the_rig(tmp_path: Path) -> None:

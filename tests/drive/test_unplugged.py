@@ -4,55 +4,24 @@ The whole stack runs: `dodo run` of hil-dynamic with the example application on 
 the test's own, so that it goes on when those who use it are killed.
 """
 
-import contextlib
 import itertools
-import os
-import shutil
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from services.gantry.table import ACCELERATION, Error
-from tests.drive.applications import KIWI, ROOT, results
-from tests.drive.rig import Hardware, Pose
+from tests.drive.applications import results
+from tests.drive.rig import REST, Hardware, Pose, Run, on_its_way, running
 
-BEGIN, AT_ONCE, REST, REST_YAW = 0.55, 0.1, 0.005, 0.05
-"""s until braking begins, s in which a rig without current stands, m/s and rad/s below which it does (rotors swing)."""
+BEGIN, AT_ONCE, REST_YAW = 0.55, 0.1, 0.05
+"""s until braking begins, s in which a rig without current stands, rad/s below which it does (rotors swing)."""
 SLACK = 0.05
 """s that this machine may be late with what it does and sees."""
-
-
-@dataclass
-class Run:
-    """`dodo run` of the one test in a folder, on a rig."""
-
-    folder: Path
-    rig: Hardware
-    runner: "subprocess.Popen[str]"
-
-    def find(self, word: str) -> int:
-        """The process of this run whose command line has a word."""
-        mine = f"--serial={self.rig.path}" if word == "services.gantry" else ""
-        for entry in Path("/proc").glob("[0-9]*"):
-            with contextlib.suppress(OSError):
-                words = (entry / "cmdline").read_bytes().decode().split("\0")
-                if word in words and (mine in words or self._is_mine(entry)):
-                    return int(entry.name)
-        raise AssertionError(f"no process {word}")
-
-    def _is_mine(self, entry: Path) -> bool:
-        return str(self.folder).encode() in (entry / "environ").read_bytes()
-
-    def kill(self, word: str, number: signal.Signals = signal.SIGKILL) -> None:
-        os.kill(self.find(word), number)
 
 
 def unplug(run: Run) -> None:
@@ -121,48 +90,6 @@ WAYS = (
 )
 
 
-@pytest.fixture
-def rig(tmp_path: Path, firmware: None) -> Iterator[Hardware]:
-    with Hardware(tmp_path / "port") as one:
-        one.until(lambda _: True, 5)
-        yield one
-
-
-@contextlib.contextmanager
-def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
-    """hil-dynamic on a rig as if it were the emulated one, which needs no check of a quarter of a minute."""
-    for name in ("maps", "sil-closed-straight", "hil-dynamic"):
-        shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)
-    spec = {
-        "dodo": 1,
-        "name": "unplugged",
-        "extends": "../hil-dynamic/hil-dynamic.dodo.yml",
-        "isolation": isolation,
-        "environment": {"camera": {"with": {"frame-id": 0}}},
-        "action": {"pose": {"with": {"serial": str(rig.path), "calibrate": True, "truth-id": None}}},
-    }
-    (folder / "tests" / "unplugged").mkdir()
-    (folder / "tests" / "unplugged" / "unplugged.dodo.yml").write_text(yaml.safe_dump(spec))
-    (folder / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"]}))
-    words = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder / "leases")}
-    runner = subprocess.Popen(
-        [sys.executable, "-m", "dodo_dsl", *words],
-        cwd=folder,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    try:
-        yield Run(folder, rig, runner)
-    finally:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            runner.communicate(timeout=30)
-        runner.kill()
-        runner.communicate()
-
-
 def brakes(before: Pose, poses: list[Pose], begin: float) -> None:
     """From ``begin`` s on it gets only slower, and it stands v / a later."""
     first = next(pose for pose in poses if pose.t >= before.t + begin + SLACK)
@@ -177,8 +104,7 @@ def brakes(before: Pose, poses: list[Pose], begin: float) -> None:
 
 def pulled(run: Run, way: Way) -> tuple[Pose, list[Pose]]:
     """The pose at which the plug was pulled, and those of the time in which the rig has to come to rest."""
-    run.rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 40)
-    before = run.rig.until(lambda pose: pose.vx > 0.2, 20)
+    before = on_its_way(run.rig)
     seen = len(run.rig.poses)
     way.pull(run)
     if way.pull is not kill_rig:

@@ -6,6 +6,9 @@ the track, on ``straight`` askew from the left half of the lane into the right o
 it leads from where the beacon is onto the centre line LOOK m ahead (the circle of pure pursuit), for Kiwi's wheelbase
 and the gain with which the car takes a request. LOOK is where a driver sees both rows: the camera sees cones 0.25 m
 beside it from 0.41 m on, and the nearest of a row, 0.25 m apart, is on the average half a gap farther.
+
+``rig-straight`` is for the dynamic rig, which has to follow: it gains speed with GAIN up to RIG_SPEED, brakes as
+gently, and stands at last.
 """
 
 import importlib.util
@@ -21,6 +24,9 @@ LOOK = 0.54
 WHEELBASE = 0.224
 REQUEST_PER_ANGLE, REQUEST_LIMIT = 0.290888 / 0.6, 0.290888
 ASKEW = (-0.1, 0.0, math.radians(86))
+RIG_SPEED, GAIN, RIG_WAY, STAND = 0.35, 0.35, 1.2, 0.5
+"""m/s, m/s2, m and s: well within the rig's 1 m/s, 0.5 m/s2 and workspace."""
+RIG_ASKEW = (-0.8, 0.075, math.radians(-7))
 Place = tuple[float, float, float]
 
 
@@ -59,10 +65,29 @@ def steering(place: Place, aim: Place) -> float:
     return max(-REQUEST_LIMIT, min(REQUEST_LIMIT, REQUEST_PER_ANGLE * angle))
 
 
-def table(name: str, length: float, place_at: Callable[[float], Place]) -> str:
+def evenly(length: float) -> list[float]:
+    """How far the beacon has come after each PERIOD (m)."""
+    return [row * SPEED * PERIOD for row in range(round(length / (SPEED * PERIOD)) + 1)]
+
+
+def gently() -> list[float]:
+    """The same for the rig."""
+    ramp = RIG_SPEED / GAIN
+    took = RIG_WAY / RIG_SPEED + ramp
+    rows = math.ceil((took + STAND) / PERIOD)
+    return [_gone(min(row * PERIOD, took), took, ramp) for row in range(rows + 1)]
+
+
+def _gone(time: float, took: float, ramp: float) -> float:
+    """A trapezium of speed."""
+    if time > took / 2:
+        return RIG_WAY - _gone(took - time, took, ramp)
+    return GAIN * time**2 / 2 if time < ramp else RIG_SPEED * (time - ramp / 2)
+
+
+def table(name: str, ways: list[float], place_at: Callable[[float], Place]) -> str:
     lines = ["time,x,y,yaw,groundSteering"]
-    for row in range(round(length / (SPEED * PERIOD)) + 1):
-        along = row * SPEED * PERIOD
+    for row, along in enumerate(ways):
         place = place_at(along)
         values = (*place, steering(place, centre(name, along + LOOK)))
         lines.append(",".join([f"{row * PERIOD:.1f}", *(f"{round(v, 5) + 0.0:.5f}" for v in values)]))
@@ -72,8 +97,9 @@ def table(name: str, length: float, place_at: Callable[[float], Place]) -> str:
 def make(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     tables = {
-        "straight": table("straight", 2.75, lambda along: MAPS.ahead(ASKEW, along)),
-        "left-curve": table("left-curve", 3.8, lambda along: centre("left-curve", along)),
+        "straight": table("straight", evenly(2.75), lambda along: MAPS.ahead(ASKEW, along)),
+        "left-curve": table("left-curve", evenly(3.8), lambda along: centre("left-curve", along)),
+        "rig-straight": table("rig-straight", gently(), lambda along: MAPS.ahead(RIG_ASKEW, along)),
     }
     for name, text in tables.items():
         (folder / f"{name}.csv").write_text(text)
