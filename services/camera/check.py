@@ -1,14 +1,17 @@
 """Whether a camera is alive and lit: ``python -m services.camera.check --source=...`` prints one JSON object.
 
-It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason`` or ``error`` says why).
+It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason`` says why) or cannot be looked at (``error``).
 """
 
 import contextlib
 import json
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TextIO
+
+import numpy as np
 
 from services.base import Flags
 from services.base.flags import parse
@@ -23,6 +26,8 @@ BRIGHTNESS = 0.04, 0.97
 """Mean brightness of a lit picture, as a share of white."""
 BLACK, WHITE = 16.0, 235.0
 """Of the Y plane (BT.601)."""
+SETTLED = 1.0
+"""s after the first picture from which on exposure and white balance have settled, and pictures are judged."""
 CONTRAST = 0.02
 """Least standard deviation of brightness: a covered lens or a blown picture has less."""
 
@@ -33,7 +38,9 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
         flags = parse(load_manifest(Path(__file__).parent), [*argv, "--cid=1"])
         with interruptible():
             said = judged(looked(flags))
-    except (ValueError, OSError, CameraError) as error:
+    except CameraError as error:
+        said = {"ok": False, "reason": " ".join(str(error).split())}
+    except (ValueError, OSError) as error:
         said = {"ok": False, "error": " ".join(str(error).split())}
     stdout.write(json.dumps(said) + "\n")
     return 0 if said["ok"] else 1
@@ -55,15 +62,29 @@ def judged(picture: Picture) -> dict[str, Any]:
 
 
 def looked(flags: Flags) -> Picture:
-    """A picture of the camera that the flags name; raises ValueError, OSError and CameraError."""
+    """A picture of the camera that the flags name; raises ValueError and OSError, and CameraError when it is not alive.
+
+    A camera that lives has settled by then, and has shown another picture before.
+    """
     camera = open_camera(flags)
     if isinstance(camera, FileCamera):
         with contextlib.closing(camera):
             return camera.read()
     with contextlib.closing(Grabber(camera, flags["source"])) as grabber:
-        if not grabber.wait(SILENCE) or (picture := grabber.take()) is None:
-            raise CameraError(f"the camera {flags['source']} has given no picture for {SILENCE:g} s")
-        return picture
+        first = _next(grabber, flags["source"])
+        end = time.monotonic() + SETTLED
+        while time.monotonic() < end:
+            first = _next(grabber, flags["source"])
+        while (other := _next(grabber, flags["source"])) and np.array_equal(other.i420, first.i420):
+            if time.monotonic() - end > SILENCE:
+                raise CameraError(f"the camera {flags['source']} has shown one and the same picture for {SILENCE:g} s")
+        return other
+
+
+def _next(grabber: Grabber, name: str) -> Picture:
+    if not grabber.wait(SILENCE) or (picture := grabber.take()) is None:
+        raise CameraError(f"the camera {name} has given no picture for {SILENCE:g} s")
+    return picture
 
 
 if __name__ == "__main__":

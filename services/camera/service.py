@@ -13,7 +13,7 @@ from services.camera.report import Report
 from services.camera.rpicam import RpiCamera
 from services.camera.v4l2 import V4l2Camera
 
-EMULATED = "an emulated camera belongs to the emulated rig, which comes with a later version"
+EMULATED = "--source=emulated is the camera of `rig: emulated`, for which virtual-camera is started in its place"
 
 
 class CameraService(Service):

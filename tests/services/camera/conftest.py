@@ -20,10 +20,14 @@ if mode == "missing":
     sys.exit(255)
 if mode == "stubborn":
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-count = 0
+count, begin = 0, time.monotonic()
 while mode != "silent":
     count += 1
     picture = bytes([16 + count]) * (width * height) + bytes([128]) * (width * height // 2)
+    if mode in ("lit", "frozen", "dark"):
+        bright = 40 if mode == "dark" or (mode == "lit" and time.monotonic() - begin < 0.5) else 210
+        stripes = bytes([16, bright if bright > 40 else 17]) * (width * height // 2)
+        picture = bytes([16 + (mode != "frozen") * count % 2]) + stripes[1:] + bytes([128]) * (width * height // 2)
     for part in (picture[:1000], picture[1000:]):
         sys.stdout.buffer.write(part)
         sys.stdout.buffer.flush()

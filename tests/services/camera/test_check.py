@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,8 +26,34 @@ def test_a_picture_is_judged(
     path = tmp_path / "picture.png"
     if picture is not None:
         cv2.imwrite(str(path), picture)
-    command = [sys.executable, "-m", "services.camera.check", f"--source={path}", "--width=128", "--height=128"]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
-    said = json.loads(result.stdout)
-    assert (result.returncode, said["ok"]) == (int(bool(words)), not words)
+    said = check(str(path), ok=not words)
     assert words in said.get("reason", "") + said.get("error", "")
+    assert ("error" in said) == (picture is None)
+
+
+def check(source: str, ok: bool) -> dict[str, Any]:
+    command = [sys.executable, "-m", "services.camera.check", f"--source={source}", "--width=128", "--height=128"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
+    said: dict[str, Any] = json.loads(result.stdout)
+    assert (result.returncode, said["ok"]) == (int(not ok), ok), said
+    return said
+
+
+@pytest.mark.usefixtures("rpicam")
+@pytest.mark.parametrize(
+    ("mode", "words"),
+    [
+        ("lit", ""),
+        ("dark", "is it lit?"),
+        ("frozen", "has shown one and the same picture for 5 s"),
+        ("lost", "rpicam-vid ended with code 1"),
+    ],
+)
+def test_a_live_camera_is_judged_when_it_has_settled(monkeypatch: pytest.MonkeyPatch, mode: str, words: str) -> None:
+    """It is dark at first, as it finds its exposure."""
+    monkeypatch.setenv("FAKE_MODE", mode)
+    assert words in check("rpicam", ok=not words).get("reason", "")
+
+
+def test_a_camera_that_is_not_there_cannot_be_judged() -> None:
+    assert "/dev/video99" in check("/dev/video99", ok=False)["error"]
