@@ -14,7 +14,7 @@ from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
 
-MAP = "maps/straight"
+MAPS = ("maps/straight", "maps/rig-straight")
 TARGET = "targets/straight-ahead.csv"
 COMPOSE_FILES = ("docker-compose.yml", "docker-compose.yaml", "compose.yml", "compose.yaml")
 SCHEMAS = ".dodo"
@@ -68,8 +68,10 @@ def test_files(name: str, level: str, kind: str, registry: Path, root: Path) -> 
     folder = registry / name
     spec = _filled(template, name=name)
     files = [*_spec(name, folder, root, spec)]
-    if f"../{MAP}".encode() in spec and not (registry / MAP).exists():
-        files += [New(registry / MAP / path.name, path.read_bytes()) for path in sorted(_shipped_map().iterdir())]
+    for place in MAPS:
+        if f"../{place}".encode() in spec and not (registry / place).exists():
+            shipped = sorted((data.registry() / place).iterdir())
+            files += [New(registry / place / path.name, path.read_bytes()) for path in shipped]
     if f"../{TARGET}".encode() in spec and not (registry / TARGET).exists():
         files.append(New(registry / TARGET, _filled("tests/straight-ahead.csv")))
     return files
@@ -84,10 +86,6 @@ def _template(level: str, kind: str) -> str:
     if level == "dil":
         raise NoStart(_DIL)
     raise NoStart(_PERCEPTION if kind == "perception" else f"a hil test begins closed-loop; {kind} ones are sil or dil")
-
-
-def _shipped_map() -> Path:
-    return data.registry() / MAP
 
 
 def extending_files(name: str, base: Spec, root: Path) -> list[New]:

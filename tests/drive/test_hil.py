@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from services.gantry.table import ACCELERATION, BOUNDS, MICROSTEP
@@ -143,6 +144,15 @@ def test_the_rig_goes_its_way_whatever_the_application_does(tmp_path: Path) -> N
     application = kiwi(tmp_path / "app", None, steering="--reverse")
     test = run(tmp_path / "bad", "hil-open-straight", "--application", str(application), code=1)
     assert test["reason"].startswith("the mean distance is ")
+
+
+def test_a_test_as_dodo_new_writes_it_passes_on_the_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for words in (["new", "--deployment"], ["new", "mine", "--level", "hil"]):
+        assert main(words, sys.stdout, sys.stderr) == 0
+    application = str(ROOT / "examples" / "kiwi" / "docker-compose.yml")
+    test = run(tmp_path / "report", str(tmp_path / "tests" / "mine"), "--application", application, code=0)
+    assert (test["slug"], test["outcome"]) == ("mine", "passed")
 
 
 def test_a_reversed_application_hits_the_wall_on_the_rig(tmp_path: Path) -> None:
