@@ -16,7 +16,7 @@ help:
 demo:
 	@scripts/setup
 	$(DODO) compile
-	$(DODO) run --level sil --level dil --level hil $(shell scripts/have-rig || echo "'sil-*' 'dil-*' hil-camera")
+	$(DODO) run --level sil --level dil --level hil $(shell scripts/have-rig || echo "'sil-*' 'dil-*' 'hil-camera*'")
 
 lint:
 	@scripts/setup dev
