@@ -146,7 +146,7 @@ def test_garbage_and_lines_in_parts_do_no_harm(cid: int, rig: FakeRig) -> None:
         assert abs(frame.x) < 1
 
 
-@pytest.mark.parametrize(("code", "name"), [(9, "BLOCKED"), (99, "which this version does not know")])
+@pytest.mark.parametrize(("code", "name"), [(8, "TROUBLE"), (99, "which this version does not know")])
 def test_a_rig_that_refuses_to_move_ends_the_test(cid: int, rig: FakeRig, code: int, name: str) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         drive(session, lambda: any(rig.velocity), vx=0.2)
