@@ -111,18 +111,15 @@ class Run:
     rig: Hardware
     runner: "subprocess.Popen[str]"
 
-    def find(self, word: str) -> int:
-        """The process of this run whose command line has a word."""
-        mine = f"--serial={self.rig.path}" if word == "services.gantry" else ""
+    def find(self, module: str) -> int:
+        """The process of this very run that runs a module."""
+        mine = f"DODO_LEASES={self.folder}/leases".encode()
         for entry in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
-                words = (entry / "cmdline").read_bytes().decode().split("\0")
-                if word in words and (mine in words or self._is_mine(entry)):
+                is_it = module.encode() in (entry / "cmdline").read_bytes().split(b"\0")
+                if is_it and mine in (entry / "environ").read_bytes().split(b"\0"):
                     return int(entry.name)
-        raise AssertionError(f"no process {word}")
-
-    def _is_mine(self, entry: Path) -> bool:
-        return str(self.folder).encode() in (entry / "environ").read_bytes()
+        raise AssertionError(f"no process {module}")
 
     def kill(self, word: str, number: signal.Signals = signal.SIGKILL) -> None:
         os.kill(self.find(word), number)
