@@ -15,7 +15,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
@@ -153,8 +152,7 @@ def test_a_hil_test_on_a_real_rig(place: Place) -> None:
     assert place.rig.last() == "STOP"
     alive = MessageSet.standard().id("dodo.Alive")
     recording = read_envelopes(place.folder / "dodo-report" / "hil-fake" / "test.rec")
-    signs = [envelope.sent for envelope in recording if envelope.data_type == alive]
-    assert len(signs) >= 3 and max(np.diff(signs)) < 2_500_000
+    assert len([envelope for envelope in recording if envelope.data_type == alive]) >= 3
 
 
 def test_a_real_rig_is_never_kept_up(place: Place) -> None:

@@ -1,0 +1,53 @@
+"""The serial port on a pseudo terminal."""
+
+import contextlib
+import fcntl
+import os
+import pty
+import termios
+import tty
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from services.gantry.port import SerialPort
+
+
+@pytest.fixture
+def terminal() -> Iterator[tuple[int, str]]:
+    """A descriptor of the terminal and its name."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    yield slave, os.ttyname(slave)
+    os.close(slave)
+    os.close(master)
+
+
+def test_a_port_is_ours_alone_and_resets_nothing_when_it_is_closed(terminal: tuple[int, str]) -> None:
+    slave, name = terminal
+    attributes = termios.tcgetattr(slave)
+    attributes[2] |= termios.HUPCL
+    termios.tcsetattr(slave, termios.TCSANOW, attributes)
+    with contextlib.closing(SerialPort(name)):
+        assert not termios.tcgetattr(slave)[2] & termios.HUPCL
+        with pytest.raises(OSError, match="exclusively lock"):
+            SerialPort(name)
+        held = bytearray(4)
+        fcntl.ioctl(slave, 0x80045440, held)  # TIOCGEXCL
+        assert int.from_bytes(held, "little") == 1
+
+
+def test_what_cannot_be_kept_is_said(
+    terminal: tuple[int, str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    allowed = fcntl.ioctl
+
+    def refuse(descriptor: int, request: int, *rest: Any) -> Any:
+        if request == termios.TIOCEXCL:
+            raise OSError("not here")
+        return allowed(descriptor, request, *rest)
+
+    monkeypatch.setattr(fcntl, "ioctl", refuse)
+    with contextlib.closing(SerialPort(terminal[1])):
+        assert "may reset the rig when it is closed, and is not locked: not here" in caplog.text
