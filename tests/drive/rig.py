@@ -111,13 +111,19 @@ class Run:
     rig: Hardware
     runner: "subprocess.Popen[str]"
 
-    def find(self, module: str) -> int:
-        """The process of this very run that runs a module."""
-        mine = f"DODO_LEASES={self.folder}/leases".encode()
+    def processes(self) -> Iterator[Path]:
+        """All of this very run; a service that was forked has the runner's variables."""
+        mine = f"DODO_RIGS={self.folder}/state".encode()
         for entry in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
-                is_it = module.encode() in (entry / "cmdline").read_bytes().split(b"\0")
-                if is_it and mine in (entry / "environ").read_bytes().split(b"\0"):
+                if mine in (entry / "environ").read_bytes().split(b"\0"):
+                    yield entry
+
+    def find(self, module: str) -> int:
+        """The one process that was started to run a module."""
+        for entry in self.processes():
+            with contextlib.suppress(OSError):
+                if module.encode() in (entry / "cmdline").read_bytes().split(b"\0"):
                     return int(entry.name)
         raise AssertionError(f"no process {module}")
 
@@ -142,7 +148,7 @@ def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
     (folder / "tests" / "unplugged" / "unplugged.dodo.yml").write_text(yaml.safe_dump(spec))
     (folder / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"]}))
     words = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder / "leases")}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_RIGS": str(folder / "state")}
     runner = subprocess.Popen(
         [sys.executable, "-m", "dodo_dsl", *words],
         cwd=folder,
