@@ -89,6 +89,11 @@ def stays_within_limits(poses: list[Pose], ramps: list[float]) -> None:
         assert low <= way.min() and way.max() <= high
 
 
+def stands(pose: Pose) -> bool:
+    """Whether not even a rotor swings."""
+    return pose.speed < 1e-4 and abs(pose.vyaw) < 1e-3
+
+
 def measured_by_hand(rig: Hardware) -> NDArray[np.float64]:
     """Time, x, y and yaw as the rig's own counters have them."""
     command = [sys.executable, "-m", "services.gantry.hand", f"--serial={rig.path}", "status"]
@@ -122,10 +127,10 @@ def test_the_rig_itself_saw_no_limit_passed_and_knows_where_it_stands(tmp_path: 
     with running(tmp_path, rig, "network") as run:
         before = on_its_way(rig)
         rig.order("extremes")  # anew from here on
-        start = next(pose for pose in reversed(rig.poses) if pose.t < before.t - 1)
+        start = next(pose for pose in reversed(rig.poses) if pose.t < before.t and stands(pose))
         output = run.runner.communicate(timeout=60)[0]
         assert run.runner.returncode == 0 or rig.late, output
-    rig.until(lambda pose: pose.speed < 1e-4 and abs(pose.vyaw) < 1e-3, 10)
+    rig.until(stands, 10)
     stays_within_limits([pose for pose in rig.poses if pose.t > start.t], rig.ramps())
     (first, *_), (end, *_) = (poses(tmp_path / "dodo-report" / "unplugged" / "test.rec", MEASURED), rig.poses[-1:])
     same_at_rest(first, np.array(start)[:4])
