@@ -221,7 +221,9 @@ def test_what_a_killed_runner_leaves_misses_it_and_stops_the_rig(place: Place, c
     runner = subprocess.Popen([sys.executable, "-c", live], env=place.environment)
     place.rig.at = [0.0, 0.0, 0.0]
     with Session(cid) as session, running("gantry", tmp_path, f"--cid={cid}", f"--serial={place.rig.path}") as gantry:
-        hear(session, "dodo.Alive")
+        ready = time.time_ns() // 1000
+        while hear(session, "dodo.Alive")[0].sent < ready:
+            pass  # the gantry was not there yet
         while not any(place.rig.velocity):
             say(session, "opendlv.sim.KinematicState", vx=0.05)
             time.sleep(0.02)
