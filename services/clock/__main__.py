@@ -8,8 +8,8 @@ from services.base.channel import Channel
 from services.base.clock import MICROSECONDS
 from services.base.service import period_of
 from services.clock.answers import Answers, kinds
-from services.clock.model import Patience, Roles
 from services.clock.service import HEARD, ClockService
+from services.clock.terms import Patience, Roles
 
 
 def build(context: Context) -> Service:

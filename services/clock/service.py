@@ -12,8 +12,10 @@ from services.base.channel import Channel
 from services.base.lockstep import EPOCH
 from services.base.service import Service
 from services.clock.answers import Answers
+from services.clock.audience import Audience
 from services.clock.exchange import Exchange
-from services.clock.model import Patience, Roles, Stepper, Stuck, TimedOut, Unanswered
+from services.clock.model import Stepper
+from services.clock.terms import Patience, Roles, Stuck, TimedOut, Unanswered
 
 _TELL_S = 1.0
 _SLICE = 0.05
@@ -36,10 +38,11 @@ class ClockService(Service):
         timeout: int,
         patience: Patience,
     ) -> None:
-        self._session, self._answers = session, answers
+        self._session = session
         self._begin_id = session.messages.id("dodo.TestBegin")
         exchange = Exchange(session, channel, answers.take)
-        self._stepper = Stepper(roles, period, timeout, patience, answers, exchange, self._over)
+        self._audience = Audience(answers, patience, exchange, self._over)
+        self._stepper = Stepper(roles, period, timeout, self._audience, exchange, self._over)
         self._told = 0.0
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
@@ -77,7 +80,7 @@ class ClockService(Service):
     def _tell_time(self, last: bool = False) -> None:
         self._told = time.monotonic()
         seconds = (self._stepper.reached - EPOCH) / 1e6
-        self._say("time", s=seconds, frames=self._stepper.frames, surplus=self._answers.surplus, last=last)
+        self._say("time", s=seconds, frames=self._audience.frames, surplus=self._audience.answers.surplus, last=last)
 
     @staticmethod
     def _say(kind: str, **facts: object) -> None:

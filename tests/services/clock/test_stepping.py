@@ -12,7 +12,8 @@ from dodo_dsl.opendlv.session import Session
 from services.base import channel, ear
 from services.base.lockstep import EPOCH
 from services.clock import exchange, model
-from services.clock.model import Patience, Stepper, Stuck, TimedOut, Unanswered
+from services.clock.model import Stepper
+from services.clock.terms import Patience, Stuck, TimedOut, Unanswered
 from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Judge, Mover, Toys
 
 Way = list[tuple[int, float]]
@@ -43,7 +44,7 @@ def test_the_way_is_as_computed_by_hand(toys: Toys) -> None:
     application = toys.application()
     way, stepper = toys.run(application)
     assert close(way, expected(21))
-    assert (stepper.frames, stepper.answers.surplus) == (21, 0)
+    assert (stepper.audience.frames, stepper.audience.answers.surplus) == (21, 0)
     assert application.seen[:2] == pytest.approx([0.01, 0.11], abs=0.05)
 
 
@@ -62,7 +63,7 @@ def test_manners_change_nothing(toys: Toys, manner: str) -> None:
     assert close(way, expected(21))
     assert len(application.seen) in (20, 21), "every picture once"
     most = 21 * (application.times - 1)
-    assert most - 2 <= stepper.answers.surplus <= most
+    assert most - 2 <= stepper.audience.answers.surplus <= most
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -91,7 +92,7 @@ def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch:
     monkeypatch.setattr(ear, "SLICE_MS", 10)
     way, stepper = toys.run(toys.application())
     assert close(way, expected(21))
-    assert stepper.frames == 21
+    assert stepper.audience.frames == 21
 
 
 def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,7 +106,7 @@ def test_an_application_without_an_answer_of_its_own_is_awaited_by_its_readers(t
     toys.answers = ()
     application = toys.application(pause=lambda _: 0.01)
     _, stepper = toys.run(application)
-    assert stepper.frames == 21
+    assert stepper.audience.frames == 21
     assert len(application.seen) == 21
 
 
@@ -120,7 +121,7 @@ def test_an_application_without_a_camera_may_answer_at_once(toys: Toys) -> None:
     toys.cast = {"mover": lambda session, _: Mover(session)}
     way, stepper = toys.run(Filter(toys.cid))
     assert len(way) == 201
-    assert stepper.frames == 21
+    assert stepper.audience.frames == 21
 
 
 def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
@@ -129,7 +130,7 @@ def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
     slow = toys.application("other", times=0, boxes=1, pause=lambda _: 0.02)
     way, stepper = toys.run(toys.application(), slow)
     assert close(way, expected(21))
-    assert stepper.answers.surplus == 0
+    assert stepper.audience.answers.surplus == 0
     assert len(slow.seen) in (20, 21)
 
 
@@ -150,7 +151,7 @@ def test_a_film_is_seen_to_its_last_picture_and_no_picture_twice(toys: Toys, man
     _, stepper = toys.run(application)
     assert application.seen == [1, 2, 3, 4, 5]
     assert [number for _, number in toys.judge.boxes] == [1, 2, 3, 4, 5]
-    assert stepper.frames == 5
+    assert stepper.audience.frames == 5
 
 
 def test_the_test_time_is_limited(toys: Toys) -> None:

@@ -17,8 +17,10 @@ from services.base.channel import Channel
 from services.base.lockstep import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, kinds
+from services.clock.audience import Audience
 from services.clock.exchange import Exchange
-from services.clock.model import Patience, Roles, Stepper
+from services.clock.model import Stepper
+from services.clock.terms import Patience, Roles
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
@@ -210,7 +212,8 @@ class Toys:
             exchange = Exchange(session, channel, answers.take)
             advance = tuple(name for name in self.cast if name == "mover")
             roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
-            stepper = Stepper(roles, STEP, self.timeout, self.patience, answers, exchange, stop.is_set)
+            audience = Audience(answers, self.patience, exchange, stop.is_set)
+            stepper = Stepper(roles, STEP, self.timeout, audience, exchange, stop.is_set)
             try:
                 stepper.meet()
                 stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
