@@ -11,11 +11,11 @@ from typing import Any, Protocol
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import lanes, leases, projects, rigs
-from dodo_dsl.run.channel import Nursery
 from dodo_dsl.run.client import connect
 from dodo_dsl.run.commands import Lane
 from dodo_dsl.run.docker import DockerBackend, other_subnets
 from dodo_dsl.run.events import Backend, BackendError
+from dodo_dsl.run.forks import Nursery
 from dodo_dsl.run.process import ProcessBackend
 from dodo_dsl.run.pulls import Pulls
 

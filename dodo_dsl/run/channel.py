@@ -5,7 +5,6 @@ import errno
 import json
 import os
 import select
-import signal
 import socket
 import subprocess
 import sys
@@ -16,37 +15,11 @@ from typing import Any
 
 from dodo_dsl.run.commands import Lane, package_path
 from dodo_dsl.run.events import BackendError
+from dodo_dsl.run.forks import Fork, Nursery, end
 from dodo_dsl.run.sandbox import MAX_MESSAGE
 
 CLOSE_S = 10.0
 LOG = "sandbox.log"
-
-
-class Nursery:
-    """The runner's end of the process that forks sandboxes; it ends when this is closed, or with the runner."""
-
-    def __init__(self, descriptors: tuple[int, ...]) -> None:
-        """``descriptors`` are of leases that sandboxes hold, too."""
-        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "dodo_dsl.run.nursery", str(theirs.fileno())],
-                pass_fds=(theirs.fileno(), *descriptors),
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
-                env={**os.environ, "PYTHONPATH": package_path()},
-            )
-
-    def fork(self, channel: socket.socket, log: int, lane: str) -> None:
-        """A sandbox at the other end of ``channel``; raises OSError when the nursery has gone."""
-        socket.send_fds(self._socket, [json.dumps({"lane": lane}).encode()], [channel.fileno(), log])
-
-    def close(self) -> None:
-        """Ends the nursery; the sandboxes stay."""
-        self._socket.close()
-        _end(self._process)
 
 
 class Channel:
@@ -66,7 +39,7 @@ class Channel:
         self._nursery = nursery if isolation == "network" else None
         self._heard = heard
         self._lost = lost
-        self._process: subprocess.Popen[bytes] | _Fork | None = None
+        self._process: subprocess.Popen[bytes] | Fork | None = None
         self._socket: socket.socket | None = None
         self._up: asyncio.Future[dict[str, Any]] | None = None
         self._closing = False
@@ -87,7 +60,7 @@ class Channel:
         if "down" in answer:
             raise BackendError(f"no sandbox of isolation {self._isolation}: {answer['down']}")
         if self._process is None:
-            self._process = _Fork(answer["up"])
+            self._process = Fork(answer["up"])
 
     async def _started(self, lane: Lane, log: Path) -> dict[str, Any]:
         """What the new sandbox says first."""
@@ -168,7 +141,7 @@ class Channel:
         if self._process is not None and self._socket is not None:
             self.send({"do": "close"})
             loop = asyncio.get_running_loop()
-            await loop.run_in_executor(None, _end, self._process)
+            await loop.run_in_executor(None, end, self._process)
             loop.remove_reader(self._socket)
         if self._socket is not None:
             self._socket.close()
@@ -192,40 +165,3 @@ def send_patiently(channel: socket.socket, data: bytes, descriptors: tuple[int, 
             select.select([], [channel], [], left)
         else:
             return
-
-
-class _Fork:
-    """A process that is another's child, as subprocess has its own."""
-
-    def __init__(self, pid: int) -> None:
-        self.pid = pid
-        try:
-            self._descriptor = os.pidfd_open(pid)
-        except ProcessLookupError:
-            self._descriptor = -1
-
-    def poll(self) -> int | None:
-        """0 when it has ended."""
-        return 0 if self._descriptor < 0 or select.select([self._descriptor], [], [], 0)[0] else None
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Until it has ended; raises TimeoutExpired."""
-        if self._descriptor >= 0:
-            if not select.select([self._descriptor], [], [], timeout)[0]:
-                raise subprocess.TimeoutExpired("sandbox", timeout or 0.0)
-            os.close(self._descriptor)
-            self._descriptor = -1
-        return 0
-
-    def kill(self) -> None:
-        """End it at once."""
-        if self._descriptor >= 0:
-            signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
-
-
-def _end(process: "subprocess.Popen[bytes] | _Fork") -> None:
-    try:
-        process.wait(CLOSE_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()

@@ -9,10 +9,11 @@ from typing import Any
 from dodo_dsl.plan.model import ApplicationService, Plan, Service
 from dodo_dsl.run import lines
 from dodo_dsl.run.announce import begin_frame
-from dodo_dsl.run.channel import LOG, Channel, Nursery
+from dodo_dsl.run.channel import LOG, Channel
 from dodo_dsl.run.commands import Command, Commands, Lane, changes, package_path
 from dodo_dsl.run.environment import MissingVariable
 from dodo_dsl.run.events import Event, Exited, Lost, Unstartable
+from dodo_dsl.run.forks import Nursery
 from dodo_dsl.run.output import Output
 
 __all__ = ["Lane", "ProcessBackend", "package_path"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import backends, channel
+from dodo_dsl.run import backends, channel, forks
 from dodo_dsl.run.lanes import namespaces_refusal
 from tests.run.helpers import Bench
 
@@ -36,7 +36,7 @@ def test_without_a_nursery_a_sandbox_of_its_own_is_started(tmp_path: Path, monke
     """The nursery has gone before it was asked, and while it was."""
     if why := namespaces_refusal():
         pytest.skip(f"no namespaces here: {why}")
-    real = channel.Nursery
+    real = forks.Nursery
 
     class Gone(real):  # type: ignore[misc, valid-type]
         def __init__(self, descriptors: tuple[int, ...]) -> None:
@@ -63,9 +63,9 @@ def test_the_nursery_is_gone_after_the_run(tmp_path: Path, monkeypatch: pytest.M
     if why := namespaces_refusal():
         pytest.skip(f"no namespaces here: {why}")
     made = []
-    real = channel.Nursery
+    real = forks.Nursery
 
-    def remembered(descriptors: tuple[int, ...]) -> channel.Nursery:
+    def remembered(descriptors: tuple[int, ...]) -> forks.Nursery:
         made.append(real(descriptors))
         return made[-1]
 
