@@ -11,6 +11,9 @@ _COLOURS = {"passed": "#1a7f37", "failed": "#cf222e", "error": "#9a6700"}
 _SNAPSHOT_S = 1.0
 _MARGIN = 0.3
 _PIXELS_PER_INCH = 110
+_INCHES = 7.0
+_AROUND_INCHES = 1.4
+"""What title, labels and legend need."""
 
 
 def draw(drive: Drive, outcome: Outcome, target: Path) -> None:
@@ -18,7 +21,7 @@ def draw(drive: Drive, outcome: Outcome, target: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7, 7), layout="constrained")
+    figure = Figure(layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     _ground(axes, drive)
@@ -91,4 +94,6 @@ def _frame(axes: Any, drive: Drive) -> None:
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.grid(True, linewidth=0.3)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2, fontsize=8, frameon=False)
+    axes.figure.legend(loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+    wide, high = max(xs) - min(xs) + 2 * _MARGIN, max(ys) - min(ys) + 2 * _MARGIN
+    axes.figure.set_size_inches(_INCHES, min(_INCHES, _INCHES * high / wide + _AROUND_INCHES))
