@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl import data
 from dodo_dsl.cli import starters
+from dodo_dsl.cli.copied import copied_files, is_shipped
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.starters import New, NoStart
-from dodo_dsl.compiler import load
+from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.spec.deployment import FILE_NAME, Deployment
 
@@ -16,6 +18,7 @@ EXAMPLES = """examples:
   dodo new sil-my-curve                                a closed-loop simulation that compiles at once
   dodo new hil-my-curve --level hil                    the same on a rig, the emulated one at first
   dodo new sil-my-dark --extends sil-my-curve          another test with changes
+  dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a test that ships with DoDo, map and all
   dodo new --deployment                                dodo.yml, application and pipeline for this folder
 """
 
@@ -29,7 +32,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--deployment", action="store_true", help="what a repository with tests needs, in this folder")
     parser.add_argument("--level", choices=_LEVELS, help="of the new test (default: sil)")
     parser.add_argument("--kind", choices=_KINDS, help="of the new test (default: closed-loop)")
-    parser.add_argument("--extends", metavar="TEST", help="the test that the new one changes")
+    parser.add_argument(
+        "--extends", metavar="TEST", help="the test that the new one changes; one that ships with DoDo is copied"
+    )
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -47,12 +52,11 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
     specs = list(checked.specs)
     starters.check_name(options.name, [spec.location.stem for spec in specs])
     root = checked.deployment.root.resolve()
+    note = ""
     if options.extends:
         if options.level or options.kind:
             raise NoStart("a test that extends another has its level and kind; write no --level or --kind")
-        base = starters.base_test(options.extends, specs)
-        _own(base.location.root, root, f"'{options.extends}' ships with DoDo; copy it to extend it")
-        files = starters.extending_files(options.name, base, root)
+        files, note = _from_another(options, checked, root)
     else:
         level, kind = options.level or "sil", options.kind or "closed-loop"
         files = starters.test_files(options.name, level, kind, _registry(checked.deployment), root)
@@ -60,25 +64,36 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
     if there:
         raise NoStart(f"there is a file '{shown_path(str(there[0]))}' already; nothing was written")
     _write(files, stdout)
+    stdout.write(note)
     spec = shown_path(str(files[0].path))
     _next([f"make {spec} yours", "dodo compile --check", f"dodo run {options.name}"], stdout)
     return Exit.OK
 
 
+def _from_another(options: argparse.Namespace, checked: Checked, root: Path) -> tuple[list[New], str]:
+    """A test that extends one of the repository, or a copy of one that ships with DoDo; with what is to be said."""
+    own = [spec for spec in checked.specs if not is_shipped(spec.location.root, root)]
+    shipped = load([data.registry()])
+    others = [spec for spec in shipped.specs if is_shipped(spec.location.root, root)]
+    base = starters.base_test(options.extends, [*own, *others])
+    if not is_shipped(base.location.root, root):
+        if not base.location.root.resolve().is_relative_to(root):
+            raise NoStart(f"'{options.extends}' lies outside of this repository; a test extends tests of its registry")
+        return starters.extending_files(options.name, base, root), ""
+    instances = [spec for spec in others if spec.path == base.path]
+    files = copied_files(options.name, instances, shipped.manifests, _registry(checked.deployment), root)
+    return files, f"a copy, as '{options.extends}' ships with DoDo and a test extends tests of its own registry only\n"
+
+
 def _registry(deployment: Deployment) -> Path:
-    """The first registry that belongs to the repository itself."""
+    """The first registry that belongs to the repository itself, and not to a DoDo that is installed in it."""
     if deployment.file is None:
         raise NoStart(f"there is no {FILE_NAME} here or above; dodo new --deployment writes one")
     root = deployment.root.resolve()
     for registry in deployment.registry:
-        if registry.resolve().is_relative_to(root):
+        if registry.resolve().is_relative_to(root) and not is_shipped(registry, root):
             return registry
     raise NoStart(f"{shown_path(str(deployment.file))} names no folder of this repository under 'registry'")
-
-
-def _own(registry: Path, root: Path, otherwise: str) -> None:
-    if not registry.resolve().is_relative_to(root):
-        raise NoStart(otherwise)
 
 
 def _deployment(options: argparse.Namespace, stdout: TextIO) -> int:

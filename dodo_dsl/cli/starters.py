@@ -67,7 +67,7 @@ def test_files(name: str, level: str, kind: str, registry: Path, root: Path) -> 
     template = _template(level, kind)
     folder = registry / name
     spec = _filled(template, name=name)
-    files = [*_spec(name, folder, root, spec)]
+    files = [*spec_files(name, folder, root, spec)]
     for place in MAPS:
         if f"../{place}".encode() in spec and not (registry / place).exists():
             shipped = sorted((data.registry() / place).iterdir())
@@ -92,7 +92,7 @@ def extending_files(name: str, base: Spec, root: Path) -> list[New]:
     """A spec that extends ``base``, in its registry, and a README."""
     path = base.path.relative_to(base.location.root.resolve()).as_posix()
     text = _filled("tests/extends.dodo.yml", name=name, base=path, description=f"As {base.name}, but ...")
-    return [*_spec(name, base.location.root / name, root, text)]
+    return [*spec_files(name, base.location.root / name, root, text)]
 
 
 def base_test(name: str, specs: list[Spec]) -> Spec:
@@ -104,7 +104,8 @@ def base_test(name: str, specs: list[Spec]) -> Spec:
     raise NoStart(f"there is no test '{name}' to extend" + (f"; {hint}" if hint else ""))
 
 
-def _spec(name: str, folder: Path, root: Path, text: bytes) -> list[New]:
+def spec_files(name: str, folder: Path, root: Path, text: bytes) -> list[New]:
+    """A test's folder: the spec, with the line by which editors know its schema, and a README."""
     description = re.search(r"^description: (.*)$", text.decode(), re.MULTILINE)
     readme = _filled("tests/README.md", name=name, description=description[1] if description else "")
     return [New(folder / f"{name}{SUFFIX}", _schema_line(folder, root) + text), New(folder / "README.md", readme)]

@@ -1,12 +1,16 @@
 """``dodo new``: what it writes compiles at once, and nothing that is there changes."""
 
+import re
+import shutil
 from io import StringIO
 from pathlib import Path
 
 import pytest
 import yaml
 
+from dodo_dsl import data
 from dodo_dsl.cli.main import main
+from dodo_dsl.compiler import load
 
 
 def dodo(*words: str) -> tuple[int, str, str]:
@@ -105,11 +109,78 @@ def test_a_deployment_without_folders_of_its_own_is_said(empty: Path) -> None:
     assert (code, err) == (2, "dodo new: dodo.yml names no folder of this repository under 'registry'\n")
 
 
-def test_shipped_tests_are_not_extended_from_elsewhere(repository: Path) -> None:
+def with_shipped(repository: Path, registry: str = '["dodo:", tests]') -> None:
     deployment = repository / "dodo.yml"
-    deployment.write_text(deployment.read_text().replace("[tests]", '[tests, "dodo:"]'))
-    code, _, err = dodo("new", "first", "--extends", "sil-closed-straight")
-    assert (code, err) == (2, "dodo new: 'sil-closed-straight' ships with DoDo; copy it to extend it\n")
+    deployment.write_text(deployment.read_text().replace("[tests]", registry))
+
+
+def installed_in(repository: Path, patch: pytest.MonkeyPatch) -> Path:
+    """A wheel's data in a virtual environment that lies in the repository."""
+    bundled = repository / ".venv/lib/python3/site-packages/dodo_dsl/_data"
+    for name in ("schemas", "templates", "services", "tests_registry"):
+        shutil.copytree(data.root() / name, bundled / name, ignore=shutil.ignore_patterns("__pycache__"))
+    patch.setattr(data, "root", lambda: bundled)
+    return bundled
+
+
+SHIPPED = sorted(path.parent.name for path in data.registry().glob("*/*.dodo.yml"))
+
+
+@pytest.mark.parametrize("shipped", SHIPPED)
+def test_a_shipped_test_is_copied_with_what_it_refers_to(repository: Path, shipped: str) -> None:
+    (repository / "docker-compose.yml").write_text("services: {anything: {image: example, command: --cid=111}}\n")
+    code, out, err = dodo("new", "my-own", "--extends", shipped)
+    assert (code, err) == (0, "")
+    assert f"a copy, as '{shipped}' ships with DoDo" in out
+    code, out, err = dodo("compile", "--check")
+    assert (code, err) == (0, ""), out
+    spec = yaml.safe_load((repository / "tests/my-own/my-own.dodo.yml").read_text())
+    assert (spec["name"], "extends" in spec) == ("my-own", False)
+    text = (repository / "tests/my-own/my-own.dodo.yml").read_text()
+    for path in re.findall(r"\.\./[\w./-]+", text.partition("dodo: 1")[2]):
+        assert (repository / "tests/my-own" / path).exists(), path
+
+
+def test_a_copy_is_the_same_test(repository: Path) -> None:
+    dodo("new", "mine", "--extends", "hil-dynamic")
+    dodo("new", "further", "--extends", "mine")
+    (shipped,) = load([data.registry() / "hil-dynamic"]).specs
+    copies = load([repository / "tests"]).specs
+    assert [spec.name for spec in copies] == ["further", "mine"]
+    for copy in copies:
+        assert (copy.level, copy.kind, copy.rig, copy.timeout_s) == ("hil", "closed-loop", "emulated", 60.0)
+        assert [(u.name, u.uses.text, list(u.parameters)) for u in copy.uses] == [
+            (u.name, u.uses.text, list(u.parameters)) for u in shipped.uses
+        ]
+
+
+def test_a_copy_leaves_the_map_that_is_there(repository: Path) -> None:
+    dodo("new", "first")
+    place = repository / "tests/maps/straight/map.json"
+    place.write_text(place.read_text() + "\n")
+    before = contents(repository / "tests/maps")
+    assert dodo("new", "second", "--extends", "sil-closed-straight")[0] == 0
+    assert contents(repository / "tests/maps") == before
+
+
+@pytest.mark.parametrize("words", [[], ["--extends", "sil-closed-straight"]])
+def test_nothing_is_written_into_an_installed_dodo(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    with_shipped(repository)
+    bundled = installed_in(repository, monkeypatch)
+    before = contents(bundled)
+    code, out, err = dodo("new", "first", *words)
+    assert (code, err) == (0, "")
+    assert "wrote tests/first/first.dodo.yml\n" in out
+    assert contents(bundled) == before
+
+
+def test_an_installed_dodo_is_no_folder_of_the_repository(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_shipped(repository, '["dodo:"]')
+    installed_in(repository, monkeypatch)
+    code, out, err = dodo("new", "first")
+    assert (code, out, err) == (2, "", "dodo new: dodo.yml names no folder of this repository under 'registry'\n")
 
 
 def test_a_deployment_is_written_once(repository: Path) -> None:
