@@ -21,8 +21,13 @@ SCHEMAS = ".dodo"
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 _LONGEST = 60
-_DIL = "a dil test replays a recording of yours: start from a sil test, with rec-replay in place of the camera"
-_PERCEPTION = "a perception test needs the true boxes of its pictures: start from another, with object-detection"
+_SHIPPED = {
+    "dil-open-loop": "dil-kiwi-track",
+    "dil-perception": "dil-static-rig",
+    "sil-perception": "sil-perception",
+    "hil-perception": "hil-camera",
+}
+"""Shipped tests to copy, where a test needs a recording or true boxes that cannot be made up."""
 
 
 class NoStart(Exception):
@@ -64,7 +69,7 @@ def check_name(name: str, taken: list[str]) -> None:
 
 def test_files(name: str, level: str, kind: str, registry: Path, root: Path) -> list[New]:
     """A spec that compiles, its README, and the map or target that it needs where the registry has none."""
-    template = _template(level, kind)
+    template = _template(name, level, kind)
     folder = registry / name
     spec = _filled(template, name=name)
     files = [*spec_files(name, folder, root, spec)]
@@ -77,15 +82,21 @@ def test_files(name: str, level: str, kind: str, registry: Path, root: Path) -> 
     return files
 
 
-def _template(level: str, kind: str) -> str:
+def _template(name: str, level: str, kind: str) -> str:
     template = f"tests/{level}-{kind}{SUFFIX}"
     if (data.templates() / "new" / template).is_file():
         return template
     if (level, kind) == ("dil", "closed-loop"):
-        raise NoStart("a dil test cannot be closed-loop: what was recorded does not react to the application")
-    if level == "dil":
-        raise NoStart(_DIL)
-    raise NoStart(_PERCEPTION if kind == "perception" else f"a hil test begins closed-loop; {kind} ones are sil or dil")
+        reason = "a dil test cannot be closed-loop: what was recorded does not react to the application"
+        raise NoStart(f"{reason}; dodo new {name} --level dil --kind open-loop begins another")
+    shipped = _SHIPPED.get(f"{level}-{kind}")
+    if shipped is None:
+        reason = f"a {level} test begins closed-loop; {kind} ones are sil or dil"
+        raise NoStart(f"{reason}: dodo new {name} --kind {kind} begins one")
+    needs = "a recording" if level == "dil" else "the true boxes of its pictures"
+    raise NoStart(
+        f"a {level} test of kind {kind} needs {needs}; copy one that has: dodo new {name} --extends {shipped}"
+    )
 
 
 def extending_files(name: str, base: Spec, root: Path) -> list[New]:

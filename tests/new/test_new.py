@@ -77,9 +77,9 @@ def test_editors_find_the_schema(repository: Path) -> None:
         (["new", "--extends", "their"], "there is no test 'their' to extend; did you mean 'there'?"),
         (["new", "--extends", "there", "--level", "hil"], "write no --level or --kind"),
         (["new", "--level", "dil"], "a dil test cannot be closed-loop"),
-        (["new", "--level", "dil", "--kind", "open-loop"], "a dil test replays a recording of yours"),
-        (["new", "--kind", "perception"], "a perception test needs the true boxes"),
+        (["new", "--level", "dil"], "; dodo new new --level dil --kind open-loop begins another"),
         (["new", "--level", "hil", "--kind", "open-loop"], "a hil test begins closed-loop; open-loop ones are"),
+        (["new", "--level", "hil", "--kind", "open-loop"], ": dodo new new --kind open-loop begins one"),
         (["--deployment", "--level", "hil"], "--level, --kind and --extends belong to a test"),
     ],
     ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
@@ -95,6 +95,18 @@ def test_what_cannot_be_begun_is_said_and_writes_nothing(repository: Path, words
     assert said in err
     assert err.count("\n") == 1
     assert contents(repository) == before
+
+
+@pytest.mark.parametrize(
+    ("level", "kind"), [("sil", "perception"), ("dil", "perception"), ("dil", "open-loop"), ("hil", "perception")]
+)
+def test_what_no_start_is_made_up_for_has_a_test_to_copy(repository: Path, level: str, kind: str) -> None:
+    code, _, err = dodo("new", "mine", "--level", level, "--kind", kind)
+    assert code == 2
+    assert err.startswith(f"dodo new: a {level} test of kind {kind} needs ")
+    assert dodo(*err.rpartition("dodo ")[2].split())[0] == 0
+    spec = load([repository / "tests"]).specs[0]
+    assert (spec.name, spec.level, spec.kind) == ("mine", level, kind)
 
 
 def test_outside_a_deployment_it_says_the_way(empty: Path) -> None:
