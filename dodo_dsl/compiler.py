@@ -1,10 +1,12 @@
 """The compiler from end to end: from paths to checked specs, and on to Plans."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from dodo_dsl import data
 from dodo_dsl.check import check
+from dodo_dsl.check.context import Declared
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, ordered
 from dodo_dsl.emit.pipeline import pipeline_problems
 from dodo_dsl.emit.render import render_pipeline
@@ -19,7 +21,10 @@ from dodo_dsl.spec.registry import locate
 
 @dataclass(frozen=True)
 class Checked:
-    """Specs with everything that was found wrong with them, sorted by place."""
+    """Specs with everything that was found wrong with them, sorted by place.
+
+    ``left_out`` names shipped tests that were not asked for by name and that the application cannot feed.
+    """
 
     deployment: Deployment
     manifests: Mapping[str, Manifest]
@@ -27,10 +32,15 @@ class Checked:
     diagnostics: tuple[Diagnostic, ...]
     application: ApplicationSource | None = None
     empty: tuple[Path, ...] = field(default=())
+    left_out: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
         return not has_errors(self.diagnostics)
+
+
+UNFED = ("no-producer", "no-sample")
+"""The rules by which a service of a test hears what nobody sends."""
 
 
 class NoApplication(Exception):
@@ -57,6 +67,38 @@ def load(paths: Sequence[Path], application: Sequence[Path] = (), start: Path | 
     return Checked(deployment, manifests, specs, tuple(ordered(found)), source, tuple(empty))
 
 
+def without_unfed(checked: Checked, named: Collection[Path] = ()) -> Checked:
+    """The same without shipped tests that hear what the application does not send, but for the files ``named``."""
+    if not any(d.rule in UNFED for d in checked.diagnostics):
+        return checked
+    groups: dict[Path, list[Spec]] = {}
+    for spec in checked.specs:
+        groups.setdefault(spec.path, []).append(spec)
+    found = {path: set(_checked_again(checked, specs)) for path, specs in groups.items()}
+    left_out = {
+        path
+        for path, specs in groups.items()
+        if path not in named
+        and data.is_shipped(specs[0].location.root, checked.deployment.root)
+        and any(d.rule in UNFED for d in found[path])
+    }
+    gone = {d for path in left_out for d in found[path]} - {d for p in groups.keys() - left_out for d in found[p]}
+    return replace(
+        checked,
+        specs=tuple(spec for spec in checked.specs if spec.path not in left_out),
+        diagnostics=tuple(d for d in checked.diagnostics if d not in gone),
+        left_out=tuple(sorted(groups[path][0].location.stem for path in left_out)),
+    )
+
+
+def _checked_again(checked: Checked, specs: Iterable[Spec]) -> list[Diagnostic]:
+    return check(specs, checked.manifests, checked.deployment, _declared(checked))
+
+
+def _declared(checked: Checked) -> Mapping[str, Declared | None] | None:
+    return checked.application.declared if checked.application else None
+
+
 def with_clock(checked: Checked, clock: str) -> Checked:
     """The same by another clock, with what is wrong then; hardware keeps the one that it has."""
     return _with(checked, (spec if spec.level == "hil" else replace(spec, clock=clock) for spec in checked.specs))
@@ -73,9 +115,9 @@ def _isolated(spec: Spec, isolation: str) -> Spec:
 
 def _with(checked: Checked, changed: Iterable[Spec]) -> Checked:
     """The same with other specs, checked once more."""
-    specs, declared = tuple(changed), checked.application.declared if checked.application else None
+    specs = tuple(changed)
     known = {_key(d) for d in checked.diagnostics}
-    more = [d for d in check(specs, checked.manifests, checked.deployment, declared) if _key(d) not in known]
+    more = [d for d in _checked_again(checked, specs) if _key(d) not in known]
     return replace(checked, specs=specs, diagnostics=tuple(ordered([*checked.diagnostics, *more])))
 
 

@@ -28,3 +28,8 @@ def services() -> Path:
 
 def registry() -> Path:
     return root() / "tests_registry"
+
+
+def is_shipped(folder: Path, repository: Path) -> bool:
+    """Whether a folder of tests is DoDo's own, seen from another repository than DoDo's checkout."""
+    return folder.resolve().is_relative_to(registry().resolve()) and repository.resolve() != root().resolve()

@@ -11,9 +11,8 @@ import pytest
 import yaml
 
 from dodo_dsl.cli.main import COMMANDS, main
-from dodo_dsl.plan.application import read_application
+from dodo_dsl.cli.selection import select
 from dodo_dsl.report.drive import read_ground
-from dodo_dsl.spec.deployment import load_deployment
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -25,25 +24,89 @@ def block(word: str) -> str:
     return found
 
 
-def test_the_spec_of_the_readme_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    name = re.search(r"name: (\S+)", block("evaluation:")).group(1)  # type: ignore[union-attr]
-    spec = tmp_path / "tests" / name / f"{name}.dodo.yml"
-    spec.parent.mkdir(parents=True)
-    spec.write_text(block("evaluation:"))
-    shutil.copytree(ROOT / "tests_registry" / "maps", tmp_path / "tests" / "maps")
+PROGRAM = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "applications.md").read_text(), re.DOTALL)[1]  # type: ignore[index]
+SPEC = "tests/sil-my-straight/sil-my-straight.dodo.yml"
+
+
+@pytest.fixture
+def newcomer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A repository made of the README's blocks and the application of its page, word for word."""
+    assert SPEC in README
+    (tmp_path / SPEC).parent.mkdir(parents=True)
+    (tmp_path / SPEC).write_text(block("evaluation:"))
+    shutil.copytree(ROOT / "tests_registry" / "maps" / "straight", tmp_path / "tests" / "maps" / "straight")
     (tmp_path / "docker-compose.yml").write_text(block("x-dodo-process"))
     (tmp_path / "dodo.yml").write_text(block("registry:"))
+    (tmp_path / "steering.py").write_text(PROGRAM)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    return tmp_path
+
+
+def dodo(*words: str) -> tuple[int, str]:
+    command = [sys.executable, "-m", "dodo_dsl", *words]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    return result.returncode, result.stdout + result.stderr
+
+
+def test_the_blocks_of_the_readme_compile_together(newcomer: Path) -> None:
+    """Shipped tests that its application cannot feed are left out, and said; they are nobody's mistake."""
     stdout, stderr = StringIO(), StringIO()
-    assert main(["compile", str(spec)], stdout, stderr) == 0, stdout.getvalue() + stderr.getvalue()
+    assert main(["compile"], stdout, stderr) == 0, stdout.getvalue() + stderr.getvalue()
+    unfed = ["hil-camera", "hil-camera-scenes", "sil-perception"]
+    assert f"left out of the shipped tests: {', '.join(unfed)}, as the application does not send" in stdout.getvalue()
+    compiled = {path.parent.name.partition("--")[0] for path in newcomer.glob("generated/*/test.json")}
+    shipped = {path.parent.name for path in (ROOT / "tests_registry").glob("*/*.dodo.yml")}
+    assert compiled == {"sil-my-straight", *shipped} - {*unfed}
 
 
-def test_the_other_blocks_are_what_they_say(tmp_path: Path) -> None:
-    (tmp_path / "tests").mkdir()
-    (tmp_path / "docker-compose.yml").write_text(block("x-dodo-process"))
-    (tmp_path / "dodo.yml").write_text(block("registry:"))
-    assert read_application(tmp_path / "docker-compose.yml")[1] == []
-    assert load_deployment(tmp_path / "dodo.yml")[1] == []
+@pytest.mark.parametrize(
+    ("words", "levels", "expected"),
+    [
+        ((), (), ("hil-camera", "hil-camera-scenes", "sil-perception")),
+        ((), ("sil",), ("sil-perception",)),
+        (("sil-*",), (), ("sil-perception",)),
+        (("sil-*", "sil-my-straight"), (), ("sil-perception",)),
+    ],
+)
+def test_what_is_left_out_keeps_to_what_was_asked_for(
+    newcomer: Path, words: tuple[str, ...], levels: tuple[str, ...], expected: tuple[str, ...]
+) -> None:
+    checked = select(words, levels, ())
+    assert (checked.ok, checked.left_out) == (True, expected)
+
+
+def test_a_shipped_test_that_is_named_is_an_error(newcomer: Path) -> None:
+    stdout = StringIO()
+    assert main(["compile", "--check", "sil-perception"], stdout, StringIO()) == 2
+    assert "error[no-sample]: 'cones' needs opendlv.logic.perception.DetectionBoundingBox/0" in stdout.getvalue()
+    assert "left out" not in stdout.getvalue()
+
+
+def test_ones_own_test_is_never_left_out(newcomer: Path) -> None:
+    compose = newcomer / "docker-compose.yml"
+    compose.write_text(compose.read_text().replace("opendlv.proxy.GroundSteeringRequest, ", ""))
+    stdout = StringIO()
+    assert main(["compile", "--check"], stdout, StringIO()) == 2
+    assert f"{SPEC}:10:3: error[no-producer]: 'vehicle' needs opendlv.proxy.GroundSteeringRequest" in stdout.getvalue()
+    assert "tests_registry" not in stdout.getvalue()
+    assert "sil-closed-straight" in stdout.getvalue().splitlines()[0]
+
+
+def test_the_application_of_the_page_passes_the_test_of_the_readme(newcomer: Path) -> None:
+    code, output = dodo("run", "sil-my-straight", "--clock", "lockstep")
+    assert code == 0, output
+    assert "PASSED  sil-my-straight  reached finish after " in output
+
+
+def test_a_blind_application_fails_the_test_that_dodo_new_writes(newcomer: Path) -> None:
+    """Who goes straight ahead, without a look, is told so by the very first test."""
+    (newcomer / "steering.py").write_text(PROGRAM.replace("-(left + right)", "0.0"))
+    assert dodo("new", "sil-first")[0] == 0
+    code, output = dodo("run", "sil-first", "--clock", "lockstep")
+    assert code == 1, output
+    assert "FAILED  sil-first  hit wall right after " in output
 
 
 def test_the_readme_names_every_command_and_flag() -> None:

@@ -36,6 +36,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     except selection.NoSuchTest as error:
         stderr.write(f"dodo compile: {error}\n")
         return Exit.USAGE
+    (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
     if options.check:
         return _check(checked, options, stdout, stderr)
     return _write(checked, options, stdout, stderr)

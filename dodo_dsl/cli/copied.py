@@ -6,7 +6,6 @@ from pathlib import Path
 
 import yaml
 
-from dodo_dsl import data
 from dodo_dsl.cli.starters import New, NoStart, spec_files
 from dodo_dsl.plan.files import FilesError, copies
 from dodo_dsl.source import Mapping as Written
@@ -18,11 +17,6 @@ from dodo_dsl.spec.values import ValueProblem, convert
 
 _NAME = re.compile(r"^name: .*$", re.MULTILINE)
 _EDITOR = re.compile(r"^# yaml-language-server:.*\n")
-
-
-def is_shipped(registry: Path, root: Path) -> bool:
-    """Whether a registry is DoDo's own, which only DoDo's checkout may change; ``root`` is the repository's."""
-    return registry.resolve().is_relative_to(data.registry().resolve()) and root.resolve() != data.root().resolve()
 
 
 def copied_files(

@@ -46,7 +46,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         return Exit.USAGE
     found = [explain(context) for context in _contexts(checked)]
     stdout.write(json.dumps([asdict(e) for e in found], indent=2) + "\n" if options.json else _text(found))
-    stderr.write(format_text(checked.diagnostics))
+    stderr.write(selection.left_out(checked) + format_text(checked.diagnostics))
     return Exit.OK if checked.ok else Exit.USAGE
 
 

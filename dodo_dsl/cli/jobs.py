@@ -84,6 +84,7 @@ def _load_plan(folder: Path) -> Plan:
 
 def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Plan], Deployment]:
     checked = selection.select(options.test, options.level, options.application)
+    stdout.write(selection.left_out(checked))
     if not checked.specs:
         raise Usage("there is no test to run")
     if options.clock:

@@ -7,7 +7,7 @@ from typing import TextIO
 
 from dodo_dsl import data
 from dodo_dsl.cli import starters
-from dodo_dsl.cli.copied import copied_files, is_shipped
+from dodo_dsl.cli.copied import copied_files
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.starters import New, NoStart
 from dodo_dsl.compiler import Checked, load
@@ -72,11 +72,11 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
 
 def _from_another(options: argparse.Namespace, checked: Checked, root: Path) -> tuple[list[New], str]:
     """A test that extends one of the repository, or a copy of one that ships with DoDo; with what is to be said."""
-    own = [spec for spec in checked.specs if not is_shipped(spec.location.root, root)]
+    own = [spec for spec in checked.specs if not data.is_shipped(spec.location.root, root)]
     shipped = load([data.registry()])
-    others = [spec for spec in shipped.specs if is_shipped(spec.location.root, root)]
+    others = [spec for spec in shipped.specs if data.is_shipped(spec.location.root, root)]
     base = starters.base_test(options.extends, [*own, *others])
-    if not is_shipped(base.location.root, root):
+    if not data.is_shipped(base.location.root, root):
         if not base.location.root.resolve().is_relative_to(root):
             raise NoStart(f"'{options.extends}' lies outside of this repository; a test extends tests of its registry")
         return starters.extending_files(options.name, base, root), ""
@@ -91,7 +91,7 @@ def _registry(deployment: Deployment) -> Path:
         raise NoStart(f"there is no {FILE_NAME} here or above; dodo new --deployment writes one")
     root = deployment.root.resolve()
     for registry in deployment.registry:
-        if registry.resolve().is_relative_to(root) and not is_shipped(registry, root):
+        if registry.resolve().is_relative_to(root) and not data.is_shipped(registry, root):
             return registry
     raise NoStart(f"{shown_path(str(deployment.file))} names no folder of this repository under 'registry'")
 

@@ -5,7 +5,7 @@ import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 
-from dodo_dsl.compiler import Checked, load
+from dodo_dsl.compiler import Checked, load, without_unfed
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
@@ -39,29 +39,45 @@ def _is_path(word: str) -> bool:
 
 
 def select(words: Sequence[str], levels: Sequence[str], application: Sequence[Path]) -> Checked:
-    """The checked specs that the words mean (all without any), kept to the levels; raises NoSuchTest."""
+    """The checked specs that the words mean (all without any), kept to the levels; raises NoSuchTest.
+
+    Shipped tests that the application cannot feed are left out, unless a word is the name or the path of one.
+    """
     paths = [Path(word) for word in words if _is_path(word)]
     names = [word for word in words if not _is_path(word)]
     checked = load(paths, existing_files(application))
     if checked.empty:
         raise NoSuchTest(f"there is no test at '{checked.empty[0]}'; specs end in .dodo.yml")
+    given = {spec.path for spec in checked.specs} if paths else set()
     if names:
-        given = {spec.path for spec in checked.specs} if paths else set()
         if paths:
             checked = load([*paths, *checked.deployment.registry], application)
         others = [spec for spec in checked.specs if spec.path not in given]
         chosen = {spec.slug for word in names for spec in _named(word, others)}
         checked = _narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
+        given |= {spec.path for spec in others if any(_is_name(word, spec) for word in names)}
     if levels:
         kept = tuple(s for s in checked.specs if s.level in levels)
         if not kept:
             raise NoSuchTest(f"none of the tests is of level {' or '.join(levels)}")
         checked = _narrowed(checked, kept)
-    return checked
+    return without_unfed(checked, given)
+
+
+def left_out(checked: Checked) -> str:
+    """One line about the shipped tests that were left out; empty when there are none."""
+    if not checked.left_out:
+        return ""
+    why = "as the application does not send what they need (dodo explain NAME says what)"
+    return f"left out of the shipped tests: {', '.join(checked.left_out)}, {why}\n"
+
+
+def _is_name(word: str, spec: Spec) -> bool:
+    return word in (spec.location.stem, spec.title, spec.slug)
 
 
 def _named(word: str, specs: Sequence[Spec]) -> list[Spec]:
-    found = [s for s in specs if word in (s.location.stem, s.title, s.slug)]
+    found = [s for s in specs if _is_name(word, s)]
     found = found or [s for s in specs if _matches(s, word)]
     if not found:
         hint = did_you_mean(word, list(dict.fromkeys(s.location.stem for s in specs)))
