@@ -82,7 +82,7 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
             resources.enter_context(_readiness(ready))
             (service.drive or loop.run)(stop)
             if service.verdict is not None:
-                print(service.verdict.line(), flush=True)
+                print(service.verdict.line(flags["cid"]), flush=True)
     except Exception as error:
         expected = code == USAGE and isinstance(error, ValueError | OSError)
         text = " ".join(str(error).split())

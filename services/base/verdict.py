@@ -30,16 +30,21 @@ class Check:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Passed or failed, in one sentence, with what was measured."""
+    """Passed or failed, in one sentence, with what was measured; ``unheard`` when nothing of the application came."""
 
     outcome: Literal["passed", "failed"]
     reason: str
     checks: tuple[Check, ...] = ()
+    unheard: bool = False
 
-    def line(self) -> str:
-        """The verdict line of design section 6, without its line break; ASCII, whatever the locale."""
+    def line(self, cid: int) -> str:
+        """The verdict line of design section 6, without its line break; ASCII, whatever the locale.
+
+        An application that was not heard may well have talked on another bus, so the reason names the test's.
+        """
         checks = [check.as_json() for check in self.checks]
-        message = {"dodo": "verdict", "outcome": self.outcome, "reason": self.reason, "checks": checks}
+        reason = f"{self.reason}; the test is on CID {cid}" if self.unheard else self.reason
+        message = {"dodo": "verdict", "outcome": self.outcome, "reason": reason, "checks": checks}
         return json.dumps(message, allow_nan=False)
 
 

@@ -128,7 +128,7 @@ class Judge:
         silent = [name for name in REQUESTS if name not in self._heard]
         aside = f"; the application sent no {silent[0]}" if silent else ""
         if len(silent) == len(REQUESTS):
-            self._decide("failed", f"the application sent no {' and no '.join(silent)} {within}")
+            self._decide("failed", f"the application sent no {' and no '.join(silent)} {within}", unheard=True)
         elif self.track.goal or self.track.gates:
             self._decide("failed", f"{self._missed(self._last[1], within)}{aside}")
         else:
@@ -142,9 +142,9 @@ class Judge:
         early = f"; {next(iter(self.track.goal))} does not count before the gates" if self._early else ""
         return f"crossed {self._gates.crossed} of {len(self._gates)} gates {within}: {away} {name}, the next{early}"
 
-    def _decide(self, outcome: Literal["passed", "failed"], reason: str) -> None:
+    def _decide(self, outcome: Literal["passed", "failed"], reason: str, unheard: bool = False) -> None:
         track, measures = self.track, self._measures
         goal = (measures.goal_check(track.max_time),) if track.goal or track.gates else ()
         gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
         walls = (measures.wall_check(track.min_margin),) if track.walls else ()
-        self.verdict = Verdict(outcome, reason, (*goal, *gates, *walls, *measures.drive_checks()))
+        self.verdict = Verdict(outcome, reason, (*goal, *gates, *walls, *measures.drive_checks()), unheard)

@@ -13,7 +13,7 @@ def verdict(signal: str, target: Target, measures: Measures, limits: Limits, dur
     faults = [] if measures.samples else [_nothing(signal, target, measures, during)]
     faults += [] if faults else [_fault(check, measures, limits) for check in checks if not check.ok]
     if faults:
-        return Verdict("failed", "; ".join(faults) + _worst(measures), checks)
+        return Verdict("failed", "; ".join(faults) + _worst(measures), checks, unheard=not measures.heard)
     kept = [
         f"{check.name} {_number(check.value)} ({_bound(check)})"
         for check in checks

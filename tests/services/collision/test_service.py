@@ -186,6 +186,7 @@ def test_the_end_of_the_input_of_a_silent_application(lane: Path, cid: int) -> N
     assert verdict["reason"].startswith(
         "the application sent no GroundSteeringRequest and no PedalPositionRequest before the input ended after 0."
     )
+    assert verdict["reason"].endswith(f" s; the test is on CID {cid}")
 
 
 def test_no_frame_is_an_error_and_no_verdict(lane: Path, cid: int) -> None:

@@ -128,7 +128,9 @@ def test_a_silent_application_fails_when_the_time_is_over(table: Path, cid: int,
         code, output, _ = finished(process)
     verdict = json.loads(output)
     assert (code, verdict["outcome"]) == (0, "failed")
-    assert verdict["reason"] == f"no sample of groundSteering of {STEERING}/0 came within 0.05 s"
+    assert (
+        verdict["reason"] == f"no sample of groundSteering of {STEERING}/0 came within 0.05 s; the test is on CID {cid}"
+    )
     assert verdict["checks"][0] == {"name": "mean", "value": None, "limit": {"max": 0.05}, "unit": "", "ok": False}
 
 
