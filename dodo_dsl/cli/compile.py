@@ -1,6 +1,7 @@
 """dodo compile: check tests and write their compose files and child pipeline."""
 
 import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -8,7 +9,7 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, NoApplication, plan
 from dodo_dsl.diagnostics import FORMATS, Diagnostic, has_errors, ordered
-from dodo_dsl.emit.write import differences, write
+from dodo_dsl.emit.write import differences, stale_folders, write
 
 EXAMPLES = """examples:
   dodo compile                             all tests of the deployment, into generated/
@@ -18,14 +19,21 @@ EXAMPLES = """examples:
 """
 
 
-_MOST_LINES = 200
+_SHORT_DIFF = 30  # lines that are shown without being asked for
+_MOST_NAMES = 8
 _MOST_PROBLEMS = 1000
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", nargs="*", metavar="PATH", help="specs, folders or names (default: all)")
+    parser.add_argument(
+        "path",
+        nargs="*",
+        metavar="PATH",
+        help="specs, folders or names; DIR then holds these only (default: all)",
+    )
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
     parser.add_argument("--check", action="store_true", help="write nothing; show problems, and what is stale in DIR")
+    parser.add_argument("--diff", action="store_true", help="with --check, show what is stale in full")
     parser.add_argument("--format", choices=sorted(FORMATS), default="text", help="of the diagnostics")
     selection.add_application(parser)
 
@@ -54,7 +62,7 @@ def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
 
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    diagnostics, stale = list(checked.diagnostics), ""
+    diagnostics, stale = list(checked.diagnostics), {}
     if checked.ok and checked.application is not None and checked.specs:
         compiled, problems = plan(checked, options.output)
         diagnostics = ordered([*diagnostics, *problems])
@@ -63,19 +71,28 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     _show(diagnostics, options.format, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
+    outdated = f"{options.output} is stale; dodo compile brings it up to date"
     if options.format == "text":
-        stdout.write(_shortened(stale))
-        state = f"{options.output} is stale; dodo compile brings it up to date" if stale else "no problems"
-        stdout.write(f"{_count(len(checked.specs))} checked: {state}\n")
+        stdout.write(_difference(stale, options.output, options.diff))
+        warnings = [f"{len(diagnostics)} warning{'' if len(diagnostics) == 1 else 's'}"] if diagnostics else []
+        state = ", ".join([*warnings, *([outdated] if stale else [])])
+        stdout.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
     elif stale:
-        stderr.write(f"{options.output} is stale; dodo compile brings it up to date\n")
+        stderr.write(f"{outdated}\n")
     return Exit.PROBLEMS if stale else Exit.OK
 
 
-def _shortened(difference: str) -> str:
-    lines = difference.splitlines(keepends=True)
-    rest = f"... {len(lines) - _MOST_LINES} more lines\n" if len(lines) > _MOST_LINES else ""
-    return "".join(lines[:_MOST_LINES]) + rest
+def _difference(stale: Mapping[str, str], out: Path, in_full: bool) -> str:
+    """The diff where it is asked for or short, and otherwise what differs."""
+    text = "".join(stale.values())
+    if in_full or text.count("\n") <= _SHORT_DIFF:
+        return text
+    return f"stale in {out}: {_names(list(stale))}; --diff shows how\n"
+
+
+def _names(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more
 
 
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -91,9 +108,13 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     _show(diagnostics, options.format, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
+    gone = [folder.name for folder in stale_folders(compiled, options.output)]
     write(compiled, options.output)
     if options.format == "text":
         stdout.write(f"{_count(len(compiled.suite.plans))} compiled into {options.output}\n")
+        if gone:
+            what = f"{_count(len(gone))} of before that {'is' if len(gone) == 1 else 'are'} not among them"
+            stdout.write(f"removed {what}: {_names(gone)}\n")
     return Exit.OK
 
 

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from dodo_dsl.emit.render import File, render, render_pipeline, render_plan
+from dodo_dsl.emit.render import File, render_pipeline, render_plan
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.files import Copy
 
@@ -52,7 +52,7 @@ def write(compiled: Compiled, out: Path) -> None:
             _write_copies(folder / FILES, copies)
         else:
             _write_new(folder, [(file.path.removeprefix(f"{plan.slug}/"), file.text) for file in files], copies)
-    for folder in _stale_folders(compiled, out):
+    for folder in stale_folders(compiled, out):
         shutil.rmtree(folder)
 
 
@@ -97,7 +97,8 @@ def _surplus(folder: Path, wanted: Sequence[Copy]) -> Iterator[Path]:
             yield path
 
 
-def _stale_folders(compiled: Compiled, out: Path) -> list[Path]:
+def stale_folders(compiled: Compiled, out: Path) -> list[Path]:
+    """Tests of earlier compilations that are not in this one."""
     slugs = {plan.slug for plan in compiled.suite.plans}
     return [path.parent for path in sorted(out.glob(f"*/{PLAN_FILE}")) if path.parent.name not in slugs and _ours(path)]
 
@@ -109,14 +110,16 @@ def _ours(path: Path) -> bool:
         return False
 
 
-def differences(compiled: Compiled, out: Path) -> str:
-    """What writing would change below ``out``, as a unified diff; empty when it is up to date."""
-    parts = [_text_difference(file, out) for file in render(compiled.suite, pipeline_folder(out))]
+def differences(compiled: Compiled, out: Path) -> dict[str, str]:
+    """What writing would change below ``out``, a unified diff by test, the pipeline's first; empty when up to date."""
+    child = render_pipeline(compiled.suite, pipeline_folder(out))
+    found = {child.path: _text_difference(child, out)}
     for plan in compiled.suite.plans:
-        folder = out / plan.slug / FILES
-        parts.extend(_copy_differences(folder, compiled.copies[plan.slug], out))
-    parts.extend(f"only in {out.name}: {folder.name}\n" for folder in _stale_folders(compiled, out))
-    return "".join(parts)
+        texts = (_text_difference(file, out) for file in render_plan(plan))
+        copies = _copy_differences(out / plan.slug / FILES, compiled.copies[plan.slug], out)
+        found[plan.slug] = "".join([*texts, *copies])
+    found.update((folder.name, f"only in {out.name}: {folder.name}\n") for folder in stale_folders(compiled, out))
+    return {name: text for name, text in found.items() if text}
 
 
 def _text_difference(file: File, out: Path) -> str:

@@ -151,11 +151,37 @@ def test_check_says_when_output_is_stale(generated: Path, monkeypatch: pytest.Mo
     assert layer.read_text() == before
 
 
+def count(generated: Path) -> int:
+    return len(list(generated.glob("*/test.json")))
+
+
+def test_a_long_difference_is_shown_when_asked_for(generated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(generated.parent)
+    layers = [generated / name / "action.compose.yml" for name in ("sil-closed-left-curve", "sil-closed-straight")]
+    before = [layer.read_text() for layer in layers]
+    for layer in layers:
+        layer.write_text("# of somebody else\n" * 50)
+    (generated / "dil-kiwi-track/.env").unlink()
+    code, out, _ = run("compile", "--check")
+    names = "dil-kiwi-track, sil-closed-left-curve, sil-closed-straight"
+    state = f"{count(generated)} tests checked: generated is stale; dodo compile brings it up to date\n"
+    assert (code, out) == (1, f"stale in generated: {names}; --diff shows how\n{state}")
+    code, out, _ = run("compile", "--check", "--diff")
+    assert (code, out.count("-# of somebody else\n")) == (1, 100)
+    assert out.endswith(state)
+    assert run("compile")[0] == 0
+    assert [layer.read_text() for layer in layers] == before
+
+
 def test_tests_that_are_gone_leave_the_output(generated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(generated.parent)
     (generated / "mine").mkdir(exist_ok=True)
     (generated / "mine" / "notes.txt").write_text("keep")
-    assert run("compile", "sil-closed-straight")[0] == 0
+    others = count(generated) - 1
+    code, out, _ = run("compile", "sil-closed-straight")
+    removed = f"removed {others} tests of before that are not among them: dil-kiwi-track, "
+    assert (code, out[: out.index(removed)]) == (0, "1 test compiled into generated\n")
+    assert out.endswith(f" and {others - 8} more\n")
     assert not (generated / "sil-closed-left-curve").exists()
     assert (generated / "mine" / "notes.txt").exists()
     shutil.rmtree(generated / "mine")
