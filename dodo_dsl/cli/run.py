@@ -140,7 +140,7 @@ def _backends(
 
 def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> tuple[list[Outcome], bool]:
     """The outcomes, and whether the report holds all of them; without it they are told all the same."""
-    forget(report.resolve(), [job.plan.slug for job in jobs])
+    gone = forget(report.resolve(), [job.plan.slug for job in jobs])
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
     tests = {job.plan.slug: job.test for job in jobs}
@@ -158,7 +158,8 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> t
         history.save()
     stdout.writelines(f"{printable(problem)}\n" for problem in problems)
     summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
-    stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}\n")
+    instead = f", in place of an earlier one with {progress.count(gone)} that did not run now" if gone else ""
+    stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}{instead}\n")
     return outcomes, not unwritten
 
 

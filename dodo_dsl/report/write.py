@@ -33,8 +33,11 @@ class Drawable:
     folder: Path
 
 
-def forget(folder: Path, slugs: Sequence[str]) -> None:
-    """Removes what earlier runs wrote for the tests that they name, and for ``slugs``; other files stay."""
+def forget(folder: Path, slugs: Sequence[str]) -> int:
+    """Removes what earlier runs wrote for the tests that they name, and for ``slugs``; other files stay.
+
+    Returns how many tests of the earlier run are not among ``slugs``.
+    """
     try:
         earlier = [outcome.slug for outcome in results.load(folder / results.FILE_NAME)]
     except results.ResultsError:
@@ -42,6 +45,7 @@ def forget(folder: Path, slugs: Sequence[str]) -> None:
     for slug in {*slugs, *earlier}:
         if SLUG.fullmatch(slug):
             _forget_test(folder / slug)
+    return len({*earlier} - {*slugs})
 
 
 def _forget_test(place: Path) -> None:

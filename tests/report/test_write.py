@@ -67,7 +67,7 @@ def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
     (tmp_path / "project" / "logs").mkdir()
     document = json.loads(results.to_json([replace(OUTCOME, slug="gone"), replace(OUTCOME, slug="..")]))
     (report / "results.json").write_text(json.dumps(document))
-    forget(report, ["test"])
+    assert forget(report, ["test"]) == 2
     assert sorted(p.name for p in report.iterdir()) == ["results.json", "test"]
     assert [p.name for p in (report / "test").iterdir()] == ["notes.txt"]
     assert (tmp_path / "project" / "logs").is_dir()
