@@ -5,9 +5,10 @@ import json
 import shlex
 from typing import TextIO
 
+from dodo_dsl.cli import selection
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.compiler import Checked, load
-from dodo_dsl.diagnostics import did_you_mean, format_text, printable, shown_path
+from dodo_dsl.compiler import Checked, load, without_unfed
+from dodo_dsl.diagnostics import did_you_mean, printable, shown_path
 
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
@@ -15,6 +16,8 @@ EXAMPLES = """examples:
   dodo list --services integrator    one of them: parameters, messages
   dodo list --json          for programs
 """
+
+_MOST_FILES = 3
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -25,20 +28,29 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    checked = load([])
+    everything = load([])
     if options.services:
-        return _explain(checked, options.services, stdout, stderr)
+        return _explain(everything, options.services, stdout, stderr)
     of_services = options.services is not None
-    rows = _services(checked) if of_services else _tests(checked)
+    rows = _services(everything) if of_services else _tests(everything)
     if options.json:
         stdout.write(json.dumps(rows, indent=2) + "\n")
     else:
         columns = ("name", "layers", "description") if of_services else ("name", "level", "kind", "description")
         _table(rows, columns, stdout)
+    checked = without_unfed(everything)
+    stderr.write(selection.left_out(checked))
     if checked.ok:
         return Exit.OK
-    stderr.write(format_text(checked.diagnostics))
+    stderr.write(f"problems in {_places(checked)}; dodo compile --check shows them\n")
     return Exit.USAGE
+
+
+def _places(checked: Checked) -> str:
+    """The files with errors, a few by name."""
+    files = sorted({shown_path(d.span.file) for d in checked.diagnostics if d.severity == "error"})
+    more = f" and {len(files) - _MOST_FILES} more files" if len(files) > _MOST_FILES else ""
+    return printable(", ".join(files[:_MOST_FILES]) + more)
 
 
 def _tests(checked: Checked) -> list[dict[str, str]]:
@@ -70,7 +82,10 @@ def _explain(checked: Checked, name: str, stdout: TextIO, stderr: TextIO) -> int
     stdout.write(f"{manifest.name} ({', '.join(manifest.layers)}): {manifest.description}\n\nparameters:\n")
     for parameter in manifest.parameters.values():
         default = "" if parameter.default in (None, []) else f", default {parameter.default}"
-        facts = "required" if parameter.required else f"{parameter.type}{default}"
+        facts = f"{parameter.type}{default}"
+        if parameter.required:
+            others = [*["another service of the test"] * parameter.shared, *["the rig"] * bool(parameter.rig)]
+            facts += f", required unless {' or '.join(others)} has it" if others else ", required"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
         stdout.write(f"  {parameter.name}: {facts} {unit}".rstrip() + f"\n      {parameter.help}\n")
     for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):

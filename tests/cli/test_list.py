@@ -1,0 +1,44 @@
+"""``dodo list`` shows what there is, whatever is wrong with some of it."""
+
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.cli.main import main
+
+
+def dodo(*words: str) -> tuple[int, str, str]:
+    stdout, stderr = StringIO(), StringIO()
+    code = main(words, stdout, stderr)
+    return code, stdout.getvalue(), stderr.getvalue()
+
+
+def test_a_broken_test_is_one_line_beside_the_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert dodo("new", "--deployment")[0] == dodo("new", "mine")[0] == dodo("new", "other")[0] == 0
+    spec = tmp_path / "tests/mine/mine.dodo.yml"
+    spec.write_text(spec.read_text().replace("9.5 cm", "9.5").replace("level: sil", "level: sail"))
+    code, out, err = dodo("list")
+    assert (code, [line.split()[0] for line in out.splitlines()]) == (2, ["mine", "other"])
+    assert err == "problems in tests/mine/mine.dodo.yml; dodo compile --check shows them\n"
+
+
+def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    dodo("new", "--deployment")
+    deployment = tmp_path / "dodo.yml"
+    deployment.write_text(deployment.read_text().replace("[tests]", '["dodo:"]'))
+    code, out, err = dodo("list")
+    assert code == 0
+    assert "\nsil-perception" in out
+    assert err.startswith(
+        "left out of the shipped tests: hil-camera, hil-camera-scenes, sil-perception, as the application"
+    )
+
+
+def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
+    code, out, _ = dodo("list", "--services", "collision")
+    assert code == 0
+    assert "  map-path: path, required unless another service of the test has it\n" in out
+    assert "  message: message, required\n" in dodo("list", "--services", "continuous-signal")[1]
