@@ -11,7 +11,7 @@ from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.run import leases, rigs
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.values import ValueProblem, convert
@@ -78,6 +78,8 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         stdout.write(json.dumps(results, indent=2) + "\n")
     else:
         stdout.writelines(f"{_sentence(result)}\n" for result in results)
+        if not results:
+            stdout.write(f"{FILE_NAME} has no rigs; every machine has '{EMULATED}': dodo rig status {EMULATED}\n")
     if any(result.get("error") for result in results):
         return Exit.ERROR
     return Exit.PROBLEMS if any(result["quarantine"] for result in results) else Exit.OK

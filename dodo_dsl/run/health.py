@@ -13,12 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from dodo_dsl import data
 from dodo_dsl.run import lanes, leases, projects, rigs
 from dodo_dsl.run.client import connect
 from dodo_dsl.run.events import BackendError
 
 State = Literal["ok", "warning", "problem"]
 
+FIRMWARE = "DODO_FIRMWARE"
+EMULATOR_PLACES = (data.root() / "build" / "firmware", Path("/opt/dodo/firmware"))
 _PORT = 12175
 _RECEIVE_BUFFER = 26_214_400
 _COMPOSE = (2, 20)
@@ -168,6 +171,18 @@ def _rigs() -> Iterator[Finding]:
         yield Finding(f"rig {rig}", "problem", f"in quarantine: {reason}", f"mend it, then dodo rig clear {rig}")
 
 
+def _emulated_rig() -> Iterator[Finding]:
+    """The programs that a gantry with ``--serial=emulated`` starts."""
+    named = os.environ.get(FIRMWARE)
+    places = (Path(named),) if named else EMULATOR_PLACES
+    found = next((p for p in places if all((p / name).is_file() for name in ("rig-emulator", "gantry.elf"))), None)
+    if found:
+        yield Finding("emulated rig", "ok", f"is built, in {found}")
+    else:
+        advice = f"hil tests on it need it: make firmware in DoDo's checkout, or set {FIRMWARE} to its folder"
+        yield Finding("emulated rig", "warning", f"is not built: it is not in {' or '.join(map(str, places))}", advice)
+
+
 CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
     _namespaces,
     _multicast,
@@ -178,6 +193,7 @@ CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
     _compose,
     _left_behind,
     _rigs,
+    _emulated_rig,
 )
 
 

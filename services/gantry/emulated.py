@@ -115,5 +115,5 @@ def _folder() -> Path:
         if (folder / "rig-emulator").is_file() and (folder / "gantry.elf").is_file():
             return folder
     raise PortError(
-        f"the emulated rig is not built: `make firmware` builds it, and {FOLDER} names its folder elsewhere"
+        f"the emulated rig is not built: `make firmware` builds it in DoDo's checkout, or set {FOLDER} to its folder"
     )
