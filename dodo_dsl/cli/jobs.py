@@ -82,6 +82,14 @@ def _load_plan(folder: Path) -> Plan:
         raise Usage(f"{folder / PLAN_FILE}: {error}") from error
 
 
+def _kept_clock(names: Sequence[str]) -> str:
+    """A note about tests on hardware, which run by no other clock than their own."""
+    if not names:
+        return ""
+    who = f"{names[0]} runs" if len(names) == 1 else f"{names[0]} and {len(names) - 1} more run"
+    return f"note: {who} in real time, as hardware does not wait\n"
+
+
 def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Plan], Deployment]:
     checked = selection.select(options.test, options.level, options.application)
     stdout.write(selection.left_out(checked))
@@ -89,6 +97,7 @@ def _compile(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple
         raise Usage("there is no test to run")
     if options.clock:
         checked = with_clock(checked, options.clock)
+        stdout.write(_kept_clock([s.title for s in checked.specs if s.clock != options.clock]))
     if options.isolation:
         checked = with_isolation(checked, options.isolation)
     problems = checked.diagnostics
