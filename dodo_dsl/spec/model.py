@@ -9,12 +9,13 @@ from typing import Any
 
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, read
-from dodo_dsl.spec import extends, matrix, quantity
+from dodo_dsl.spec import commas, extends, matrix, quantity
 from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.schema import validate
 
 LAYERS = ("environment", "action", "evaluation")
+_MAPPINGS = (*LAYERS, matrix.KEY, "record")
 MAX_SERVICES = 100
 """Of a layer, as the schema has it."""
 
@@ -79,7 +80,7 @@ def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
         if not found:
             found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
         return [Spec(location)], found
-    node, problems = extends.resolve(node, location.path, location.root)
+    node, problems = extends.resolve(commas.joined(node), location.path, location.root)
     is_whole = not has_errors(problems) and extends.is_text(node)
     found = [*found, *problems]
     choices, problems = matrix.choices(node)
@@ -168,9 +169,14 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         uses=uses,
         choice=choice,
         spans={key: entry.value.span for key, entry in node.entries.items()},
-        is_whole=is_whole and len(uses) == _written_services(node),
+        is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),
     )
     return spec, found
+
+
+def _has_stranger(node: Mapping) -> bool:
+    """Whether an unknown key holds a mapping, which is likely a layer with a misspelt name."""
+    return any(k not in _MAPPINGS and isinstance(e.value, Mapping) for k, e in node.entries.items())
 
 
 def _written_services(node: Mapping) -> int:

@@ -67,7 +67,9 @@ def convert(value: object, unit: str) -> Decimal:
     if unit == SHARE and (not match or _DIMENSION.get(match["unit"] or SHARE) != "share"):
         raise QuantityError(f"'{text}' is no share", "write for example 0.5 or 50 %")
     if not match:
-        raise QuantityError(f"'{text}' is not a quantity in {unit}", _example("1", unit))
+        point = text.replace(",", ".", 1)
+        hint = f"write '{point}', with a point" if _QUANTITY.fullmatch(point) else _example("1", unit)
+        raise QuantityError(f"'{text}' is not a quantity in {unit}", hint)
     if match["unit"] is None and unit == SHARE:
         return _converted(match["number"], SHARE, unit)
     if match["unit"] is None:

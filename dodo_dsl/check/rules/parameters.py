@@ -16,6 +16,8 @@ from dodo_dsl.spec.values import ValueProblem, convert
 
 def check(context: Context) -> Iterator[Diagnostic]:
     for use, manifest in context.known_uses():
+        if use.layer not in manifest.layers:
+            continue  # it may be another service that is meant
         yield from _written(context, use, manifest)
         yield from _taken(context, use, manifest)
         yield from _missing(context, use, manifest)
@@ -50,6 +52,8 @@ def _missing(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnos
             continue
         if parameter.rig and context.rig and context.rig.entry(parameter.rig):
             continue
+        if parameter.shared and not context.spec.is_whole:
+            continue  # a service that could not be read may give it
         givers = _givers(context, parameter.name) if parameter.shared else {}
         if len(givers) == 1:
             continue

@@ -21,7 +21,10 @@ def check(context: Context) -> Iterator[Diagnostic]:
     ):
         return  # what stands in a wrong place, or is unknown, is to be mended first
     wiring = wire(context)
+    misspelt = any(e.port.name not in context.messages for e in wiring.application_says if e.port.kind == "message")
     for end in wiring.heard:
+        if misspelt and end.port.may_be_asked:
+            continue  # the misspelt one may be it
         if not end.port.optional and not wiring.producers(end.port) and not wiring.application_may_say(end.port):
             yield _unfed(context, wiring, end)
     yield from _twice(wiring)
