@@ -134,7 +134,8 @@ def _backends(
         return Containers(subnets(deployment.subnets))
     without = sorted({s.name for p in plans for s in p.application.services if not s.process})
     if without:
-        raise Usage(f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs")
+        way = "write for example 'x-dodo-process: [python, main.py]' at it, or run with --backend docker"
+        raise Usage(f"application service '{without[0]}' has no 'x-dodo-process', which processes need; {way}")
     return Processes(deployment.cids, options.isolation, (descriptor,))
 
 

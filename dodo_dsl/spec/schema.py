@@ -106,7 +106,8 @@ def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
     # jsonschema reports each missing key by itself, in the order of the schema
     missing = next(n for n in error.validator_value if n not in error.instance and f"'{n}'" in error.message)
     about = (error.schema.get("properties") or place.about).get(missing, {})
-    hint = about.get("description", "") if isinstance(about, dict) else ""
+    about = about if isinstance(about, dict) else {}
+    hint = f"write '{missing}: {about['const']}'" if "const" in about else about.get("description", "")
     yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
 
 
@@ -120,6 +121,8 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{place.name} {found}, expected {' or '.join(names)}"
     is_scalar = isinstance(error.instance, int | float)
     hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
+    if not hint and wanted == "array" and "examples" in error.schema:
+        hint = f"write for example {place.name[1:-1]}: [{', '.join(error.schema['examples'][0])}]"
     yield Diagnostic(place.span, "wrong-type", message, hint)
 
 
@@ -145,7 +148,8 @@ def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{place.name} is {_shown(error.instance)}, expected {error.validator_value}"
-    yield Diagnostic(place.span, "wrong-value", message, error.schema.get("description", ""))
+    hint = f"write '{place.name[1:-1]}: {error.validator_value}'"
+    yield Diagnostic(place.span, "wrong-value", message, hint)
 
 
 def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:

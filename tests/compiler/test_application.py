@@ -38,6 +38,7 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> 
     folder = tmp_path / "team"
     folder.mkdir()
     (folder / "docker-compose.yml").write_text(text)
+    (folder / "perception.py").touch()
     source, problems = read_application(folder / "docker-compose.yml")
     assert problems == []
     assert source is not None

@@ -59,6 +59,9 @@ def unknown_keys(service: Node) -> Iterator[Diagnostic]:
         if word.startswith("x-dodo") and word not in KEYS:
             hint = did_you_mean(word, KEYS)
             yield Diagnostic(entry.key, "unknown-key", f"DoDo knows no key '{word}'", hint)
+        elif word not in KEYS and word.startswith("x-do") and did_you_mean(word, KEYS).startswith("did"):
+            message = f"the key '{word}' says nothing, neither to compose nor to DoDo"
+            yield Diagnostic(entry.key, "unknown-key", message, did_you_mean(word, KEYS), "warning")
 
 
 def _name(written: Written) -> Iterator[Diagnostic]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.diagnostics import Diagnostic, has_errors
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, has_errors
 from dodo_dsl.plan import argv
 from dodo_dsl.plan.application.environment import env_files, image_variable, told_in_files
 from dodo_dsl.plan.application.files import Files
@@ -18,6 +18,7 @@ from dodo_dsl.plan.variables import names
 from dodo_dsl.spec.schema import validate
 
 MAX_SERVICES = 256
+INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 _OURS = ("services", "version", "name", "networks", "include")
 
 
@@ -96,6 +97,7 @@ def _judged(application: ApplicationSource, services: source.Mapping, folder: Pa
         )
         found.extend(problems(written))
         found.extend(_missing_files(node, folder))
+        found.extend(_missing_program(node, folder))
     found.extend(_circles(application))
     found.extend(_same_variable(application))
     yield from found
@@ -109,6 +111,21 @@ def _missing_files(node: source.Mapping, folder: Path) -> Iterator[Diagnostic]:
         if required and is_local and not (folder / word.text).is_file():
             hint = "write it, or {path: ..., required: false}"
             yield Diagnostic(word.span, "application-file", f"there is no file '{word.text}' beside this one", hint)
+
+
+def _missing_program(node: source.Mapping, folder: Path) -> Iterator[Diagnostic]:
+    """A script of ``x-dodo-process`` that is not there; other programs may be built later, or lie in the PATH."""
+    process = node.get("x-dodo-process")
+    words = process.items if isinstance(process, source.Sequence) else ()
+    if len(words) < 2 or plain(words[0]) not in INTERPRETERS:
+        return
+    script = words[1]
+    text = script.text if isinstance(script, source.Scalar) else ""
+    if text and not text.startswith("-") and "$" not in text and not (folder / text).is_file():
+        message = f"there is no file '{text}' beside this one for {plain(words[0])} to run"
+        beside = [path.name for path in folder.iterdir() if path.suffix == Path(text).suffix]
+        hint = did_you_mean(Path(text).name, beside) or "without it the application starts in containers only"
+        yield Diagnostic(script.span, "application-file", message, hint, "warning")
 
 
 def _circles(application: ApplicationSource) -> Iterator[Diagnostic]:
