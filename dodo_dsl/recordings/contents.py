@@ -11,6 +11,8 @@ from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.varints import Numbers
 from dodo_dsl.recordings.frames import IMAGE, decoded
 
+_DAY = 86_400_000_000
+
 
 @dataclass(frozen=True)
 class Stream:
@@ -35,13 +37,18 @@ class Frames:
 
 @dataclass(frozen=True)
 class Contents:
-    """Begin and duration in s, from sample times where there are any; `unordered` counts steps back in time."""
+    """Begin and duration in s, from sample times where there are any; `unordered` counts steps back in time.
+
+    `apart` messages are more than a day away from most others and do not count for these: in lockstep, what an
+    application stamps with the time of its machine lies years from the time of the test.
+    """
 
     size: int
     envelopes: int
     begin: float | None
     duration: float
     unordered: int
+    apart: int
     untimed: int
     message_set: str
     streams: list[Stream]
@@ -68,18 +75,28 @@ def look(
     `problem` is told what cannot be decoded at all.
     """
     times = recording.index["time"]
-    known = times[times != 0]
+    stamped = times[times != 0]
+    known = _together(stamped)
     return Contents(
         size=recording.size,
         envelopes=len(recording),
         begin=int(known.min()) / 1e6 if len(known) else None,
         duration=int(known.max() - known.min()) / 1e6 if len(known) else 0.0,
         unordered=int((np.diff(known) < 0).sum()),
+        apart=len(stamped) - len(known),
         untimed=int((recording.index["sampled"] == 0).sum()),
         message_set=message_set,
         streams=_streams(recording, messages),
         frames=_frames(recording, progress, problem),
     )
+
+
+def _together(times: Numbers) -> Numbers:
+    """The times in us, as they stand, of the largest group without a gap of a day; the earliest of such groups."""
+    ordered = np.sort(times)
+    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _DAY) + 1)
+    largest = max(groups, key=len)
+    return times[(times >= largest[0]) & (times <= largest[-1])] if len(largest) else times
 
 
 def _streams(recording: Recording, messages: MessageSet) -> list[Stream]:

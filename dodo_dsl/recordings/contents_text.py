@@ -14,6 +14,9 @@ def contents_text(found: Contents, recording: Recording) -> str:
     lines = [f"{recording.path}: {found.envelopes} messages in {found.duration:.1f} s, {found.size} bytes"]
     if found.begin is not None:
         lines.append(f"begins {datetime.fromtimestamp(found.begin, UTC):%Y-%m-%d %H:%M:%S} UTC")
+    if found.apart:
+        are = "1 message is" if found.apart == 1 else f"{found.apart} messages are"
+        lines.append(f"{are} of another day than these, and not counted in them")
     lines.append(f"message set {found.message_set}")
     if found.frames.packets:
         told = "not decoded" if found.frames.decoded is None else f"{found.frames.decoded} decoded"

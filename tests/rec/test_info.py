@@ -21,6 +21,24 @@ def test_messages_rates_and_gaps(record: Callable[..., Path]) -> None:
     )
 
 
+def test_times_of_another_day_make_no_duration(record: Callable[..., Path]) -> None:
+    """In lockstep an application's status may carry the machine's time among times of the test."""
+    status = "opendlv.system.SystemStatusMessage"
+    times = [0, 100_000, 200_000, 500_000]
+    envelopes = [message(STEERING, BEGIN + time, 3, groundSteering=0.1) for time in times]
+    years = 95_288_782_000_000
+    path = record([*envelopes[:2], message(status, BEGIN + years, 1), *envelopes[2:]])
+    head, begin, apart = dodo_rec("info", path).stdout.splitlines()[:3]
+    assert head.startswith(f"{path}: 5 messages in 0.5 s, ")
+    assert begin == "begins 2023-11-14 22:13:20 UTC"
+    assert apart == "1 message is of another day than these, and not counted in them"
+    found = json.loads(dodo_rec("info", "--json", path).stdout)
+    assert (found["duration"], found["apart"], found["unordered"]) == (0.5, 1, 0)
+    path = record([message(status, BEGIN - years, 1), *envelopes, *[message(status, BEGIN + years, 1)] * 2])
+    found = json.loads(dodo_rec("info", "--json", path).stdout)
+    assert (found["begin"], found["duration"], found["apart"]) == (BEGIN / 1e6, 0.5, 3)
+
+
 def test_json_for_programs(record: Callable[..., Path]) -> None:
     frames = video(12)
     envelopes = [message(STEERING, BEGIN, 1), *frames, message("dodo.EndOfInput", 0)]
