@@ -28,3 +28,4 @@ class Outcome:
     checks: tuple[dict[str, Any], ...] = ()
     last_lines: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    description: str = ""

@@ -29,6 +29,7 @@ def writable(outcome: Outcome) -> Outcome:
         outcome,
         name=_written(outcome.name),
         spec=_written(outcome.spec),
+        description=_written(outcome.description),
         reason=_written(outcome.reason),
         last_lines=tuple(map(_written, outcome.last_lines)),
         notes=tuple(map(_written, outcome.notes)),

@@ -1,6 +1,7 @@
 """A run's report folder."""
 
 import contextlib
+import os
 import platform
 import re
 import shutil
@@ -15,6 +16,7 @@ from dodo_dsl.report import html, junit, metrics, results
 from dodo_dsl.report.drive import read_drive
 from dodo_dsl.report.times import Times
 from dodo_dsl.report.times import draw as draw_times
+from dodo_dsl.spec.registry import SUFFIX
 
 RECORDING = "test.rec"
 TRAJECTORY = "trajectory.png"
@@ -22,6 +24,7 @@ SNAPSHOT = "snapshot.png"
 TIMES = "times.png"
 LOGS, ATTEMPTS = "logs", "attempts"
 SANDBOX_LOG = "sandbox.log"
+_LONGEST_PATH = 1000
 SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 
 
@@ -95,7 +98,10 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
     write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     replace_file(folder / "junit.xml", lambda path: junit.write(path, outcomes, attachments))
     write_text(folder / "metrics.txt", metrics.to_text(outcomes))
-    write_text(folder / "index.html", html.render(outcomes, pictures, _logs(folder, outcomes), times))
+    files = html.Files(
+        pictures, _logs(folder, outcomes), _recordings(folder, outcomes), _specs(folder, outcomes), times
+    )
+    write_text(folder / "index.html", html.render(outcomes, files))
 
 
 def _pictures(folder: Path, outcome: Outcome) -> list[html.Picture]:
@@ -118,6 +124,21 @@ def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
     return {
         o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / LOGS).glob("*.log"))]
         for o in outcomes
+    }
+
+
+def _recordings(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
+    names = {o.slug: f"{o.slug}/{RECORDING}" for o in outcomes}
+    return {slug: name for slug, name in names.items() if (folder / name).is_file()}
+
+
+def _specs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
+    """The specs that lie below the working folder, as seen from the report."""
+    paths = {o.slug: Path.cwd() / o.spec for o in outcomes if len(o.spec) < _LONGEST_PATH}
+    return {
+        slug: Path(os.path.relpath(path, folder.resolve())).as_posix()
+        for slug, path in paths.items()
+        if path.name.endswith(SUFFIX) and path.is_file()
     }
 
 

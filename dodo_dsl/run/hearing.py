@@ -134,6 +134,7 @@ class Hearing:
             name=plan.name,
             slug=plan.slug,
             spec=plan.spec,
+            description=plan.description,
             level=plan.level,
             kind=plan.kind,
             outcome=finding.result,

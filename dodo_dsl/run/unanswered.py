@@ -18,6 +18,7 @@ def without_answer(plan: Plan, backend: str, why: str) -> Outcome:
         name=plan.name,
         slug=plan.slug,
         spec=plan.spec,
+        description=plan.description,
         level=plan.level,
         kind=plan.kind,
         outcome="error",

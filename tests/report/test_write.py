@@ -11,6 +11,7 @@ from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages import MessageSet
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
+from dodo_dsl.report.html import MEANINGS
 from dodo_dsl.report.write import Drawable, forget, write_report
 from tests.run.helpers import Bench
 
@@ -55,6 +56,32 @@ def test_a_snapshot_is_shown_beside_the_drive(tmp_path: Path) -> None:
         "drive/trajectory.png",
         "look/snapshot.png",
     ]
+
+
+def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    report = tmp_path / "out" / "report"
+    recording(report / "test" / "test.rec", frame(0), frame(1))
+    checks = tuple({"name": name, "value": 2, "limit": {}, "unit": "", "ok": True} for name in ("late", "mean"))
+    outcome = replace(OUTCOME, description="Drive & turn.", checks=checks)
+    other = replace(OUTCOME, name="other", slug="other", spec="t/gone.dodo.yml")
+    spec = tmp_path / "t" / "t.dodo.yml"
+    spec.parent.mkdir()
+    spec.touch()
+    write_report(report, [outcome, other], {})
+    page = (report / "index.html").read_text()
+    assert '<p class="about">Drive &amp; turn.</p>' in page
+    assert page.count('class="about"') == 1
+    assert re.findall(r'href="([^"#]*)"', page) == ["../../t/t.dodo.yml", "test/test.rec"]
+    assert "Test: t/gone.dodo.yml" in page
+    assert "<td>late<br><small>detections that came when their frame was judged already, left out</small></td>" in page
+    assert "<td>mean</td>" in page
+
+
+def test_what_the_page_explains_are_checks_of_services() -> None:
+    folder = Path(__file__).parents[2] / "services"
+    pages = "".join((folder / name / "README.md").read_text() for name in ("continuous_signal", "object_detection"))
+    assert [name for name in MEANINGS if f"`{name}`" not in pages] == []
 
 
 def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
