@@ -12,7 +12,7 @@ from dodo_dsl.source import Mapping as Written
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import extends
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.model import LAYERS, Spec
 from dodo_dsl.spec.values import ValueProblem, convert
 
 _NAME = re.compile(r"^name: .*$", re.MULTILINE)
@@ -38,7 +38,9 @@ def _text(name: str, base: Spec) -> bytes:
     resolved = extends.resolve(node, base.path, base.location.root)[0] if node else None
     if not isinstance(resolved, Written):
         raise NoStart(f"'{base.name}' cannot be read, so it cannot be copied")
-    keys = {"dodo": 1, "name": name, **{k: v for k, v in plain(resolved).items() if k not in ("dodo", "name")}}
+    written = plain(resolved)
+    rest = {key: value for key, value in written.items() if key not in ("dodo", "name", *LAYERS)}
+    keys = {"dodo": 1, "name": name, **rest, **{key: written[key] for key in LAYERS if key in written}}
     text = yaml.safe_dump(keys, sort_keys=False, default_flow_style=None, width=1000, allow_unicode=True)
     return str(text).encode()
 
