@@ -58,7 +58,7 @@ def _word(flag: Flag) -> str:
 
 def _environment(plan: Plan, service: Service) -> tuple[tuple[str, str], ...]:
     messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
-    own = {"DODO_SERVICE": service.name, "DODO_ODVD": messages, **plan.clock_variables}
+    own = {"DODO_SERVICE": service.name, "DODO_ODVD": messages, **plan.variables}
     return tuple((name, value) for name, value in own.items() if value)
 
 

@@ -121,9 +121,10 @@ class Plan:
     source_map: dict[str, Place] = field(default_factory=dict)
 
     @property
-    def clock_variables(self) -> dict[str, str]:
-        """Environment variables by which the test's services know their clock."""
-        return {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
+    def variables(self) -> dict[str, str]:
+        """Environment variables by which the test's services know their clock and that they are on a rig."""
+        stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
+        return {**stepped, **({"DODO_RIG": self.rig} if self.rig else {})}
 
     def layer(self, name: str) -> tuple[Service, ...]:
         return tuple(s for s in self.services if s.layer == name)

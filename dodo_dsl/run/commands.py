@@ -59,7 +59,7 @@ class Commands:
             "DODO_READY_FILE": ready_file(self.lane.name, service.name),
             "DODO_LANE": self.lane.name,
             "DODO_ODVD": os.pathsep.join(str(self.folder / "files" / path) for path in self.plan.messages),
-            **self.plan.clock_variables,
+            **self.plan.variables,
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         module = _is_module(service.process)

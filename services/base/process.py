@@ -76,7 +76,8 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
             session = resources.enter_context(Session(flags["cid"], _messages()))
             resources.enter_context(published(session, flags["log-id"]))
             clock = clock or _clock(session, role)
-            service = build(Context(name, flags, session.messages, resources, clock, session))
+            on_rig = bool(os.environ.get("DODO_RIG"))
+            service = build(Context(name, flags, session.messages, resources, clock, session, on_rig))
             code = BROKEN
             loop = Loop(role, service, session, clock, flags["id"])
             resources.enter_context(_readiness(ready))

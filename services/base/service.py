@@ -69,6 +69,8 @@ class Context:
     clock: Clock = field(default_factory=RealTimeClock)
     session: Session | None = None
     """The bus itself; only for a service that drives itself."""
+    on_rig: bool = False
+    """Whether the test runs on a rig, where a service that vanishes may have been unplugged."""
 
     @property
     def log(self) -> logging.Logger:

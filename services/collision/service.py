@@ -8,7 +8,7 @@ from typing import Any
 
 from google.protobuf.message import Message
 
-from services.base import Context, Flags, Handler, Output, RealTimeClock, Service
+from services.base import Context, Flags, Handler, Output, Service
 from services.collision.geometry import Box, Pose, heading_of
 from services.collision.model import REQUESTS, Judge, UnjudgeableError
 from services.collision.obstacles import load, pick
@@ -25,9 +25,9 @@ class Collision(Service):
     period = PERIOD
 
     def __init__(self, context: Context, wall: Callable[[], float] = time.monotonic) -> None:
-        """``wall`` in s: in real time a vehicle that vanishes is noticed."""
+        """``wall`` in s: on a rig it is an error when the vehicle vanishes."""
         self._wall = wall
-        self._is_realtime = isinstance(context.clock, RealTimeClock)
+        self._on_rig = context.on_rig
         self._seen: float | None = None
         self._gap = math.inf
         self._log = context.log
@@ -44,7 +44,7 @@ class Collision(Service):
     def update(self, now: int) -> Iterable[Message | Output]:
         self.judge.update(now)
         self.verdict = self.judge.verdict
-        if self.verdict is None and self._is_realtime and self._seen is not None:
+        if self.verdict is None and self._on_rig and self._seen is not None:
             self._miss(self._wall() - self._seen)
         return ()
 

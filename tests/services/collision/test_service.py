@@ -33,7 +33,7 @@ def lane(tmp_path: Path) -> Iterator[Path]:
     yield tmp_path
 
 
-def service(lane: Path, wall: Callable[[], float] = time.monotonic, **changes: Any) -> Collision:
+def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool = False, **changes: Any) -> Collision:
     flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
     none: dict[str, Any] = {"gates": [], "min-margin": 0.0}
     return Collision(
@@ -41,6 +41,7 @@ def service(lane: Path, wall: Callable[[], float] = time.monotonic, **changes: A
             "collision",
             Flags({**flags, **none, "map-path": str(lane), "frame-id": 2, **changes}),
             MessageSet.standard(),
+            on_rig=on_rig,
         ),
         wall,
     )
@@ -89,7 +90,7 @@ def test_a_frame_without_an_attitude_is_no_sample(lane: Path, caplog: pytest.Log
 
 def test_frames_that_stop_are_no_verdict_about_the_application(lane: Path) -> None:
     now = [100.0]
-    judge = service(lane, wall=lambda: now[0])
+    judge = service(lane, wall=lambda: now[0], on_rig=True)
     judge.begin(START)
     look = judge.inputs[FRAME, 2]
     for count in range(3):
@@ -102,9 +103,21 @@ def test_frames_that_stop_are_no_verdict_about_the_application(lane: Path) -> No
         judge.update(START + 20)
 
 
-def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
+def test_off_a_rig_a_vehicle_may_stop_telling_where_it_is(lane: Path) -> None:
     now = [100.0]
     judge = service(lane, wall=lambda: now[0])
+    judge.begin(START)
+    for count in range(3):
+        judge.inputs[FRAME, 2](frame(0, 0), START + count)
+        now[0] += 0.5
+    now[0] += 60.0
+    judge.update(START + 10)
+    assert judge.verdict is None
+
+
+def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
+    now = [100.0]
+    judge = service(lane, wall=lambda: now[0], on_rig=True)
     judge.begin(START)
     look = judge.inputs[FRAME, 2]
     look(frame(0, 0), START)
