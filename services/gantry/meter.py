@@ -1,8 +1,9 @@
 """How evenly the rig is told to move, and how long it takes to answer."""
 
+import statistics
 from array import array
-
-import numpy as np
+from collections.abc import Sequence
+from itertools import pairwise
 
 MOST = 1_000_000
 """Turns that are counted: 14 hours at 20 Hz."""
@@ -25,12 +26,12 @@ class Meter:
     @property
     def jitter(self) -> tuple[float, float, float]:
         """Median, 95 % and largest distance (s) of a period from the one that it should be; 0 before two turns."""
-        return _summary(np.abs(np.diff(np.array(self._began)) - self._period))
+        return _summary([abs(after - before - self._period) for before, after in pairwise(self._began)])
 
     @property
     def latency(self) -> tuple[float, float, float]:
         """Median, 95 % and largest time (s) from RUN, POSITION and STATUS to the last of the answers."""
-        return _summary(np.array(self._took))
+        return _summary(self._took)
 
     def __str__(self) -> str:
         missed = len(self._began) - len(self._took)
@@ -40,10 +41,10 @@ class Meter:
         )
 
 
-def _summary(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple[float, float, float]:
-    if not len(values):
-        return 0.0, 0.0, 0.0
-    return float(np.median(values)), float(np.quantile(values, 0.95)), float(values.max())
+def _summary(values: Sequence[float]) -> tuple[float, float, float]:
+    if len(values) < 2:
+        return (values[0],) * 3 if values else (0.0, 0.0, 0.0)
+    return statistics.median(values), statistics.quantiles(values, n=20, method="inclusive")[-1], max(values)
 
 
 def _text(summary: tuple[float, float, float]) -> str:
