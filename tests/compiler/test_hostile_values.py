@@ -214,6 +214,7 @@ def test_mutations_of_a_good_spec(folder: Path, data: st.DataObject) -> None:
             st.sampled_from(["", "\n", ": ", "{", "]", "- ", "&a ", "*a", "${matrix.a}", spec[begin:end] * 2])
         )
         spec = spec[:begin] + put + spec[end:]
+    compiled(folder, spec)  # which says what it takes the place of
     first = compiled(folder, spec)
     assert compiled(folder, spec) == first
 

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -138,7 +139,12 @@ def test_the_rig_itself_saw_no_limit_passed_and_knows_where_it_stands(tmp_path: 
 
 
 def test_the_rig_goes_its_way_whatever_the_application_does(tmp_path: Path) -> None:
-    test = run(tmp_path / "good", "hil-open-straight", code=0)
+    application = kiwi(tmp_path / "app", None, steering="--reverse")
+    words = ("hil-open-straight", "--application", str(application))
+    with ThreadPoolExecutor() as pool:
+        reversed_ = pool.submit(run, tmp_path / "bad", *words, code=1)
+        test = run(tmp_path / "good", "hil-open-straight", code=0)
+    assert reversed_.result()["reason"].startswith("the mean distance is ")
     assert (test["outcome"], test["kind"]) == ("passed", "open-loop")
     recording = tmp_path / "good" / "hil-open-straight" / "test.rec"
     measured, true = poses(recording, MEASURED), poses(recording, TRUE)
@@ -146,9 +152,6 @@ def test_the_rig_goes_its_way_whatever_the_application_does(tmp_path: Path) -> N
     same_at_rest(measured[-1], true[-1])
     way = np.loadtxt(ROOT / "tests_registry" / "targets" / "rig-straight.csv", delimiter=",", skiprows=1)
     assert np.abs(true[[0, -1], 1:3] - way[[0, -1], 1:3]).max() < 0.02
-    application = kiwi(tmp_path / "app", None, steering="--reverse")
-    test = run(tmp_path / "bad", "hil-open-straight", "--application", str(application), code=1)
-    assert test["reason"].startswith("the mean distance is ")
 
 
 def test_a_test_as_dodo_new_writes_it_passes_on_the_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,7 +171,11 @@ def test_a_reversed_application_hits_the_wall_on_the_rig(tmp_path: Path) -> None
 
 
 def test_the_static_rig_sees_its_board(tmp_path: Path) -> None:
-    test = run(tmp_path / "good", "hil-camera", code=0)
+    application = kiwi(tmp_path / "app", BLIND)
+    with ThreadPoolExecutor() as pool:
+        blind = pool.submit(run, tmp_path / "blind", "hil-camera", "--application", str(application), code=1)
+        test = run(tmp_path / "good", "hil-camera", code=0)
+    assert "no detection came" in blind.result()["reason"]
     assert test["outcome"] == "passed"
     report = tmp_path / "good"
     assert 'src="hil-camera/snapshot.png"' in (report / "index.html").read_text()
@@ -178,9 +185,6 @@ def test_the_static_rig_sees_its_board(tmp_path: Path) -> None:
     for label, x, y, width, height in TRUTH:
         blue, _, red = snapshot[round(y + 0.8 * height), round(x + width / 2)].tolist()
         assert (blue - red > 80) if label == "blue" else (red - blue > 80), (label, x, y)
-    application = kiwi(tmp_path / "app", BLIND)
-    test = run(tmp_path / "blind", "hil-camera", "--application", str(application), code=1)
-    assert "no detection came" in test["reason"]
 
 
 def test_the_static_rig_in_the_dusk_before_a_background(tmp_path: Path) -> None:

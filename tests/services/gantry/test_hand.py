@@ -64,6 +64,6 @@ def test_check_of_a_good_rig_and_of_one_that_loses_steps(rig: FakeRig) -> None:
     rig.homes_slowly, rig.at = True, [-0.85, -0.65, -2.5]
     said = hand(rig, "check")
     assert said["ok"] and {c["name"] for c in said["checks"]} >= {"answers", "latency", "homing x", "homing yaw"}
-    rig.lost = 0.01
+    rig.homes_slowly, rig.lost = False, 0.01
     said = hand(rig, "check", code=1)
     assert said["reason"].startswith("homing x is ")
