@@ -1,7 +1,7 @@
 """What is heard of one test while it runs, and what that decides."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.outcome import Outcome, Result
@@ -21,7 +21,7 @@ from dodo_dsl.run.events import (
     Unstartable,
     Verdict,
 )
-from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended, lost_messages
+from dodo_dsl.run.outcome import Facts, Finding, decide, how_it_ended, lost_messages, outcome_of
 
 
 class Ended(Exception):
@@ -130,19 +130,8 @@ class Hearing:
         plan, finding = self.plan, decide(self.facts)
         verdicts = [v for judge in self.facts.judges for v in self.facts.verdicts.get(judge, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
-        return Outcome(
-            name=plan.name,
-            slug=plan.slug,
-            spec=plan.spec,
-            description=plan.description,
-            level=plan.level,
-            kind=plan.kind,
-            outcome=finding.result,
-            reason=finding.reason,
-            cid=backend.cid,
-            seed=plan.seed,
-            clock=plan.clock,
-            backend=backend.name,
+        return replace(
+            outcome_of(plan, finding, backend.name, backend.cid),
             setup_s=self.setup_s,
             execution_s=self.finished - self.began if self.finished and self.began else None,
             sim_s=self.time.seconds if self.time else None,

@@ -4,8 +4,8 @@ import signal
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from dodo_dsl.outcome import Result
-from dodo_dsl.plan.model import Service
+from dodo_dsl.outcome import Outcome, Result
+from dodo_dsl.plan.model import Plan, Service
 from dodo_dsl.run.events import Verdict
 
 _RANK: dict[Result, int] = {"passed": 0, "failed": 1, "error": 2}
@@ -18,6 +18,24 @@ class Finding:
     result: Result
     reason: str
     service: str = ""
+
+
+def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
+    """A test's outcome as far as plan and finding tell it; ``backend`` by its name."""
+    return Outcome(
+        name=plan.name,
+        slug=plan.slug,
+        spec=plan.spec,
+        description=plan.description,
+        level=plan.level,
+        kind=plan.kind,
+        outcome=finding.result,
+        reason=finding.reason,
+        cid=cid,
+        seed=plan.seed,
+        clock=plan.clock,
+        backend=backend,
+    )
 
 
 @dataclass

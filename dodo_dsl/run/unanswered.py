@@ -6,6 +6,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.events import BackendError
+from dodo_dsl.run.outcome import Finding, outcome_of
 
 LOG = "logs/runner.log"
 """In a test's report: where a fault of DoDo's own lies."""
@@ -14,20 +15,7 @@ _MOST_LETTERS = 300
 
 def without_answer(plan: Plan, backend: str, why: str) -> Outcome:
     """The outcome of a test that never began."""
-    return Outcome(
-        name=plan.name,
-        slug=plan.slug,
-        spec=plan.spec,
-        description=plan.description,
-        level=plan.level,
-        kind=plan.kind,
-        outcome="error",
-        reason=why,
-        cid=plan.cid,
-        seed=plan.seed,
-        clock=plan.clock,
-        backend=backend,
-    )
+    return outcome_of(plan, Finding("error", why), backend, plan.cid)
 
 
 def reason(job: Job, error: Exception) -> str:

@@ -149,7 +149,7 @@ def test_the_registry_in_lockstep(tmp_path: Path) -> None:
     if why := namespaces_refusal():
         pytest.skip(f"no namespaces here: {why}")
     report = tmp_path / "report"
-    names = ("dil-*", "sil-open-*", "sil-closed-straight")
+    names = ("dil-*", "sil-open-*", "sil-closed-straight", "sil-closed-kiwi-track")
     dodo(*names, "--clock", "lockstep", "-j", "2", "--report", str(report), code=0)
     tests = results(report)
     assert {t["clock"] for t in tests.values()} == {"lockstep"}
@@ -191,8 +191,8 @@ def test_the_other_clock_for_one_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", [CURVE, "dil-static-rig"])
 def test_repeated_under_load_it_is_the_same(name: str, tmp_path: Path) -> None:
-    """Verdict, way and pictures of two runs beside processes that take all of the processor."""
-    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), name, "2", "5"]
+    """Verdict, way and pictures of three runs beside processes that take all of the processor."""
+    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), name, "3", "5"]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=240)
     assert result.returncode == 0, result.stdout + result.stderr
-    assert f"{name}: 2 of 2 runs gave " in result.stdout
+    assert f"{name}: 3 of 3 runs gave " in result.stdout
