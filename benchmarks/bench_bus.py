@@ -18,8 +18,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 COUNT, BURST, WINDOW, ROUNDS = 10_000, 100, 300, 15
 CID = 127

@@ -22,16 +22,16 @@ import cv2
 import numpy as np
 
 from benchmarks.gl_peer import GlPeer, ssim
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pinhole, Pose
-from services.virtual_camera.lens import Distortion
-from services.virtual_camera.light import Light
+from services.virtual_camera.draw.light import Light
+from services.virtual_camera.draw.raster import Image
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import Wishes, load_scene
+from services.virtual_camera.image.lens import Distortion
+from services.virtual_camera.image.optics import Optics
+from services.virtual_camera.image.sensor import Sensor
 from services.virtual_camera.motion import Motion, still
-from services.virtual_camera.optics import Optics
-from services.virtual_camera.raster import Image
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import Wishes, load_scene
-from services.virtual_camera.sensor import Sensor
 from services.virtual_camera.truth import Limits, Truth, classes_of
 
 SIZE, FOVY = (1280, 720), math.radians(48.8)
@@ -43,7 +43,7 @@ ONE_THREAD = dict.fromkeys(("LP_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_T
 
 def make_map(folder: Path) -> Path:
     """An oval of 45 yellow cones inside 45 blue ones, on the shipped textured floor."""
-    straight = data.registry() / "maps" / "straight"
+    straight = package_data.registry() / "maps" / "straight"
     for name in ("cone.obj", "floor.png"):
         shutil.copy(straight / name, folder / name)
     angles = np.arange(CONES // 2) * 2 * math.pi / (CONES // 2)

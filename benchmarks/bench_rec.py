@@ -14,10 +14,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import STANDARD, MessageSet
-from dodo_dsl.opendlv.recording import Recording, read_envelopes
-from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.odvd import STANDARD
+from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.recordings.writer import RecordingWriter
 
 ROOT = Path(__file__).parents[1]
 PEER = Path(sys.executable).with_name("cluon-rec2csv")

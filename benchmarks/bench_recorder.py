@@ -19,12 +19,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from bench_rec import drive
 from players import ROOT, Measured, peer, service, tool
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.opendlv.session import Session
-from dodo_dsl.opendlv.video import VideoDecoder
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.video.decoder import VideoDecoder
 
 CID, ROUNDS, SECONDS = 125, 5, 4.0
 MESSAGE_HZ, FRAME_HZ = 1000, 10

@@ -20,9 +20,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from bench_rec import drive
 from players import Measured, peer, service, tool
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.recording_writer import RecordingWriter
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.recordings.writer import RecordingWriter
 
 FAST, EVEN, ROUNDS = 50_000, 3_000, 5  # messages; those in real time are 2 ms apart, 6 s
 CID = 126

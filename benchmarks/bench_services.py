@@ -24,8 +24,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from tests.services.gantry.fakerig import FakeRig
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -8,19 +8,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pinhole, Pose
-from services.virtual_camera.lens import Distortion
-from services.virtual_camera.light import Light
+from services.virtual_camera.draw.light import Light
+from services.virtual_camera.draw.raster import Image
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import Wishes, load_scene
+from services.virtual_camera.image.lens import Distortion
+from services.virtual_camera.image.optics import Optics
+from services.virtual_camera.image.sensor import Sensor
 from services.virtual_camera.motion import Motion
-from services.virtual_camera.optics import Optics
-from services.virtual_camera.raster import Image
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import Wishes, load_scene
-from services.virtual_camera.sensor import Sensor
 from services.virtual_camera.truth import Limits, Truth, classes_of
 
-MAP = data.registry() / "maps" / "left-curve"
+MAP = package_data.registry() / "maps" / "left-curve"
 SIZE, FOVY, COLUMNS = (288, 216), math.radians(48.8), 4
 LABEL = 24
 PLACE = Pose.at(0.0, 0.2, 0.095, yaw=math.pi / 2)

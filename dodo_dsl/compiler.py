@@ -4,14 +4,15 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from dodo_dsl import data
+from dodo_dsl import package_data
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.read import read_application
 from dodo_dsl.check import check
 from dodo_dsl.check.context import Declared
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, ordered
+from dodo_dsl.emit.output_folder import pipeline_folder
 from dodo_dsl.emit.pipeline import pipeline_problems
 from dodo_dsl.emit.render import render_pipeline
-from dodo_dsl.emit.write import pipeline_folder
-from dodo_dsl.plan.application import ApplicationSource, read_application
 from dodo_dsl.plan.build import Compiled, build
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import Manifest, load_manifests
@@ -79,7 +80,7 @@ def without_unfed(checked: Checked, named: Collection[Path] = ()) -> Checked:
         path
         for path, specs in groups.items()
         if path not in named
-        and data.is_shipped(specs[0].location.root, checked.deployment.root)
+        and package_data.is_shipped(specs[0].location.root, checked.deployment.root)
         and any(d.rule in UNFED for d in found[path])
     }
     gone = {d for path in left_out for d in found[path]} - {d for p in groups.keys() - left_out for d in found[p]}

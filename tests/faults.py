@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.emit.write import write_text
+from dodo_dsl.emit.output_folder import write_text
 
 PAGE = Path(__file__).parents[1] / "docs" / "faults.md"
 FAULTS = (

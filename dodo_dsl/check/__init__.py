@@ -5,7 +5,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.check.context import Context, Declared, Rule
-from dodo_dsl.check.rules import clocks, layers, levels, messages, names, parameters, references, rigs, services, wiring
+from dodo_dsl.check.rules import (
+    clocks,
+    layers,
+    levels,
+    messages,
+    names,
+    parameters,
+    producers,
+    references,
+    rigs,
+    services,
+)
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
@@ -21,7 +32,7 @@ RULES: tuple[Rule, ...] = (
     parameters.check,
     messages.check,
     references.check,
-    wiring.check,
+    producers.check,
 )
 
 

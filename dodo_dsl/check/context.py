@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.odvd import STANDARD, parser
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec, Use
@@ -60,11 +60,11 @@ class Context:
 @functools.cache
 def known_messages(own: tuple[Path, ...]) -> frozenset[str]:
     """The names of the standard messages and of those in a deployment's files, as far as these can be read."""
-    names = {d.name for d in odvd.load(Path(odvd.__file__).parent / "messages.odvd")}
+    names = {d.name for d in parser.load(STANDARD)}
     for path in own:
         try:
-            names.update(d.name for d in odvd.load(path))
-        except odvd.OdvdError:
+            names.update(d.name for d in parser.load(path))
+        except parser.OdvdError:
             continue  # the deployment's own diagnostic
     return frozenset(names)
 

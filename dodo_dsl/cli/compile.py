@@ -9,7 +9,7 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, NoApplication, plan
 from dodo_dsl.diagnostics import FORMATS, Diagnostic, has_errors, ordered
-from dodo_dsl.emit.write import differences, stale_folders, write
+from dodo_dsl.emit.output_folder import differences, stale_folders, write
 
 EXAMPLES = """examples:
   dodo compile                             all tests of the deployment, into generated/

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import TextIO
 
-from dodo_dsl import catalogue
+from dodo_dsl.check import catalogue
 from dodo_dsl.check.context import Context
 from dodo_dsl.check.explanation import Asked, Explanation, Line, explain
 from dodo_dsl.cli import selection

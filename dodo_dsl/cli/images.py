@@ -7,7 +7,7 @@ from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import format_text, has_errors
-from dodo_dsl.images import context, docker, wheels
+from dodo_dsl.images import build_context, docker_command, wheels
 from dodo_dsl.images.names import Image, NoSuchImage, choose, known
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import load_manifests
@@ -55,12 +55,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         return Exit.USAGE
     try:
         images = _chosen(options, deployment)
-        docker.require_engine()
+        docker_command.require_engine()
         return _build(options, images, stdout) if options.action == "build" else _push(images, stdout)
     except (NoSuchImage, _Usage) as error:
         stderr.write(f"dodo images: {error}\n")
         return Exit.USAGE
-    except (docker.DockerError, wheels.WheelsError) as error:
+    except (docker_command.DockerError, wheels.WheelsError) as error:
         stderr.write(f"dodo images: {error}\n")
         return Exit.ERROR
 
@@ -74,22 +74,24 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
 
 
 def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> int:
-    docker.require_buildx()
-    packages = _packages(options.base_image or context.default_base_image(), stdout) if options.offline_wheels else None
+    docker_command.require_buildx()
+    packages = (
+        _packages(options.base_image or build_context.default_base_image(), stdout) if options.offline_wheels else None
+    )
     with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
         folder = Path(name) / "dodo-images"
         folder.mkdir()
-        context.assemble(folder, packages)
-        context.define(folder, images, options.base_image, options.source)
+        build_context.assemble(folder, packages)
+        build_context.define(folder, images, options.base_image, options.source)
         progress = "auto" if stdout.isatty() else "plain"
-        words = ("buildx", "bake", "--file", context.DEFINITION, "--progress", progress)
-        code, output = docker.show(words, stdout, folder)
+        words = ("buildx", "bake", "--file", build_context.DEFINITION, "--progress", progress)
+        code, output = docker_command.show(words, stdout, folder)
     if code:
         hint = f"; {_INDEX_HINT}" if packages is None and (stdout.isatty() or "requirements/install" in output) else ""
-        raise docker.DockerError(f"the images cannot be built, the reason stands above{hint}")
+        raise docker_command.DockerError(f"the images cannot be built, the reason stands above{hint}")
     width = max(len(image.reference) for image in images)
     for image in images:
-        stdout.write(f"built {image.reference:<{width}}  {docker.size(image.reference) / 1e6:.0f} MB\n")
+        stdout.write(f"built {image.reference:<{width}}  {docker_command.size(image.reference) / 1e6:.0f} MB\n")
     return Exit.OK
 
 
@@ -101,15 +103,15 @@ def _packages(base_image: str, stdout: TextIO) -> Path:
 
 
 def _push(images: list[Image], stdout: TextIO) -> int:
-    missing = [image for image in images if not docker.is_local(image.reference)]
+    missing = [image for image in images if not docker_command.is_local(image.reference)]
     if missing:
         names = " ".join(image.name for image in missing)
         raise _Usage(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
     for number, image in enumerate(images, 1):
         stdout.write(f"[{number}/{len(images)}] {image.reference}\n")
-        code, output = docker.show(("push", image.reference), stdout)
+        code, output = docker_command.show(("push", image.reference), stdout)
         if code:
             denied = any(word in output for word in ("denied", "unauthorized", "no basic auth"))
             hint = f"; log in with: docker login {image.reference.partition('/')[0]}" if denied else ""
-            raise docker.DockerError(f"{image.reference} cannot be pushed, the reason stands above{hint}")
+            raise docker_command.DockerError(f"{image.reference} cannot be pushed, the reason stands above{hint}")
     return Exit.OK

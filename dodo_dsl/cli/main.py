@@ -13,12 +13,12 @@ from dodo_dsl.cli import doctor as doctor_command
 from dodo_dsl.cli import explain as explain_command
 from dodo_dsl.cli import images as images_command
 from dodo_dsl.cli import list as list_command
-from dodo_dsl.cli import new as new_command
-from dodo_dsl.cli import rec as rec_command
 from dodo_dsl.cli import report as report_command
-from dodo_dsl.cli import rig as rig_command
-from dodo_dsl.cli import run as run_command
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.new import command as new_command
+from dodo_dsl.cli.rec import command as rec_command
+from dodo_dsl.cli.rig import command as rig_command
+from dodo_dsl.cli.run import command as run_command
 
 COMMANDS: dict[str, ModuleType] = {
     "compile": compile_command,

@@ -6,7 +6,7 @@ from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.report import results
-from dodo_dsl.report.write import write_summaries
+from dodo_dsl.report.report_folder import write_summaries
 
 EXAMPLES = """examples:
   dodo report dodo-report       index.html, junit.xml and metrics.txt from its results.json

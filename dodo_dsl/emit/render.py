@@ -9,11 +9,11 @@ import jinja2
 import orjson
 import yaml
 
-from dodo_dsl import data
+from dodo_dsl import package_data
+from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.emit.containers import containers
 from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
-from dodo_dsl.plan.variables import dotenv_line
 from dodo_dsl.source import resolve
 
 _SERVICE_DEPTH = 2
@@ -79,7 +79,7 @@ def _yaml(value: Any) -> str:
 @functools.cache
 def _templates() -> jinja2.Environment:
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(data.templates()),
+        loader=jinja2.FileSystemLoader(package_data.templates()),
         undefined=jinja2.StrictUndefined,
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
         keep_trailing_newline=True,

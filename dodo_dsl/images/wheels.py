@@ -9,9 +9,9 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl import data
-from dodo_dsl.images import docker
-from dodo_dsl.images.context import CONSTRAINTS, REQUIREMENTS
+from dodo_dsl import package_data
+from dodo_dsl.images import docker_command
+from dodo_dsl.images.build_context import CONSTRAINTS, REQUIREMENTS
 
 _OLDEST_GLIBC = 17  # manylinux2014 is glibc 2.17
 _QUESTION = "import platform, sys; print(*sys.version_info[:2], platform.machine(), platform.libc_ver()[1] or '-')"
@@ -43,11 +43,13 @@ class Python:
 def python_of(image: str) -> Python:
     """Asks an image; the engine pulls it when it is missing. Raises WheelsError."""
     try:
-        answer = docker.ask("run", "--rm", "--network", "none", "--entrypoint", "python3", image, "-c", _QUESTION)
+        answer = docker_command.ask(
+            "run", "--rm", "--network", "none", "--entrypoint", "python3", image, "-c", _QUESTION
+        )
         major, minor, machine, glibc = answer.split()
         glibc_major, glibc_minor = glibc.split(".")[:2]
         return Python((int(major), int(minor)), machine, (int(glibc_major), int(glibc_minor)))
-    except docker.DockerError as error:
+    except docker_command.DockerError as error:
         raise WheelsError(f"base image {image} does not run python3: {error}") from None
     except ValueError:
         raise WheelsError(f"base image {image} has no Python with glibc, which the wheels need") from None
@@ -63,8 +65,8 @@ def provide(python: Python, cache: Path) -> Path:
 
     It is named after what was asked for, and appears under this name only when it is complete.
     """
-    requirements = sorted((data.root() / REQUIREMENTS).glob("*.txt"))
-    constraints = data.root() / CONSTRAINTS
+    requirements = sorted((package_data.root() / REQUIREMENTS).glob("*.txt"))
+    constraints = package_data.root() / CONSTRAINTS
     digest = hashlib.sha256(repr(python).encode())
     for file in (*requirements, constraints):
         digest.update(file.read_bytes())

@@ -6,15 +6,16 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses
-from dodo_dsl.plan.application import ApplicationSource, plan_application
-from dodo_dsl.plan.emulation import DRAWN, hardware
-from dodo_dsl.plan.files import Copy, FilesError, copies
-from dodo_dsl.plan.lockstep import clock, lockstep
+from dodo_dsl.plan.clock_service import clock, lockstep
+from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
-from dodo_dsl.plan.recorder import MANIFEST, RECORDER, recorder
+from dodo_dsl.plan.recorder_service import MANIFEST, RECORDER, recorder
+from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.test_files import Copy, FilesError, copies
 from dodo_dsl.spec import arguments
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import jinja2
 
-from dodo_dsl import __version__, data
+from dodo_dsl import __version__, package_data
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.junit import check_line
 
@@ -42,7 +42,7 @@ MEANINGS = {
 def render(outcomes: Sequence[Outcome], files: Files) -> str:
     """The page."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
+        loader=jinja2.FileSystemLoader(package_data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
     )
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
     return environment.get_template("report.html.j2").render(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from dodo_dsl.outcome import Outcome
 
 FILE_NAME = "results.json"
@@ -66,7 +66,7 @@ def _validate(document: Any) -> None:
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
-    schema = json.loads((data.schemas() / "results.schema.json").read_text(encoding="utf-8"))
+    schema = json.loads((package_data.schemas() / "results.schema.json").read_text(encoding="utf-8"))
     fault = best_match(Draft202012Validator(schema).iter_errors(document))
     if fault is not None:
         raise ValueError(f"{fault.json_path}: {fault.message[:_MOST_OF_A_FAULT]}")

@@ -9,8 +9,8 @@ from collections.abc import AsyncIterator
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 ALIVE_S = 1.0
 _PORT = 12175

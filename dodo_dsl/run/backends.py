@@ -10,14 +10,17 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import lanes, leases, projects, rigs
-from dodo_dsl.run.client import connect
-from dodo_dsl.run.commands import Lane
-from dodo_dsl.run.docker import DockerBackend, other_subnets
-from dodo_dsl.run.events import Backend, BackendError
-from dodo_dsl.run.forks import Nursery
-from dodo_dsl.run.process import ProcessBackend
-from dodo_dsl.run.pulls import Pulls
+from dodo_dsl.run import leases
+from dodo_dsl.run.docker import cleanup
+from dodo_dsl.run.docker.backend import DockerBackend, other_subnets
+from dodo_dsl.run.docker.client import connect
+from dodo_dsl.run.docker.pulls import Pulls
+from dodo_dsl.run.process import host_isolation
+from dodo_dsl.run.process.backend import ProcessBackend
+from dodo_dsl.run.process.commands import Lane
+from dodo_dsl.run.process.fork_server_client import Nursery
+from dodo_dsl.run.protocol import Backend, BackendError
+from dodo_dsl.run.rigs import rigs
 
 Say = Callable[[str], None]
 
@@ -68,14 +71,14 @@ class Processes:
 
     def _turn(self, plan: Plan) -> AbstractAsyncContextManager[None]:
         """Tests of this run that need the machine for themselves queue here, where waiting has no limit."""
-        return self._alone if lanes.runs_alone(plan) else contextlib.nullcontext()
+        return self._alone if host_isolation.runs_alone(plan) else contextlib.nullcontext()
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        for left in lanes.reap():
+        for left in host_isolation.reap():
             note(f"removed what a killed run left: {left}")
         wanted = {self._isolation or plan.isolation for plan in plans}
         if self._isolation is None and "network" in wanted:
-            refusal = await asyncio.to_thread(lanes.namespaces_refusal)
+            refusal = await asyncio.to_thread(host_isolation.namespaces_refusal)
             if refusal:
                 note(f"no namespaces here ({refusal}): tests share the host, each with leases")
                 self._isolation = "host"
@@ -96,7 +99,7 @@ class Processes:
             return
         async with (
             self._turn(plan),
-            lanes.host_lane(plan, () if rigs.is_real(plan) else self._cids, say, keep) as leased,
+            host_isolation.host_lane(plan, () if rigs.is_real(plan) else self._cids, say, keep) as leased,
             rigs.attended(plan, leased.cid, leased.descriptors, say) as descriptors,
         ):
             lane = replace(leased, descriptors=(*descriptors, *self._descriptors))
@@ -121,7 +124,7 @@ class Containers:
             self._problem = str(error)
             return
         self._pulls = Pulls(self._client)
-        reaped = await asyncio.to_thread(projects.reap_projects, self._client)
+        reaped = await asyncio.to_thread(cleanup.reap_projects, self._client)
         for removed in reaped.removed:
             note(f"removed what a killed run left: {removed}")
         for left in reaped.left:
@@ -145,7 +148,7 @@ class Containers:
                 yield backend
             else:
                 async with (
-                    lanes.host_lane(replace_flags(plan), (plan.cid,), say) as lane,
+                    host_isolation.host_lane(replace_flags(plan), (plan.cid,), say) as lane,
                     rigs.attended(plan, lane.cid, lane.descriptors, say),
                 ):
                     yield backend

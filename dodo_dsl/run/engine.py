@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.lockstep import CLOCK
+from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import READY_S, Plan
-from dodo_dsl.run.events import Backend, BackendError, Event, Noted, Overrun
-from dodo_dsl.run.hearing import Ended, Hearing
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Noted, Overrun
+from dodo_dsl.run.test_state import Ended, Hearing
 
 ORDER = ("environment", "action", "evaluation", "application")
 READY_PATIENCE_S = READY_S

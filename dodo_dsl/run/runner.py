@@ -12,8 +12,8 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
+from dodo_dsl.run.error_outcomes import cause, reason, without_answer, without_number
 from dodo_dsl.run.schedule import Places, Schedule
-from dodo_dsl.run.unanswered import cause, reason, without_answer, without_number
 
 BackendName = Literal["process", "docker"]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

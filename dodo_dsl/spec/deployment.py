@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dodo_dsl import __version__, data
+from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
@@ -56,13 +56,13 @@ def find_deployment(start: Path) -> Path | None:
 def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
     """The deployment of a ``dodo.yml``; without one, the shipped registry and no application."""
     if path is None:
-        return Deployment(Path.cwd(), registry=(data.registry(),)), []
+        return Deployment(Path.cwd(), registry=(package_data.registry(),)), []
     node, found = read(path)
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
         found = [*found, *validate(node, "deployment")]
-    fallback = Deployment(path.parent, path, registry=(data.registry(),))
+    fallback = Deployment(path.parent, path, registry=(package_data.registry(),))
     if not isinstance(node, Mapping) or has_errors(found):
         return fallback, found
     raw = plain(node)
@@ -73,7 +73,7 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
     deployment = Deployment(
         root=path.parent,
         file=path,
-        registry=_folders(path.parent, node.entries.get("registry"), problems) or (data.registry(),),
+        registry=_folders(path.parent, node.entries.get("registry"), problems) or (package_data.registry(),),
         services=_folders(path.parent, node.entries.get("services"), problems),
         messages=_files(path.parent, node.entries.get("messages"), problems),
         application=_files(path.parent, node.entries.get("application"), problems),
@@ -99,7 +99,7 @@ def _texts(entry: Entry | None) -> Iterator[Scalar]:
 def _folders(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
     folders = []
     for item in _texts(entry):
-        folder = data.registry() if item.text == SHIPPED else path_of(root, item.text)
+        folder = package_data.registry() if item.text == SHIPPED else path_of(root, item.text)
         if folder is None or not folder.is_dir():
             problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'", _FROM_HERE))
         else:
@@ -122,8 +122,8 @@ def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnosti
     """What keeps the deployment's messages from being used."""
     if not files or entry is None:
         return
-    from dodo_dsl.opendlv.messages import MessageSet  # not before it is needed: it takes its time to load
-    from dodo_dsl.opendlv.odvd import OdvdError
+    from dodo_dsl.opendlv.messages.message_set import MessageSet  # not before it is needed: it takes its time to load
+    from dodo_dsl.opendlv.odvd.parser import OdvdError
 
     try:
         MessageSet.load(*files)

@@ -4,10 +4,10 @@ import functools
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, shown_path
 from dodo_dsl.source import Mapping, plain, read
-from dodo_dsl.spec import consistency
+from dodo_dsl.spec import manifest_consistency
 from dodo_dsl.spec.schema import validate
 
 Value = str | int | float | bool | list[str | int | float] | None
@@ -78,7 +78,7 @@ def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
     if node is not None:
         found = [*found, *validate(node, "service")]
     if isinstance(node, Mapping) and not has_errors(found):
-        found = [*found, *consistency.problems(node)]
+        found = [*found, *manifest_consistency.problems(node)]
     if node is None or has_errors(found):
         return None, found
     raw = plain(node)
@@ -113,13 +113,15 @@ def load_manifests(folders: tuple[Path, ...] = ()) -> tuple[dict[str, Manifest],
     """Every manifest ``<folder>/<service>/service.yml``, by service name: the shipped ones and those of ``folders``."""
     manifests: dict[str, Manifest] = {}
     found: list[Diagnostic] = []
-    for folder in (data.services(), *folders):
+    for folder in (package_data.services(), *folders):
         for path in sorted(folder.glob("*/service.yml")):
             manifest, problems = load_manifest(path)
             found.extend(problems)
             if manifest and manifest.name in manifests:
                 other = manifests[manifest.name].folder
-                where = "among DoDo's own" if other.parent == data.services() else f"in {shown_path(str(other))}"
+                where = (
+                    "among DoDo's own" if other.parent == package_data.services() else f"in {shown_path(str(other))}"
+                )
                 message = f"the service '{manifest.name}' is {where} already"
                 found.append(Diagnostic(Span(str(path)), "name-taken", message, "give it a name of its own"))
             elif manifest:

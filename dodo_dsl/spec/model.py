@@ -9,7 +9,7 @@ from typing import Any
 
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, read
-from dodo_dsl.spec import commas, extends, matrix, quantity
+from dodo_dsl.spec import decimal_commas, extends, matrix, quantity
 from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.schema import validate
@@ -80,7 +80,7 @@ def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
         if not found:
             found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
         return [Spec(location)], found
-    node, problems = extends.resolve(commas.joined(node), location.path, location.root)
+    node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root)
     is_whole = not has_errors(problems) and extends.is_text(node)
     found = [*found, *problems]
     choices, problems = matrix.choices(node)

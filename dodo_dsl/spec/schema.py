@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
@@ -36,7 +36,7 @@ def _validator(name: str) -> Any:
         except quantity.QuantityError as error:
             yield ValidationError(str(error))
 
-    schema = json.loads((data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
+    schema = json.loads((package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
     schema.get("$defs", {}).get("use", {}).pop("allOf", None)  # for editors; here the rules say it, and better
     return extend(Draft202012Validator, {_UNIT: is_quantity})(schema)  # type: ignore[no-untyped-call]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.codec import MessageError
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.clock import Clock
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 

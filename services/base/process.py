@@ -9,13 +9,13 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
 
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, parse
+from services.base.log_messages import published
 from services.base.loop import Loop
 from services.base.manifest import load_manifest
-from services.base.published import published
 from services.base.service import Build, Context
 from services.base.usage import help_text
 
@@ -101,7 +101,7 @@ def _clock(session: Session, role: str) -> Clock:
     """The test's clock, as ``DODO_CLOCK`` says."""
     if os.environ.get("DODO_CLOCK") != "lockstep":
         return RealTimeClock()
-    from services.base.lockstep import LockstepClock
+    from services.base.lockstep.lockstep_clock import LockstepClock
 
     return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1))
 

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import MICROSECONDS, Clock, RealTimeClock
 from services.base.flags import Flags
 from services.base.verdict import Verdict

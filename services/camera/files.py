@@ -67,11 +67,11 @@ def filmed(path: Path) -> Iterator[Image]:
 def recorded(path: Path) -> Iterator[Image]:
     """The pictures of an OpenDLV recording's first camera, as B, G, R; raises ValueError where none can be decoded."""
     try:
-        video = importlib.import_module("dodo_dsl.opendlv.video")
-        reader = importlib.import_module("dodo_dsl.opendlv.recording")
+        video = importlib.import_module("dodo_dsl.opendlv.video.decoder")
+        reader = importlib.import_module("dodo_dsl.opendlv.recordings.recording")
     except ImportError as error:
         raise ValueError(f"recordings cannot be shown here: {error}") from None
-    from dodo_dsl.opendlv.messages import MessageSet
+    from dodo_dsl.opendlv.messages.message_set import MessageSet
 
     messages, decoder, sender = MessageSet.standard(), None, None
     for envelope in reader.read_envelopes(path):

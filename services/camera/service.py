@@ -3,14 +3,14 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
 from services.base.signals import interruptible
 from services.camera.files import FileCamera
 from services.camera.grabber import SILENCE, Camera, Grabber
 from services.camera.picture import CameraError, Image, Picture
-from services.camera.report import Report
 from services.camera.rpicam import RpiCamera
+from services.camera.telemetry import Report
 from services.camera.v4l2 import V4l2Camera
 
 EMULATED = "--source=emulated is the camera of `rig: emulated`, for which virtual-camera is started in its place"

@@ -1,7 +1,8 @@
 """A picture of a camera: ``python -m services.camera.snapshot --output=FILE --source=...`` writes it as a PNG.
 
-It takes the camera's flags and prints one JSON object: what `services.camera.check` says of the picture, its ``width``
-and ``height``. Exit codes: 0 it is written, also when it is not fit (``reason``); 1 there is none (``error``).
+It takes the camera's flags and prints one JSON object: what `services.camera.health_check` says of the picture, its
+``width`` and ``height``. Exit codes: 0 it is written, also when it is not fit (``reason``); 1 there is none
+(``error``).
 """
 
 import json
@@ -15,7 +16,7 @@ import cv2
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.base.signals import interruptible
-from services.camera.check import judged, looked
+from services.camera.health_check import judged, looked
 from services.camera.picture import CameraError
 
 OUTPUT = "--output="

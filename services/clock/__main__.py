@@ -4,12 +4,12 @@ import sys
 from pathlib import Path
 
 from services.base import Context, Service, run
-from services.base.channel import Channel
 from services.base.clock import MICROSECONDS
+from services.base.lockstep.channel import Channel
 from services.base.service import period_of
 from services.clock.answers import Answers, kinds
+from services.clock.participants import Patience, Roles
 from services.clock.service import HEARD, ClockService
-from services.clock.terms import Patience, Roles
 
 
 def build(context: Context) -> Service:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.bus.envelope import Envelope
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from dodo_dsl.opendlv.codec import MessageError
-from dodo_dsl.opendlv.envelope import Envelope, FrameError
-from dodo_dsl.opendlv.session import Address, Session
-from services.base.channel import Channel
-from services.base.parts import STEP, STEP_DONE, Pieces, Said, cut, frames
+from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
+from dodo_dsl.opendlv.bus.session import Address, Session
+from dodo_dsl.opendlv.messages.codec import MessageError
+from services.base.lockstep.channel import Channel
+from services.base.lockstep.datagrams import STEP, STEP_DONE, Pieces, Said, cut, frames
 
 REPEAT_S = 0.2
 _SLICE = 0.05

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from dodo_dsl.opendlv.envelope import Envelope
-from services.base.lockstep import EPOCH
-from services.base.parts import Said, say
-from services.clock.audience import Audience
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from services.base.lockstep.datagrams import Said, say
+from services.base.lockstep.lockstep_clock import EPOCH
+from services.clock.application import Audience
 from services.clock.exchange import Done, Order
-from services.clock.terms import SLICE_S, Roles, Stopped, Stuck, Talk, TimedOut, Unanswered
+from services.clock.participants import SLICE_S, Roles, Stopped, Stuck, Talk, TimedOut, Unanswered
 
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""

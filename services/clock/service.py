@@ -6,16 +6,16 @@ import time
 from collections.abc import Callable
 from fractions import Fraction
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.session import Session
-from services.base.channel import Channel
-from services.base.lockstep import EPOCH
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
+from services.base.lockstep.channel import Channel
+from services.base.lockstep.lockstep_clock import EPOCH
 from services.base.service import Service
 from services.clock.answers import Answers
-from services.clock.audience import Audience
+from services.clock.application import Audience
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
-from services.clock.terms import Patience, Roles, Stuck, TimedOut, Unanswered
+from services.clock.participants import Patience, Roles, Stuck, TimedOut, Unanswered
 
 _TELL_S = 1.0
 _SLICE = 0.05

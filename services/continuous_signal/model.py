@@ -7,7 +7,7 @@ import numpy as np
 
 from services.base import Verdict
 from services.continuous_signal.measures import Limits, measure
-from services.continuous_signal.sentences import verdict
+from services.continuous_signal.reason import verdict
 from services.continuous_signal.target import MICROSECONDS, Target, Times, Values, in_order
 
 MOST_SAMPLES = 10_000_000

@@ -6,13 +6,13 @@ from typing import Any
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags, Output, Service
+from services.continuous_signal.csv_target import read_table
 from services.continuous_signal.measures import Limits
 from services.continuous_signal.model import Judge
-from services.continuous_signal.recorded import read_recording
+from services.continuous_signal.recorded_target import read_recording
 from services.continuous_signal.signals import Signal, check
-from services.continuous_signal.table import read_table
 from services.continuous_signal.target import MICROSECONDS, Target
 
 RECORDING = ".rec"

@@ -6,7 +6,7 @@ from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor
 
-from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 _NO_NUMBERS = (FieldDescriptor.CPPTYPE_STRING, FieldDescriptor.CPPTYPE_MESSAGE)
 

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from services.gantry.protocol import Position
-from services.gantry.table import BOUNDS
+from services.gantry.rig_table import BOUNDS
 
 HOME = Position(*(BOUNDS[axis][0] for axis in ("x", "y", "yaw")))
 """Where the limit switches are, rounded to the inside: step 0 of Table 4.2's conversions."""

@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from services.gantry.table import BAUD, Error, Status
+from services.gantry.rig_table import BAUD, Error, Status
 
 __all__ = ["BAUD", "LATCHED", "SENTENCES", "Error", "Lines", "Position", "Refusal", "Status", "Word", "command"]
 

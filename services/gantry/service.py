@@ -10,12 +10,12 @@ from google.protobuf.message import Message
 from services.base import Context, Flags, Output, Service, period_of
 from services.base.signals import interruptible
 from services.gantry import start
-from services.gantry.emulated import EmulatedRig
+from services.gantry.emulator import EmulatedRig
 from services.gantry.link import ASKING, Link, RigError
-from services.gantry.meter import Meter
 from services.gantry.motion import Limits, Shaper, Velocity, box
 from services.gantry.port import PortError, SerialPort, checked
 from services.gantry.protocol import SENTENCES, Position, Refusal, Status, Word, command
+from services.gantry.telemetry import Meter
 
 EMULATED = "emulated"
 MICROSECONDS = 1_000_000

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv import odvd
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.odvd import parser
 from services.base import Context, Flags, Output, Service, period_of
 from services.integrator.model import Integrator, Pose, Twist
 from services.integrator.rotation import angles, quaternion
@@ -26,7 +26,7 @@ class Integration(Service):
         self.body = Integrator(start(flags))
         self.rejected = 0
         self._frame = context.messages.type(FRAME)
-        self._old = MessageSet(odvd.load(OLD_FRAME)) if flags["euler"] else None
+        self._old = MessageSet(parser.load(OLD_FRAME)) if flags["euler"] else None
         self._stamps = [stamp for stamp in (flags["frame-id"], flags["copy-id"]) if stamp is not None]
         self.inputs = {
             ("opendlv.sim.KinematicState", flags["frame-id"]): self._feed,

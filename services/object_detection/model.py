@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 
 from services.base import Verdict
 from services.object_detection.boxes import Box, Thing
+from services.object_detection.counts import compare
 from services.object_detection.frames import Frame, Mark, Parts, Value
+from services.object_detection.reason import verdict
 from services.object_detection.score import Limits, Rules, Score
-from services.object_detection.sentences import verdict
-from services.object_detection.tally import compare
 from services.object_detection.truth import Truth
 
 MICROSECONDS = 1_000_000

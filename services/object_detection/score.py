@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from services.base import Check
-from services.object_detection.tally import Tallies, Tally
+from services.object_detection.counts import Tallies, Tally
 
 MEASURES = ("precision", "recall", "f1")
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from dodo_dsl.opendlv.envelope import Envelope, FrameError, encode_frame
-from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, encode_frame
+from dodo_dsl.opendlv.recordings.writer import RecordingWriter
 
 RECORD, STOP = 1, 2
 

@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dodo_dsl.opendlv import pixels
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.video_encoder import FORMAT, VideoEncoder
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.memory import pixels
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder
 from services.rec_recorder.source import Source
 
 MESSAGE = "opendlv.proxy.ImageReading"

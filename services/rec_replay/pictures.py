@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.codec import MessageError
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.varints import Numbers
-from dodo_dsl.opendlv.video import Frame, VideoDecoder, VideoError, has_key_frame
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.codec import MessageError
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.video.decoder import Frame, VideoDecoder, VideoError, has_key_frame
 from services.rec_replay.selection import IMAGE
 
 FARTHEST = 3000

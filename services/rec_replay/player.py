@@ -2,7 +2,7 @@
 
 import logging
 
-from dodo_dsl.opendlv.varints import Numbers
+from dodo_dsl.opendlv.messages.varints import Numbers
 
 PLAY, PAUSE, SEEK, STEP = 1, 2, 3, 4
 

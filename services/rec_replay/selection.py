@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dodo_dsl.opendlv.messages import OWN_IDS, MessageSet, UnknownMessage
-from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.varints import Marks, Numbers
+from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet, UnknownMessage
+from dodo_dsl.opendlv.messages.varints import Marks, Numbers
+from dodo_dsl.opendlv.recordings.recording import Recording
 
 IMAGE = 1055
 MICROSECONDS = 1_000_000

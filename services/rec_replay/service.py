@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from dodo_dsl.opendlv import message_sets
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.messages import versions
+from dodo_dsl.opendlv.recordings.recording import Recording
 from services.base import Context, Service
 from services.base.service import Output, period_of
 from services.rec_replay.pictures import Screen, first_frame
@@ -143,7 +143,7 @@ def build(context: Context) -> Service:
 
 def _part(context: Context, recording: Recording) -> Part:
     flags = context.flags
-    version = flags["message-set"] if flags["message-set"] != "auto" else message_sets.version_of(recording)
+    version = flags["message-set"] if flags["message-set"] != "auto" else versions.version_of(recording)
     own = (Path(path) for path in os.environ.get("DODO_ODVD", "").split(os.pathsep) if path)
     selection = Selection(
         start=flags["start"],
@@ -154,7 +154,7 @@ def _part(context: Context, recording: Recording) -> Part:
         send_video=flags["send-video"],
     )
     max_gap = round(flags["max-gap"] * MICROSECONDS)
-    part = select(recording, selection, message_sets.load(version, *own), max_gap, flags["timemod"])
+    part = select(recording, selection, versions.load(version, *own), max_gap, flags["timemod"])
     seconds = part.due[-1] / MICROSECONDS
     _log.info("plays %d messages and %d pictures in %.1f s", part.sent.sum(), part.shown.sum(), seconds)
     return part

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.video import VideoError
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.video.decoder import VideoError
 from services.rec_replay.pictures import Decoder, Picture, lead_in, pixels
 from services.rec_replay.selection import Part
 

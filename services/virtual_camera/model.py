@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 
 from services.virtual_camera.camera import Pose, quaternion_rotation
+from services.virtual_camera.draw.raster import Image
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.motion import LONGEST_GAP, between, still
-from services.virtual_camera.optics import Optics
-from services.virtual_camera.raster import Image
-from services.virtual_camera.render import Renderer
 
 FARTHEST = 1e6
 """Frames farther than this from the origin, in m, are refused."""

@@ -8,19 +8,19 @@ import cv2
 import numpy as np
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags, Output, Service, period_of
 from services.virtual_camera.camera import Pinhole, Pose
-from services.virtual_camera.lens import Distortion
-from services.virtual_camera.light import Light
+from services.virtual_camera.draw.light import Light
+from services.virtual_camera.draw.raster import Image
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import Scene, Wishes, load_scene
+from services.virtual_camera.image.lens import Distortion
+from services.virtual_camera.image.optics import Optics
+from services.virtual_camera.image.overlays import load_overlays
+from services.virtual_camera.image.sensor import Sensor
 from services.virtual_camera.model import Publish, VirtualCamera, mount
-from services.virtual_camera.optics import Optics
-from services.virtual_camera.overlays import load_overlays
-from services.virtual_camera.raster import Image
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import Scene, Wishes, load_scene
-from services.virtual_camera.sensor import Sensor
 from services.virtual_camera.truth import Box, Limits, Truth, classes_of
 
 Memories = list[tuple[SharedMemory, str]]

@@ -17,7 +17,7 @@ import cv2
 from services.base import Flags
 from services.base.flags import parse
 from services.base.manifest import load_manifest
-from services.virtual_camera.raster import Image
+from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.service import mounted_camera, opened, truth_of
 from services.virtual_camera.truth import Box
 

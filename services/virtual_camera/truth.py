@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 
 from services.virtual_camera.camera import NEAR, Array, Pinhole, Pose, View, clip
-from services.virtual_camera.lens import Lens
-from services.virtual_camera.raster import Image, fill_fixed
-from services.virtual_camera.render import Labels, Renderer
-from services.virtual_camera.shading import Piece
+from services.virtual_camera.draw.raster import Image, fill_fixed
+from services.virtual_camera.draw.render import Labels, Renderer
+from services.virtual_camera.draw.shading import Piece
+from services.virtual_camera.image.lens import Lens
 
 _ONE = 256
 """Fixed point numbers of a pixel."""

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from dodo_dsl.cli.bar import bar
-from dodo_dsl.cli.progress import LiveProgress, PlainProgress
+from dodo_dsl.cli.progress_bar import bar
+from dodo_dsl.cli.run.progress import LiveProgress, PlainProgress
 from tests.report.test_write import OUTCOME
 
 SAID = (

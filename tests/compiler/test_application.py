@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan import argv
-from dodo_dsl.plan.application import plan_application, read_application
+from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Application
+from dodo_dsl.plan.rewrite.rewrite import plan_application
 
 COMPOSE = """\
 version: "3.6"
@@ -120,11 +121,11 @@ def test_refused(tmp_path: Path, text: str) -> None:
 
 def test_flags_in_words() -> None:
     words = ("--cid", "111", "--cid=3", "--name=/video0.argb", "--name.i420=video0.i420", "--named=x", "cid=4")
-    assert argv.with_cid(words, 150) == ("--cid", "150", "--cid=150", *words[3:])
-    assert argv.with_memory_prefix(words, "p-")[3:] == (
+    assert opendlv_flags.with_cid(words, 150) == ("--cid", "150", "--cid=150", *words[3:])
+    assert opendlv_flags.with_memory_prefix(words, "p-")[3:] == (
         "--name=/p-video0.argb",
         "--name.i420=p-video0.i420",
         *words[5:],
     )
     shell = ("sh", "-c", "run --cid=111 --verbose")
-    assert argv.with_cid(shell, 150) == ("sh", "-c", "run --cid=150 --verbose")
+    assert opendlv_flags.with_cid(shell, 150) == ("sh", "-c", "run --cid=150 --verbose")

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text, ordered
-from dodo_dsl.plan.application import read_application
 
 FOLDER = Path(__file__).parent / "applications" / "bad"
 CASES = sorted(p.stem for p in FOLDER.glob("*.yml"))

@@ -12,13 +12,14 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl import source
+from dodo_dsl.application import interpolation, opendlv_flags
+from dodo_dsl.application.compose_paths import rebased
+from dodo_dsl.application.model import plain
+from dodo_dsl.application.read import read_application
 from dodo_dsl.emit.render import render_plan
-from dodo_dsl.plan import argv, variables
-from dodo_dsl.plan.application import plan_application, read_application
-from dodo_dsl.plan.application.model import plain
-from dodo_dsl.plan.application.paths import rebased
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.environment import dotenv, interpolate
+from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.run.process.environment import dotenv, interpolate
 from tests.compiler.test_output import compose
 
 GOOD = Path(__file__).parent / "applications" / "good"
@@ -49,7 +50,7 @@ def test_commands_are_split_as_compose_splits_them(command: str, tmp_path: Path)
     (tmp_path / "c.yml").write_text(yaml.safe_dump({"services": {"a": {"image": "x", "command": command}}}))
     (tmp_path / ".env").write_text("A=a\nC=c\n")
     expected = [word.replace("$$", "$") for word in config(tmp_path, "-f", "c.yml")["a"]["command"]]
-    assert [interpolate(word, {"A": "a", "C": "c"}) for word in argv.split(command)] == expected
+    assert [interpolate(word, {"A": "a", "C": "c"}) for word in opendlv_flags.split(command)] == expected
 
 
 DOTENV = r"""
@@ -70,20 +71,20 @@ SPACED = 3
 
 
 def test_dotenv_files_are_read_as_compose_reads_them(tmp_path: Path) -> None:
-    found = variables.dotenv(DOTENV)
+    found = interpolation.dotenv(DOTENV)
     service = {"image": "x", "environment": [f"{name}=${{{name}}}" for name in found]}
     (tmp_path / "c.yml").write_text(yaml.safe_dump({"services": {"a": service}}))
     (tmp_path / ".env").write_text(DOTENV)
     expected = config(tmp_path, "-f", "c.yml")["a"]["environment"]
     assert dotenv(tmp_path / ".env", {}) == {name: value.replace("$$", "$") for name, value in expected.items()}
-    (tmp_path / ".env").write_text("".join(variables.dotenv_line(*pair) + "\n" for pair in found.items()))
+    (tmp_path / ".env").write_text("".join(interpolation.dotenv_line(*pair) + "\n" for pair in found.items()))
     assert config(tmp_path, "-f", "c.yml")["a"]["environment"] == expected
 
 
 @given(st.dictionaries(st.text(string.ascii_letters, min_size=1), st.text(st.characters(exclude_characters="\0\r"))))
 def test_dotenv_lines_are_read_back(values: dict[str, str]) -> None:
     doubled = {name: value.replace("$", "$$") for name, value in values.items()}
-    assert variables.dotenv("\n".join(variables.dotenv_line(*pair) for pair in doubled.items())) == doubled
+    assert interpolation.dotenv("\n".join(interpolation.dotenv_line(*pair) for pair in doubled.items())) == doubled
 
 
 @pytest.mark.parametrize("style", ["several", "extends", "include", "anchors"])
@@ -145,7 +146,7 @@ def test_paths_from_another_folder(path: str, expected: str) -> None:
     ],
 )
 def test_cid_in_texts(text: str, expected: str) -> None:
-    assert argv.with_cid_text(text, 140) == expected
+    assert opendlv_flags.with_cid_text(text, 140) == expected
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ from collections.abc import Iterable
 
 import pytest
 
-from dodo_dsl import catalogue, diagnostics
+from dodo_dsl import diagnostics
+from dodo_dsl.check import catalogue
 from dodo_dsl.diagnostics import Diagnostic
 from tests.compiler.test_bad_specs import CASES, expected, said
 

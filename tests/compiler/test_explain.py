@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl import catalogue
+from dodo_dsl.check import catalogue
 from dodo_dsl.cli.main import main
 from tests.compiler import examples
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl import catalogue
+from dodo_dsl.check import catalogue
 from tests.compiler import examples
 
 ROOT = Path(__file__).parents[2]

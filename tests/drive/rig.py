@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Self
 
 import yaml
 
-from services.gantry.emulated import START
+from services.gantry.emulator import START
 from tests.drive.applications import KIWI, ROOT
 
 BUILT = ROOT / "build" / "firmware"

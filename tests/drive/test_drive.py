@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl.run.lanes import namespaces_refusal
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.drive.applications import ROOT, dodo, kiwi, results
 
 

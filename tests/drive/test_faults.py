@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.run.lanes import namespaces_refusal
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.drive.applications import ROOT, results
 from tests.faults import Book
 from tests.run.desk import processes_with, wait_for
@@ -35,7 +35,7 @@ evaluation:
 """
 APPLICATION = """
 import os, subprocess, sys, time
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
 if os.environ.get("DODO_TEST_NETEM"):
     subprocess.run(os.environ["DODO_TEST_NETEM"].split(), check=True)
 with Session(int(sys.argv[1].partition("=")[2])) as bus:

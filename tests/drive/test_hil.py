@@ -16,9 +16,9 @@ import pytest
 from numpy.typing import NDArray
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
-from services.gantry.table import ACCELERATION, BOUNDS, MICROSTEP
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from services.gantry.rig_table import ACCELERATION, BOUNDS, MICROSTEP
 from tests.drive.applications import BLIND, ROOT, dodo, kiwi, results
 from tests.drive.rig import Hardware, Pose, on_its_way, running
 
@@ -97,7 +97,7 @@ def stands(pose: Pose) -> bool:
 
 def measured_by_hand(rig: Hardware) -> NDArray[np.float64]:
     """Time, x, y and yaw as the rig's own counters have them."""
-    command = [sys.executable, "-m", "services.gantry.hand", f"--serial={rig.path}", "status"]
+    command = [sys.executable, "-m", "services.gantry.manual", f"--serial={rig.path}", "status"]
     said = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
     return np.array([0.0, said["x"], said["y"], math.radians(said["yaw"])])
 

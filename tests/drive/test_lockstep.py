@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl.run.lanes import namespaces_refusal
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from services.gantry.table import ACCELERATION
+from services.gantry.rig_table import ACCELERATION
 from tests.drive.applications import results
 from tests.drive.rig import REST, Hardware, Pose, Run, on_its_way, running
 
@@ -58,7 +58,7 @@ def stop_model(run: Run) -> None:
 
 
 def kill_sandbox(run: Run) -> None:
-    run.kill("dodo_dsl.run.sandbox")
+    run.kill("dodo_dsl.run.process.sandbox")
 
 
 def kill_runner(run: Run) -> None:

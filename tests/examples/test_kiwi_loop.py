@@ -19,8 +19,8 @@ from services.integrator.model import Integrator, Twist
 from services.integrator.model import Pose as Attitude
 from services.integrator.rotation import quaternion
 from services.virtual_camera.camera import Pose as CameraPose
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 MAPS = ROOT / "tests_registry" / "maps"

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dodo_dsl import data
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.opendlv.video import VideoDecoder
+from dodo_dsl import package_data
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.video.decoder import VideoDecoder
 
 SEEN = {
     20: [("yellow", 0.391, 0.87)],
@@ -25,7 +25,7 @@ SEEN = {
 
 @pytest.fixture
 def perception(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    monkeypatch.syspath_prepend(str(data.root() / "examples" / "kiwi"))
+    monkeypatch.syspath_prepend(str(package_data.root() / "examples" / "kiwi"))
     import perception  # type: ignore[import-not-found]
 
     yield perception

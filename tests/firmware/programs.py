@@ -8,7 +8,7 @@ from typing import Any
 
 import serial
 
-from services.gantry.table import MICROSTEP, Status
+from services.gantry.rig_table import MICROSTEP, Status
 
 ROOT = Path(__file__).parents[2]
 BUILT = ROOT / "build" / "firmware"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.gantry.table import Status
+from services.gantry.rig_table import Status
 from tests.firmware.programs import Bench
 
 MOTORS = ("x", "y1", "y2", "alpha")

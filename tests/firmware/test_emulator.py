@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from services.gantry.table import ACCELERATION, SPEED, Error, Status
+from services.gantry.rig_table import ACCELERATION, SPEED, Error, Status
 from tests.firmware.programs import ELF, EMULATOR, Rig
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from services.gantry.table import BOUNDS, MICROSTEP, Status
+from services.gantry.rig_table import BOUNDS, MICROSTEP, Status
 from tests.firmware.programs import ROOT, Bench
 
 FUZZ = runpy.run_path(str(ROOT / "scripts" / "fuzz-firmware"), run_name="fuzz")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from services.gantry.table import MICROSTEP, Error, Status
+from services.gantry.rig_table import MICROSTEP, Error, Status
 from tests.firmware.programs import Bench
 
 HOME = (-0.9, -0.7, -2.63386)

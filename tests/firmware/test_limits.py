@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.gantry.table import BOUNDS, MICROSTEP, SPEED, Error, Status
+from services.gantry.rig_table import BOUNDS, MICROSTEP, SPEED, Error, Status
 from tests.firmware.programs import Bench
 
 AXES = ("x", "y", "yaw")

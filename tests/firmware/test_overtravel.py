@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.gantry.table import BOUNDS, MICROSTEP, SPEED, Status
+from services.gantry.rig_table import BOUNDS, MICROSTEP, SPEED, Status
 from tests.firmware.programs import Bench
 
 AXES = {"x": ("x",), "y": ("y1", "y2"), "yaw": ("alpha",)}

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import pytest
 
-from services.gantry.table import ACCELERATION, WATCHDOG, Status
+from services.gantry.rig_table import ACCELERATION, WATCHDOG, Status
 from tests.firmware.programs import Rig
 
 VELOCITY = "0.3,0.2,0.4"

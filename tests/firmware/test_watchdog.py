@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.gantry.table import WATCHDOG, Error, Status
+from services.gantry.rig_table import WATCHDOG, Error, Status
 from tests.firmware.programs import Bench
 
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 
 pytestmark = pytest.mark.slow
 
@@ -96,4 +96,4 @@ def test_a_failing_application_fails_its_job(repository: Path) -> None:
 
 def test_the_template_that_is_installed_is_the_one_that_runs(repository: Path) -> None:
     written = repository / ".gitlab/dodo/deployment.gitlab-ci.yml"
-    assert written.read_bytes() == (data.templates() / "gitlab/deployment.gitlab-ci.yml").read_bytes()
+    assert written.read_bytes() == (package_data.templates() / "gitlab/deployment.gitlab-ci.yml").read_bytes()

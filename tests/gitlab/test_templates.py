@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from dodo_dsl.cli.main import main
 
-TEMPLATES = sorted((data.templates() / "gitlab").glob("*.yml"))
+TEMPLATES = sorted((package_data.templates() / "gitlab").glob("*.yml"))
 DIGEST = "sha256:" + "0123456789abcdef" * 4
 
 BAKE = {
@@ -73,7 +73,7 @@ def test_no_template_names_a_host_or_shows_the_token(template: Path) -> None:
 
 
 def run_images(tmp_path: Path, docker: str) -> "subprocess.CompletedProcess[str]":
-    job = yaml.safe_load((data.templates() / "gitlab/application.gitlab-ci.yml").read_text())["dodo-images"]
+    job = yaml.safe_load((package_data.templates() / "gitlab/application.gitlab-ci.yml").read_text())["dodo-images"]
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin/docker").write_text(docker)
     (tmp_path / "bin/docker").chmod(0o755)

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from dodo_dsl import __version__
-from dodo_dsl.images import context
+from dodo_dsl.images import build_context
 from dodo_dsl.images.names import Image
 from tests.images.dockerfile import ROOT
 
@@ -14,9 +14,9 @@ def files(folder: Path) -> set[str]:
 
 
 def test_context_has_the_bus_and_the_services_and_no_more(tmp_path: Path) -> None:
-    context.assemble(tmp_path, None)
+    build_context.assemble(tmp_path, None)
     found = files(tmp_path)
-    assert {"constraints.txt", "dodo_dsl/__init__.py", "dodo_dsl/opendlv/messages.odvd"} <= found
+    assert {"constraints.txt", "dodo_dsl/__init__.py", "dodo_dsl/opendlv/odvd/messages.odvd"} <= found
     assert {"services/base/process.py", "services/collision/service.yml", "services/Dockerfile.dockerignore"} <= found
     assert not [name for name in found if "__pycache__" in name or name.startswith(("dodo_dsl/cli", "wheels", "tests"))]
     assert (tmp_path / "services/base/loop.py").stat().st_mtime == (ROOT / "services/base/loop.py").stat().st_mtime
@@ -27,14 +27,14 @@ def test_wheels_come_along(tmp_path: Path) -> None:
     wheels.mkdir()
     folder.mkdir()
     (wheels / "radar-1.0-py3-none-any.whl").write_bytes(b"PK")
-    context.assemble(folder, wheels)
+    build_context.assemble(folder, wheels)
     assert (folder / "wheels" / "radar-1.0-py3-none-any.whl").read_bytes() == b"PK"
 
 
 def test_definition_names_targets_tags_and_arguments(tmp_path: Path) -> None:
     images = [Image("base", "here/base:1"), Image("collision", "here/collision:1")]
-    context.define(tmp_path, images, "debian-with-python", "https://git.example.org/dodo")
-    definition = json.loads((tmp_path / context.DEFINITION).read_text())
+    build_context.define(tmp_path, images, "debian-with-python", "https://git.example.org/dodo")
+    definition = json.loads((tmp_path / build_context.DEFINITION).read_text())
     assert definition["group"]["default"]["targets"] == ["base", "collision"]
     target = definition["target"]["collision"]
     assert (target["target"], target["tags"]) == ("collision", ["here/collision:1"])
@@ -46,7 +46,7 @@ def test_definition_names_targets_tags_and_arguments(tmp_path: Path) -> None:
 
 
 def test_without_a_base_image_the_dockerfile_decides(tmp_path: Path) -> None:
-    context.define(tmp_path, [Image("base", "here/base:1")], None, "")
-    definition = json.loads((tmp_path / context.DEFINITION).read_text())
+    build_context.define(tmp_path, [Image("base", "here/base:1")], None, "")
+    definition = json.loads((tmp_path / build_context.DEFINITION).read_text())
     assert "BASE_IMAGE" not in definition["target"]["base"]["args"]
-    assert context.default_base_image().startswith("python:3.")
+    assert build_context.default_base_image().startswith("python:3.")

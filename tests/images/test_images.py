@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from dodo_dsl import __version__
-from dodo_dsl.images import context
+from dodo_dsl.images import build_context
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from tests.images.conftest import TAG, docker
 from tests.images.dockerfile import ROOT
@@ -179,7 +179,9 @@ def test_camera_shares_memory_with_another_user(built: dict[str, str], volume: s
     words = ("camera", "--map-path=/dodo/files/maps/straight", "--cid=133")
     with started(built["virtual-camera"], volume, *words, flags=flags) as container:
         assert await_health(container) == "healthy"
-        look = "from dodo_dsl.opendlv.memory import SharedMemory as S; print(S.attach('video0.argb').size)"
+        look = (
+            "from dodo_dsl.opendlv.memory.shared_memory import SharedMemory as S; print(S.attach('video0.argb').size)"
+        )
         application = ("--user", "0", "--ipc", f"container:{container}", "--volume", f"{volume}:/tmp")
         assert run(built["vision"], "python3", "-c", look, flags=(*HARDENED, *application)) == str(640 * 480 * 4)
 
@@ -197,7 +199,7 @@ def test_a_second_build_makes_the_same_files(built: dict[str, str], base_image: 
     """The stage of the sources, built anew from files with other dates: its layers stay shared."""
     folder = tmp_path / "dodo-images-again"
     folder.mkdir()
-    context.assemble(folder, None)
+    build_context.assemble(folder, None)
     for path in folder.rglob("*.py"):
         path.touch()
     words = ["docker", "buildx", "build", "--quiet", "--no-cache", "--target", "code", "--file", "services/Dockerfile"]

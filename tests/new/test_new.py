@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from dodo_dsl.cli.main import main
 from dodo_dsl.compiler import load
 
@@ -130,12 +130,12 @@ def installed_in(repository: Path, patch: pytest.MonkeyPatch) -> Path:
     """A wheel's data in a virtual environment that lies in the repository."""
     bundled = repository / ".venv/lib/python3/site-packages/dodo_dsl/_data"
     for name in ("schemas", "templates", "services", "tests_registry"):
-        shutil.copytree(data.root() / name, bundled / name, ignore=shutil.ignore_patterns("__pycache__"))
-    patch.setattr(data, "root", lambda: bundled)
+        shutil.copytree(package_data.root() / name, bundled / name, ignore=shutil.ignore_patterns("__pycache__"))
+    patch.setattr(package_data, "root", lambda: bundled)
     return bundled
 
 
-SHIPPED = sorted(path.parent.name for path in data.registry().glob("*/*.dodo.yml"))
+SHIPPED = sorted(path.parent.name for path in package_data.registry().glob("*/*.dodo.yml"))
 
 
 @pytest.mark.parametrize("shipped", SHIPPED)
@@ -156,7 +156,7 @@ def test_a_shipped_test_is_copied_with_what_it_refers_to(repository: Path, shipp
 def test_a_copy_is_the_same_test(repository: Path) -> None:
     dodo("new", "mine", "--extends", "hil-dynamic")
     dodo("new", "further", "--extends", "mine")
-    (shipped,) = load([data.registry() / "hil-dynamic"]).specs
+    (shipped,) = load([package_data.registry() / "hil-dynamic"]).specs
     copies = load([repository / "tests"]).specs
     assert [spec.name for spec in copies] == ["further", "mine"]
     for copy in copies:

@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import STANDARD, MessageSet
-from dodo_dsl.opendlv.odvd import Field, load
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.odvd import STANDARD
+from dodo_dsl.opendlv.odvd.parser import Field, load
 
 MESSAGES = MessageSet.standard()
 REC2CSV = Path(sys.executable).with_name("cluon-rec2csv")

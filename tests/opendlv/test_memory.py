@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv import tokenfile
-from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.memory import token_file
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from tests.opendlv.conftest import Peer
 
 SIZE = 64 * 48 * 4
@@ -137,9 +137,9 @@ def test_colliding_keys_are_avoided(memory_name: str) -> None:
     twin.touch()
     os.link(twin, path)  # the same inode gives the same keys, as two inodes 65536 apart would
     try:
-        assert tokenfile.collides(path)
+        assert token_file.collides(path)
         with SharedMemory.create(memory_name, 10) as memory:
-            assert not tokenfile.collides(path)
+            assert not token_file.collides(path)
             memory.buffer[0] = 1
             with SharedMemory.attach(memory_name) as reader:
                 assert reader.buffer[0] == 1

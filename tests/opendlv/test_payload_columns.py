@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv import payload_columns
-from dodo_dsl.opendlv.codec import MessageError
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording_table import PADDING
+from dodo_dsl.opendlv.messages import columns
+from dodo_dsl.opendlv.messages.codec import MessageError
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.frame_table import PADDING
 
 ODVD = """
 message test.Inner [id = 8001] { int8 small [id = 1]; string text [id = 2]; }
@@ -51,9 +51,9 @@ def decoded(messages: MessageSet, payloads: list[bytes]) -> tuple[list[dict[str,
     ends = np.cumsum([len(payload) for payload in payloads], dtype=np.int64)
     starts = ends - np.array([len(payload) for payload in payloads], np.int64)
     layout = messages.layout("test.Every")
-    columns, good = payload_columns.decode(layout, b"".join(payloads) + PADDING, starts, ends)
-    assert [(column.name, column.type) for column in columns] == list(payload_columns.names(layout))
-    rows = [{column.name: column.values[row] for column in columns} for row in range(len(payloads))]
+    decoded, good = columns.decode(layout, b"".join(payloads) + PADDING, starts, ends)
+    assert [(column.name, column.type) for column in decoded] == list(columns.names(layout))
+    rows = [{column.name: column.values[row] for column in decoded} for row in range(len(payloads))]
     return rows, good.tolist()
 
 
@@ -105,4 +105,4 @@ def test_usual_payloads_tell_a_message(messages: MessageSet, tmp_path: Path) -> 
     usual = messages.encode(messages.type(8000)())
     data = usual + b"\x18\x05" + PADDING
     starts, ends = np.array([0, len(usual)]), np.array([len(usual), len(usual) + 2])
-    assert payload_columns.usual_rows(messages.layout(8000), data, starts, ends).tolist() == [True, False]
+    assert columns.usual_rows(messages.layout(8000), data, starts, ends).tolist() == [True, False]

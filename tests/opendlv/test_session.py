@@ -9,10 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv import session as sessions
-from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import MAX_DATAGRAM_BYTES, PORT, Session, SessionError
+from dodo_dsl.opendlv.bus import session as sessions
+from dodo_dsl.opendlv.bus.envelope import Envelope, decode_frame, encode_frame
+from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES, PORT, Session, SessionError
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from tests.opendlv.conftest import Peer
 
 STANDARD = MessageSet.standard()
@@ -175,7 +175,7 @@ def test_a_machine_without_a_route_for_multicast() -> None:
     alone = ["unshare", "--net", "--map-root-user"]
     if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False, capture_output=True).returncode:
         pytest.skip("no network namespace can be made here")
-    code = "from dodo_dsl.opendlv.session import Session\ntry: Session(130)\nexcept OSError as error: print(error)"
+    code = "from dodo_dsl.opendlv.bus.session import Session\ntry: Session(130)\nexcept OSError as error: print(error)"
     done = subprocess.run([*alone, sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("the bus 225.0.0.130:12175 cannot be joined: ")
     assert done.stdout.endswith(" (is there a route to 224.0.0.0/4?)\n")

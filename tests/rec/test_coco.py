@@ -5,8 +5,8 @@ from pathlib import Path
 import cv2
 import pytest
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.recordings.truth import Mark, text
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.rec.truth import Mark, text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 PREFIX = "opendlv.logic.perception.Detection"

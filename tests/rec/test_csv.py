@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import STANDARD
-from dodo_dsl.opendlv.odvd import load
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
+from dodo_dsl.opendlv.odvd.parser import load
 from tests.opendlv.test_against_libcluon import some_value
 from tests.rec.conftest import BEGIN, MESSAGES, dodo_rec, message
 
 REC2CSV = Path(sys.executable).with_name("cluon-rec2csv")
-OLD = STANDARD.with_name("messages-0.9.odvd")
 
 
 def tables(folder: Path) -> dict[str, bytes]:
@@ -43,7 +42,7 @@ def test_recordings_of_others_as_libcluon_has_them(
     path = shared_data(name)
     assert ours(path, tmp_path / "new", "--messages=1.0") == libcluons(path, STANDARD, tmp_path / "their-new")
     old = ours(path, tmp_path / "old", "--messages=0.9")
-    for file, text in libcluons(path, OLD, tmp_path / "their-old").items():
+    for file, text in libcluons(path, STANDARD_0_9, tmp_path / "their-old").items():
         assert old[file] == text
 
 

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli import rec
-from dodo_dsl.recordings.truth import Mark, text
+from dodo_dsl.cli.rec import command
+from dodo_dsl.rec.truth import Mark, text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, video
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text()
-SHOWN = re.findall(r"^ +dodo rec (.*?)(?:  |$)", PAGE + rec.EXAMPLES + rec._CUT + rec._EXPORT + rec._INFO, re.MULTILINE)
+SHOWN = re.findall(
+    r"^ +dodo rec (.*?)(?:  |$)", PAGE + command.EXAMPLES + command._CUT + command._EXPORT + command._INFO, re.MULTILINE
+)
 
 
 @pytest.mark.parametrize("words", sorted(set(SHOWN)))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.recordings.truth import Mark, TruthError, check, drawn, mark, read, text
+from dodo_dsl.rec.truth import Mark, TruthError, check, drawn, mark, read, text
 from services.object_detection.truth import load
 
 WIDTH, HEIGHT = 640, 480

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 
-MAPS = data.registry() / "maps"
+MAPS = package_data.registry() / "maps"
 OPEN = ["left-curve", "rig-straight", "straight"]
 TRACKS = [*OPEN, "kiwi-track"]
 NAMES = sorted([*TRACKS, "static-rig"])

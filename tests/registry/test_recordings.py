@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.opendlv.video import VideoDecoder
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.video.decoder import VideoDecoder
 
 COMMITTED = Path(__file__).parents[2] / "tests_registry" / "recordings"
 MESSAGES = MessageSet.standard()

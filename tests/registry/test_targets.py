@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 import yaml
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 
-REGISTRY = data.registry()
-KIWI = data.root() / "examples" / "kiwi"
+REGISTRY = package_data.registry()
+KIWI = package_data.root() / "examples" / "kiwi"
 
 
 def program(path) -> ModuleType:

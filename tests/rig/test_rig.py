@@ -19,12 +19,12 @@ import pytest
 import yaml
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.plan.model import from_json
-from dodo_dsl.run import rigs
-from dodo_dsl.run.events import BackendError
+from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.rigs import rigs
 from services.gantry.port import SerialPort
 from tests.drive.applications import KIWI, ROOT, results
 from tests.services.gantry.fakerig import FakeRig
@@ -178,7 +178,7 @@ def sandbox(run: "subprocess.Popen[bytes]") -> int:
     (found,) = (
         int(name)
         for name in Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
-        if b"dodo_dsl.run.sandbox" in Path(f"/proc/{name}/cmdline").read_bytes()
+        if b"dodo_dsl.run.process.sandbox" in Path(f"/proc/{name}/cmdline").read_bytes()
     )
     return found
 

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.rig_truth import EXAMPLES
+from dodo_dsl.cli.rig.truth_command import EXAMPLES
 from services.object_detection.truth import load
 from tests.drive.applications import ROOT
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import jsonschema
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from dodo_dsl.plan.model import Plan, to_json
 from tests.run.helpers import Bench
 
@@ -44,7 +44,7 @@ class Desk:
 
     def results(self, report: str = "report") -> list[dict[str, object]]:
         document = json.loads((self.folder / report / "results.json").read_text())
-        jsonschema.validate(document, json.loads((data.schemas() / "results.schema.json").read_text()))
+        jsonschema.validate(document, json.loads((package_data.schemas() / "results.schema.json").read_text()))
         return list(document["tests"])
 
 

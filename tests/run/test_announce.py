@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.plan.model import from_json
 from dodo_dsl.run.announce import signs_of_life
-from dodo_dsl.run.docker import DockerBackend
-from dodo_dsl.run.events import BackendError
+from dodo_dsl.run.docker.backend import DockerBackend
+from dodo_dsl.run.protocol import BackendError
 
 GOLDEN = Path(__file__).parents[1] / "compiler" / "golden" / "hil-dynamic" / "test.json"
 

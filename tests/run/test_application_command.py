@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan.application import plan_application, read_application
+from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.commands import Commands, Lane
+from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.run.process.commands import Commands, Lane
 
 COMPOSE = """\
 services:

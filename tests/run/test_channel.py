@@ -7,18 +7,19 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import backends, channel, forks
-from dodo_dsl.run.lanes import namespaces_refusal
+from dodo_dsl.run import backends
+from dodo_dsl.run.process import fork_server_client, sandbox_client
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.run.helpers import Bench
 
 
 def test_a_sandbox_that_reads_nothing_is_not_waited_for_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(channel, "CLOSE_S", 0.1)
+    monkeypatch.setattr(sandbox_client, "CLOSE_S", 0.1)
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setblocking(False)
     with ours, theirs, pytest.raises(OSError, match=r"it has read nothing for 0\.1 s"):
         for _ in range(1000):
-            channel.send_patiently(ours, bytes(10_000), ())
+            sandbox_client.send_patiently(ours, bytes(10_000), ())
 
 
 def test_an_environment_that_is_too_large_is_the_services_fault(tmp_path: Path) -> None:
@@ -36,7 +37,7 @@ def test_without_a_nursery_a_sandbox_of_its_own_is_started(tmp_path: Path, monke
     """The nursery has gone before it was asked, and while it was."""
     if why := namespaces_refusal():
         pytest.skip(f"no namespaces here: {why}")
-    real = forks.Nursery
+    real = fork_server_client.Nursery
 
     class Gone(real):  # type: ignore[misc, valid-type]
         def __init__(self, descriptors: tuple[int, ...]) -> None:
@@ -63,9 +64,9 @@ def test_the_nursery_is_gone_after_the_run(tmp_path: Path, monkeypatch: pytest.M
     if why := namespaces_refusal():
         pytest.skip(f"no namespaces here: {why}")
     made = []
-    real = forks.Nursery
+    real = fork_server_client.Nursery
 
-    def remembered(descriptors: tuple[int, ...]) -> forks.Nursery:
+    def remembered(descriptors: tuple[int, ...]) -> fork_server_client.Nursery:
         made.append(real(descriptors))
         return made[-1]
 

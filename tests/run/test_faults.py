@@ -9,12 +9,12 @@ import pytest
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run import engine
-from dodo_dsl.run.lanes import namespaces_refusal
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.faults import Book
 from tests.run.helpers import BEGUN, DRIVES, FAIL, PASS, READY, STARTED, WAIT, Bench
 
 SHARES = """
-from dodo_dsl.opendlv.memory import SharedMemory
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 name = sys.argv[2].partition("=")[2]
 memory = SharedMemory.create(name, 1000)
 print("memory", name, flush=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.forked import Forked
+from dodo_dsl.run.process.forked_process import Forked
 
 TELLS = """
 import os, signal, sys
@@ -21,7 +21,7 @@ print("an error", file=sys.stderr)
 
 PARENT = """
 import signal, sys
-from dodo_dsl.run.forked import Forked
+from dodo_dsl.run.process.forked_process import Forked
 signal.signal(signal.SIGTERM, lambda *_: None)
 sys.path.insert(0, sys.argv[1])
 with open(sys.argv[1] + "/log", "wb") as log:
@@ -81,7 +81,8 @@ def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
 
 def test_what_the_nursery_loads_has_no_thread() -> None:
     """The kernel lets a process with several threads into no user namespace of its own."""
-    code = "from dodo_dsl.run import nursery; nursery.load(); import os; print(len(os.listdir('/proc/self/task')))"
+    load = "from dodo_dsl.run.process import fork_server; fork_server.load()"
+    code = f"{load}; import os; print(len(os.listdir('/proc/self/task')))"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout == "1\n"
 
@@ -91,7 +92,8 @@ def test_the_variables_are_as_before(threads: str | None) -> None:
     """Applications are started with them."""
     environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
     environment.update({} if threads is None else {"OPENBLAS_NUM_THREADS": threads})
-    code = "import os; from dodo_dsl.run import nursery; b = dict(os.environ); nursery.load(); print(b == os.environ)"
+    load = "from dodo_dsl.run.process import fork_server; b = dict(os.environ); fork_server.load()"
+    code = f"import os; {load}; print(b == os.environ)"
     words = [sys.executable, "-c", code]
     result = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
     assert result.stdout == "True\n"

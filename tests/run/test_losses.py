@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl import data
-from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl import package_data
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.plan.model import Flag, Plan, Service
-from dodo_dsl.report.write import write_report
-from dodo_dsl.run.lanes import namespaces_refusal
+from dodo_dsl.report.report_folder import write_report
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.run.helpers import READY, Bench
 
 CROWD, LAST = 400, 4711
@@ -22,12 +22,12 @@ from services.base import run
 from services.rec_recorder import model, service
 write = model.Recording.write
 model.Recording.write = lambda self, envelope: (time.sleep(0.002), write(self, envelope))
-sys.exit(run(pathlib.Path({str(data.root())!r}, "services", "rec_recorder"), service.build))
+sys.exit(run(pathlib.Path({str(package_data.root())!r}, "services", "rec_recorder"), service.build))
 """
 CROWDING_JUDGE = f"""
 import pathlib, sys, time
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
 with Session(int(sys.argv[1].partition("=")[2])) as bus:
     {READY.strip()}
     while bus.receive(1.0) is None:

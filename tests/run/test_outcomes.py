@@ -8,7 +8,7 @@ import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run import engine
-from dodo_dsl.run.lanes import namespaces_refusal
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.run.helpers import FAIL, PASS, READY, WAIT, Bench
 
 

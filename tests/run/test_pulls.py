@@ -5,8 +5,8 @@ from collections.abc import Callable, Coroutine
 
 import pytest
 
-from dodo_dsl.run.events import BackendError
-from dodo_dsl.run.pulls import Pulls
+from dodo_dsl.run.docker.pulls import Pulls
+from dodo_dsl.run.protocol import BackendError
 
 
 def failing(times: int) -> tuple[list[int], Callable[[], Coroutine[None, None, str]]]:

@@ -9,7 +9,7 @@ import pytest
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Job, Processes
-from dodo_dsl.run.events import Backend
+from dodo_dsl.run.protocol import Backend
 from dodo_dsl.run.runner import Policy
 from tests.run.helpers import READY, Bench
 

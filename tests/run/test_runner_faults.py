@@ -17,8 +17,8 @@ from tests.run.helpers import PASS, READY, WAIT
 FLOODS = "while True: print('x' * 1000, flush=True)\n"
 STUBBORN = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
 TALKS = """
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
 with Session(int(sys.argv[1].partition("=")[2])) as bus:
     while True:
         bus.send_envelope(Envelope(1086, b"", 1, 1, 1, 0))
@@ -81,7 +81,7 @@ def test_next_run_removes_what_a_killed_sandbox_left_on_the_host(desk: Desk, boo
     """Runner and sandbox both killed: of what does not end when its parent dies, only the lease's record says it."""
     process = desk.start(desk.bench.plan(judge=STUBBORN + READY + WAIT), "--isolation", "host")
     wait_for(process, "running")
-    sandboxes = [pid for pid in processes_with("dodo_dsl.run.sandbox") if parent(pid) == process.pid]
+    sandboxes = [pid for pid in processes_with("dodo_dsl.run.process.sandbox") if parent(pid) == process.pid]
     assert len(sandboxes) == 1
     os.kill(int(sandboxes[0]), signal.SIGSTOP)
     process.kill()

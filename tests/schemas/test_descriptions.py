@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 
-FILES = sorted(data.schemas().glob("*.schema.json"))
+FILES = sorted(package_data.schemas().glob("*.schema.json"))
 
 
 def keys(schema: dict[str, Any], place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:

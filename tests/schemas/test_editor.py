@@ -8,17 +8,17 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from dodo_dsl import data
-from dodo_dsl.spec import editor
+from dodo_dsl import package_data
+from dodo_dsl.spec import editor_schema
 from dodo_dsl.spec.manifest import load_manifests
 
 MANIFESTS, _ = load_manifests()
-SPECS = sorted(data.registry().glob("*/*.dodo.yml"))
+SPECS = sorted(package_data.registry().glob("*/*.dodo.yml"))
 
 
 @pytest.fixture(scope="module")
 def schema() -> dict[str, Any]:
-    made: dict[str, Any] = json.loads(editor.generate(editor.path().read_text(), MANIFESTS))
+    made: dict[str, Any] = json.loads(editor_schema.generate(editor_schema.path().read_text(), MANIFESTS))
     return made
 
 
@@ -29,18 +29,18 @@ def problems(schema: dict[str, Any], use: object) -> list[str]:
 
 
 def test_the_schema_is_what_the_manifests_say() -> None:
-    text = editor.path().read_text()
-    assert editor.generate(text, MANIFESTS) == text, "run `make schema`"
+    text = editor_schema.path().read_text()
+    assert editor_schema.generate(text, MANIFESTS) == text, "run `make schema`"
 
 
 def test_a_schema_without_services_gets_them_back(tmp_path: Path) -> None:
-    bare = json.loads(editor.path().read_text())
-    bare["$defs"] = {k: v for k, v in bare["$defs"].items() if not k.startswith(editor.PREFIX)}
+    bare = json.loads(editor_schema.path().read_text())
+    bare["$defs"] = {k: v for k, v in bare["$defs"].items() if not k.startswith(editor_schema.PREFIX)}
     bare["$defs"]["use"].pop("allOf", None)
     file = tmp_path / "dodo.schema.json"
     file.write_text(json.dumps(bare))
-    editor.write(file)
-    assert file.read_text() == editor.generate(editor.path().read_text(), MANIFESTS)
+    editor_schema.write(file)
+    assert file.read_text() == editor_schema.generate(editor_schema.path().read_text(), MANIFESTS)
 
 
 def test_each_service_is_offered_with_its_sentence_and_all_its_parameters(schema: dict[str, Any]) -> None:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
 from tests.services.process import PATIENCE, hear, running, say
 
 FRAME, STATE, PEDAL = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.proxy.PedalPositionRequest"

@@ -22,21 +22,21 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))  # the services of this checkout
 
-from dodo_dsl.opendlv import pixels  # noqa: E402
-from dodo_dsl.opendlv.envelope import Envelope  # noqa: E402
-from dodo_dsl.opendlv.messages import MessageSet  # noqa: E402
-from dodo_dsl.opendlv.video_encoder import FORMAT, VideoEncoder  # noqa: E402
+from dodo_dsl.opendlv.bus.envelope import Envelope  # noqa: E402
+from dodo_dsl.opendlv.memory import pixels  # noqa: E402
+from dodo_dsl.opendlv.messages.message_set import MessageSet  # noqa: E402
+from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder  # noqa: E402
 from services.dynamic_model.model import Vehicle  # noqa: E402
 from services.integrator.model import Integrator, Pose, Twist  # noqa: E402
 from services.integrator.rotation import quaternion  # noqa: E402
 from services.rec_recorder.model import Recording  # noqa: E402
 from services.virtual_camera.camera import Pinhole  # noqa: E402
-from services.virtual_camera.lens import Distortion  # noqa: E402
+from services.virtual_camera.draw.render import Renderer  # noqa: E402
+from services.virtual_camera.draw.scene import Wishes, load_scene  # noqa: E402
+from services.virtual_camera.image.lens import Distortion  # noqa: E402
+from services.virtual_camera.image.optics import Optics  # noqa: E402
+from services.virtual_camera.image.sensor import Sensor  # noqa: E402
 from services.virtual_camera.model import VirtualCamera, mount  # noqa: E402
-from services.virtual_camera.optics import Optics  # noqa: E402
-from services.virtual_camera.render import Renderer  # noqa: E402
-from services.virtual_camera.scene import Wishes, load_scene  # noqa: E402
-from services.virtual_camera.sensor import Sensor  # noqa: E402
 
 BEGIN = 1_700_000_000_000_000  # us since the epoch
 SIZE, FOVY, ABOVE = (640, 480), math.radians(48.8), 0.095

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import sysv_ipc
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 CID = int(FLAGS["cid"])

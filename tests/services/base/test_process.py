@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from tests.services.base.conftest import ROOT, Process, Start
 
 MESSAGES = MessageSet.standard()

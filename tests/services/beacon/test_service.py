@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context
 from services.base.flags import parse
 from services.base.manifest import load_manifest

@@ -32,7 +32,14 @@ def test_a_picture_is_judged(
 
 
 def check(source: str, ok: bool) -> dict[str, Any]:
-    command = [sys.executable, "-m", "services.camera.check", f"--source={source}", "--width=128", "--height=128"]
+    command = [
+        sys.executable,
+        "-m",
+        "services.camera.health_check",
+        f"--source={source}",
+        "--width=128",
+        "--height=128",
+    ]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
     said: dict[str, Any] = json.loads(result.stdout)
     assert (result.returncode, said["ok"]) == (int(not ok), ok), said

@@ -1,5 +1,5 @@
-from dodo_dsl.opendlv.messages import MessageSet
-from services.camera.report import Report
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.camera.telemetry import Report
 
 PERIOD = 100_000
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from services.camera.v4l2 import V4l2Camera
 from tests.services.process import PATIENCE, hear, launch, running
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.session import Session
-from services.base import channel, ear
-from services.base.lockstep import EPOCH
+from dodo_dsl.opendlv.bus.session import Session
+from services.base.lockstep import channel, clock_client
+from services.base.lockstep.lockstep_clock import EPOCH
 from services.clock import exchange, model
 from services.clock.model import Stepper
-from services.clock.terms import Patience, Stuck, TimedOut, Unanswered
+from services.clock.participants import Patience, Stuck, TimedOut, Unanswered
 from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Judge, Mover, Toys
 
 Way = list[tuple[int, float]]
@@ -89,14 +89,14 @@ def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch:
     monkeypatch.setattr(channel.Channel, "send", send)
     monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
     monkeypatch.setattr(exchange, "_SLICE", 0.01)
-    monkeypatch.setattr(ear, "SLICE_MS", 10)
+    monkeypatch.setattr(clock_client, "SLICE_MS", 10)
     way, stepper = toys.run(toys.application())
     assert close(way, expected(21))
     assert stepper.audience.frames == 21
 
 
 def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.base.parts.PART_BYTES", 100)
+    monkeypatch.setattr("services.base.lockstep.datagrams.PART_BYTES", 100)
     way, _ = toys.run(toys.application())
     assert close(way, expected(21))
 
@@ -188,7 +188,7 @@ def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: p
         if count <= 3:
             plain(self, message, to)
 
-    monkeypatch.setattr("services.base.parts.PART_BYTES", 150)
+    monkeypatch.setattr("services.base.lockstep.datagrams.PART_BYTES", 150)
     monkeypatch.setattr(channel.Channel, "send", send)
     monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
     monkeypatch.setattr(exchange, "_SLICE", 0.01)

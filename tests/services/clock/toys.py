@@ -9,18 +9,18 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.memory import SharedMemory, SharedMemoryError
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from services.base import Service, Verdict
-from services.base.channel import Channel
-from services.base.lockstep import EPOCH, LockstepClock
+from services.base.lockstep.channel import Channel
+from services.base.lockstep.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, kinds
-from services.clock.audience import Audience
+from services.clock.application import Audience
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
-from services.clock.terms import Patience, Roles
+from services.clock.participants import Patience, Roles
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags
 from services.collision.model import UnjudgeableError
 from services.collision.service import Collision

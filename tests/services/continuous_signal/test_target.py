@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import MessageSet
-from services.continuous_signal.recorded import read_recording
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.continuous_signal.csv_target import read_table
+from services.continuous_signal.recorded_target import read_recording
 from services.continuous_signal.signals import Signal, check
-from services.continuous_signal.table import read_table
 from services.continuous_signal.target import Target, TargetError, in_order
 
 SECOND = 1_000_000

@@ -13,7 +13,7 @@ import time
 import tty
 from pathlib import Path
 
-from services.gantry.table import SPEED, Error
+from services.gantry.rig_table import SPEED, Error
 
 COMMAND = re.compile(r"\$([A-Z]+):?([-+0-9.,]*)")
 WATCHDOG = 0.5

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from services.gantry.emulated import EmulatedRig
+from services.gantry.emulator import EmulatedRig
 from services.gantry.link import RigError
 
 SAYS = """#!/bin/sh

@@ -20,7 +20,7 @@ def rig(tmp_path: Path) -> Iterator[FakeRig]:
 
 
 def hand(rig: FakeRig, *words: str, code: int = 0) -> dict[str, Any]:
-    command = [sys.executable, "-m", "services.gantry.hand", f"--serial={rig.path}", *words]
+    command = [sys.executable, "-m", "services.gantry.manual", f"--serial={rig.path}", *words]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
     assert result.returncode == code, result.stdout + result.stderr
     said: dict[str, Any] = json.loads(result.stdout)

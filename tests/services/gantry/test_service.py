@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.gantry import start
 from services.gantry.link import Link, RigError
 from services.gantry.port import SerialPort
+from services.gantry.rig_table import Error
 from services.gantry.service import Gantry
-from services.gantry.table import Error
 from tests.services.gantry.fakerig import FakeRig
 from tests.services.process import PATIENCE, ROOT, hear, launch, running, say
 

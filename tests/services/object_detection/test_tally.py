@@ -6,8 +6,8 @@ from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
 from services.object_detection.boxes import Box, Thing
+from services.object_detection.counts import Tallies, Tally, compare
 from services.object_detection.frames import Kind, Parts
-from services.object_detection.tally import Tallies, Tally, compare
 
 A, B, FAR = Box(0, 0, 0.1, 0.1), Box(0.3, 0, 0.1, 0.1), Box(0.8, 0.8, 0.1, 0.1)
 LABELS = ("yellow", "blue", "orange")

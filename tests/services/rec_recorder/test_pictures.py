@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv import pixels
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.opendlv.session import Session
-from dodo_dsl.opendlv.video import VideoDecoder
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory import pixels
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.video.decoder import VideoDecoder
 from tests.services.process import PATIENCE, running, say
 from tests.services.rec_replay.viewer import Viewer
 

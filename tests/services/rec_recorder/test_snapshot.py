@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv import pixels
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory import pixels
 from services.rec_recorder.snapshot import Snapshot
 from services.rec_recorder.source import Source, Wanted
 from tests.services.process import launch, running, say

@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.video import VideoError
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.video.decoder import VideoError
 from services.rec_replay.pictures import Screen, first_frame, pixels
 from services.rec_replay.selection import Selection, select
 from services.rec_replay.stream import Stream

@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from services.virtual_camera.camera import Pinhole, Pose
-from services.virtual_camera.lens import Distortion, Lens
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
+from services.virtual_camera.image.lens import Distortion, Lens
+from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.motion import still
-from services.virtual_camera.optics import Optics
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
 
 CAMERA = Pinhole(160, 120, 1.0)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.light import DIRECTION, Light, direction_of
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import Wishes, load_scene
+from services.virtual_camera.draw.light import DIRECTION, Light, direction_of
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import Wishes, load_scene
 
 
 def draw(folder, light, *pose, **angles):

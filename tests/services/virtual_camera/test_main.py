@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 import yaml
 
-from dodo_dsl import data
-from dodo_dsl.opendlv.messages import MessageSet
+from dodo_dsl import package_data
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.virtual_camera.camera import Pose
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.model import to_i420
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
 
-FOLDER = data.services() / "virtual_camera"
-STRAIGHT = data.registry() / "maps" / "straight"
+FOLDER = package_data.services() / "virtual_camera"
+STRAIGHT = package_data.registry() / "maps" / "straight"
 
 
 @pytest.fixture

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from services.virtual_camera.jsonnode import MapError
-from services.virtual_camera.meshes import is_closed, load_obj, oriented, volume
-from services.virtual_camera.polygons import convex_parts, join
-from services.virtual_camera.shape import make_shape
+from services.virtual_camera.draw.polygons import convex_parts, join
+from services.virtual_camera.draw.shape import make_shape
+from services.virtual_camera.map.json_node import MapError
+from services.virtual_camera.map.meshes import is_closed, load_obj, oriented, volume
 
 
 def cylinder(sides: int, radius: float = 0.5, height: float = 2.0) -> str:

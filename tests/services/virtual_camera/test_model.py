@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from services.virtual_camera.camera import Pose
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.model import VirtualCamera, mount, to_i420
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
 
 
 def frame(x=0.0, y=0.0, z=0.0, yaw=0.0, **changes):

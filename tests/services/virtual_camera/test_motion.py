@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
+from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.motion import MOST, Motion, between, still
-from services.virtual_camera.optics import Optics
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
 
 BODY = Pose.at(0, 0, 0)
 

@@ -7,13 +7,13 @@ import shutil
 import numpy as np
 import pytest
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.truth import Limits, Truth, classes_of
 
-MAPS = data.registry() / "maps"
+MAPS = package_data.registry() / "maps"
 FOVY = math.radians(48.8)
 
 

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.virtual_camera.raster import fill, inset
+from services.virtual_camera.draw.raster import fill, inset
 
 
 def covered(polygon: np.ndarray, size: int) -> np.ndarray:

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 
 FOVY = math.radians(48.8)
 FOCAL = 240 / math.tan(FOVY / 2)
@@ -77,7 +77,7 @@ def test_small_and_far_boxes_keep_their_size(cube_at):
 
 def test_silhouettes_cover_what_all_the_faces_would():
     """Far cones in a small picture, drawn as silhouettes, and in one of four times the size, face by face."""
-    scene = load_scene(data.registry() / "maps" / "straight")
+    scene = load_scene(package_data.registry() / "maps" / "straight")
     small, large = (Renderer(scene, 480 * k, 360 * k, 0.5) for k in (1, 4))
     covered = []
     for x in np.linspace(-2.5, -2.1, 9):

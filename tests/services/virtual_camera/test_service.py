@@ -10,21 +10,21 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl import data
-from dodo_dsl.opendlv.memory import SharedMemory
-from dodo_dsl.opendlv.messages import MessageSet
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl import package_data
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Output
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.service import build
 from tests.services.process import hear, running
 
-MANIFEST = load_manifest(data.services() / "virtual_camera")
-STRAIGHT = data.registry() / "maps" / "straight"
+MANIFEST = load_manifest(package_data.services() / "virtual_camera")
+STRAIGHT = package_data.registry() / "maps" / "straight"
 MESSAGES = MessageSet.standard()
 LOGIC = "opendlv.logic.perception.Detection"
 PLACE = ["--z=0.095", "--yaw=90"]

@@ -3,13 +3,13 @@ import math
 import numpy as np
 import pytest
 
-from services.virtual_camera.bodies import Bodies
-from services.virtual_camera.bsp import Tree
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.light import Light
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import load_scene
-from services.virtual_camera.solids import MAX_FACES, groups
+from services.virtual_camera.draw.bodies import Bodies
+from services.virtual_camera.draw.bsp import Tree
+from services.virtual_camera.draw.light import Light
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import load_scene
+from services.virtual_camera.draw.solids import MAX_FACES, groups
 
 
 def crossing(folder_of, *places, block=()):

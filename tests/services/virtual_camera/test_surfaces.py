@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from services.virtual_camera.camera import Pinhole, Pose
-from services.virtual_camera.faces import Face, TextureMap
-from services.virtual_camera.jsonnode import MapError
-from services.virtual_camera.surfaces import draw_backdrop, draw_face
-from services.virtual_camera.textures import Texture, default_ground, load_picture
+from services.virtual_camera.draw.faces import Face, TextureMap
+from services.virtual_camera.draw.surfaces import draw_backdrop, draw_face
+from services.virtual_camera.map.json_node import MapError
+from services.virtual_camera.map.textures import Texture, default_ground, load_picture
 
 SKY, GROUND = (255.0, 0.0, 0.0, 255.0), (0.0, 255.0, 0.0, 255.0)
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pose
-from services.virtual_camera.clutter import FARTHEST, NEAREST, clutter
-from services.virtual_camera.jsonnode import MapError
-from services.virtual_camera.lines import TAPE
-from services.virtual_camera.overlays import Overlay, load_overlays
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import Wishes, load_scene
+from services.virtual_camera.draw.lines import TAPE
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import Wishes, load_scene
+from services.virtual_camera.image.overlays import Overlay, load_overlays
+from services.virtual_camera.map.clutter import FARTHEST, NEAREST, clutter
+from services.virtual_camera.map.json_node import MapError
 
-STRAIGHT = data.registry() / "maps" / "straight"
+STRAIGHT = package_data.registry() / "maps" / "straight"
 
 
 def test_tape_is_where_the_pinhole_puts_the_line(write_map):

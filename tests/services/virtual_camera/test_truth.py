@@ -5,16 +5,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl import data
+from dodo_dsl import package_data
 from services.virtual_camera.camera import Pinhole, Pose
-from services.virtual_camera.lens import Distortion
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.draw.scene import Wishes, load_scene
+from services.virtual_camera.image.lens import Distortion
+from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.motion import still
-from services.virtual_camera.optics import Optics
-from services.virtual_camera.render import Renderer
-from services.virtual_camera.scene import Wishes, load_scene
 from services.virtual_camera.truth import Box, Limits, Truth, classes_of
 
-STRAIGHT = data.registry() / "maps" / "straight"
+STRAIGHT = package_data.registry() / "maps" / "straight"
 FOVY = math.radians(48.8)
 FOCAL = 240 / math.tan(FOVY / 2)
 ALL = Limits(0.0, 0.0)

@@ -1,0 +1,90 @@
+"""The files of an application, each read once; what is wrong with them gathers on the way."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from dodo_dsl import source
+from dodo_dsl.application.interpolation import dotenv
+from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.source import Node, Scalar, read
+
+MAX_FILES = 64
+MAX_NODES = 50_000
+MAX_TEXT = 8_192
+_MAX_ENV = 1 << 20
+
+
+class Files:
+    """Documents by path, ``variables`` of their ``.env`` files and ``problems``."""
+
+    def __init__(self) -> None:
+        self.problems: list[Diagnostic] = []
+        self.variables: dict[str, str] = {}
+        self._documents: dict[Path, source.Mapping | None] = {}
+        self._nodes = 0
+
+    @property
+    def full(self) -> bool:
+        """Whether there is too much already."""
+        return self._nodes > MAX_NODES
+
+    def grow(self, node: Node, span: Span) -> bool:
+        """Counts what is read and what ``extends`` makes of it; False with a problem when it is too much."""
+        for part in source.walk(node):
+            self._nodes += 1
+            long = isinstance(part, Scalar) and len(part.text) > MAX_TEXT
+            if self._nodes <= MAX_NODES and not long:
+                continue
+            what = f"a text of more than {MAX_TEXT} characters" if long else f"more than {MAX_NODES} values in all"
+            self.problems.append(Diagnostic(part.span if long else span, "too-large", what))
+            return False
+        return True
+
+    def problem(self, span: Span, message: str, hint: str = "") -> None:
+        self.problems.append(Diagnostic(span, "application-file", message, hint))
+
+    def document(self, file: Path) -> source.Mapping | None:
+        if file not in self._documents:
+            node, found = read(file)
+            if node is None and not found:
+                found = [Diagnostic(Span(str(file)), "application-file", "the file is empty, expected a compose file")]
+            if node is not None and not isinstance(node, source.Mapping):
+                message = "the file holds no mapping, expected a compose file with services"
+                found = [*found, Diagnostic(node.span, "wrong-type", message)]
+            self.problems.extend(found)
+            fits = isinstance(node, source.Mapping) and self.grow(node, Span(str(file)))
+            self._documents[file] = node if isinstance(node, source.Mapping) and fits else None
+        return self._documents[file]
+
+    def other(self, word: Scalar, folder: Path) -> Path | None:
+        """The file that another one names from ``folder``; None with a problem when not every machine has it."""
+        text = word.text
+        if "$" in text or "://" in text or text.startswith(("/", "~", "git@", "oci:")):
+            hint = "name a file of the repository, relative to this one"
+            self.problem(word.span, f"'{text}' is not the same on every machine, expected a relative path", hint)
+            return None
+        file = Path(os.path.normpath(folder / text))
+        if file.is_symlink() or not file.is_file():
+            kind = "a symbolic link" if file.is_symlink() else "no file"
+            self.problem(word.span, f"'{text}' is {kind}, expected a file beside this one")
+            return None
+        if len(self._documents) >= MAX_FILES:
+            self.problem(word.span, f"this is one of more than {MAX_FILES} files, which is too many")
+            return None
+        return file
+
+    def gather(self, file: Path | None, span: Span) -> None:
+        """Takes the variables of an ``.env`` file, if there is one."""
+        for name, value in variables_of(file).items() if file else ():
+            if self.variables.setdefault(name, value) != value:
+                message = f"variable {name} has another value in '{file.name if file else ''}' than in an earlier file"
+                self.problem(span, message, "a test has one .env, so give the variable one value")
+
+
+def variables_of(file: Path) -> Mapping[str, str]:
+    """The variables that a plain file sets; links are not followed."""
+    if file.is_symlink() or not file.is_file():
+        return {}
+    with file.open("rb") as stream:
+        return dotenv(stream.read(_MAX_ENV).decode("utf-8", "replace"))

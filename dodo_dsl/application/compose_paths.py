@@ -1,0 +1,152 @@
+"""Relative paths in a compose file: where they stand, and what they are called from another folder."""
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from dodo_dsl import source
+from dodo_dsl.application import interpolation
+from dodo_dsl.source import Entry, Node, Scalar
+
+Change = Callable[[str], str]
+
+_HERE = re.compile(r"\$(?:PWD|\{PWD(?::?-[^{}]*)?\})(?=/|$)")
+_DEFAULT = re.compile(r"(?P<head>\$\{[A-Za-z_][A-Za-z0-9_]*:?-)(?P<path>\.\.?(?:/[^{}]*)?)\}")
+_WORD = re.compile(r"\$\{[A-Za-z_][A-Za-z0-9_]*:?-(?P<word>[^}].*)\}")
+_REMOTE = ("/", "~", "git@", "github.com/", "service:", "target:")
+
+
+def rebased(path: str, base: str) -> str:
+    """A path as seen from the folder for which ``base`` is the path's own folder.
+
+    Absolute paths, addresses and variables stay; ``${PWD}`` is the folder of the compose file, in which compose is
+    started, and a variable's default is a path as well.
+    """
+    path = _HERE.sub(".", path, count=1) if path.startswith("$") else path
+    if path.startswith(_REMOTE) or "://" in path:
+        return path
+    if path.startswith("$"):
+        return _DEFAULT.sub(lambda m: f"{m['head']}{rebased(m['path'], base)}}}", path, count=1)
+    joined = f"{base}/{path.removeprefix('./')}"
+    joined = joined if "$" in joined else os.path.normpath(joined)
+    return joined if joined.startswith((".", "/")) else f"./{joined}"
+
+
+def _as_relative(path: str) -> str:
+    """A path that begins with a variable, but surely not with a folder's: ``${CAR:-kiwi}.env`` lies beside the file."""
+    if not path.startswith("$") or "://" in path or _HERE.match(path):
+        return path
+    end = interpolation.end_of_variable(path, 0)
+    default = _WORD.match(path[:end])
+    is_name = path[end : end + 1] not in ("", "/") or (default is not None and default["word"][:1] not in "/~.$")
+    return f"./{path}" if is_name else path
+
+
+def is_path(text: str) -> bool:
+    """Whether a volume's source is a path; other words name a volume."""
+    return text.startswith((".", "/", "~", "$"))
+
+
+def mapped_service(service: source.Mapping, change: Change) -> source.Mapping:
+    """A service with ``change`` done to each of its paths."""
+    return _mapped(service, _SERVICE, change)
+
+
+def mapped_rest(rest: Mapping[str, Node], change: Change) -> dict[str, Node]:
+    """Top-level volumes, secrets and configs likewise."""
+    return {key: _each(node, _TOP[key], change) if key in _TOP else node for key, node in rest.items()}
+
+
+def _mapped(node: Node, table: Mapping[str, Callable[[Node, Change], Node]], change: Change) -> source.Mapping:
+    assert isinstance(node, source.Mapping)
+    entries = {k: Entry(e.key, table[k](e.value, change)) if k in table else e for k, e in node.entries.items()}
+    return replace(node, entries=entries)
+
+
+def _scalar(node: Node, change: Change) -> Node:
+    if not isinstance(node, Scalar) or not isinstance(node.value, str):
+        return node
+    text = change(node.value)
+    return replace(node, value=text, text=text)
+
+
+def _path(node: Node, change: Change) -> Node:
+    return _scalar(node, lambda text: change(_as_relative(text)))
+
+
+def _each(node: Node, form: Callable[[Node, Change], Node], change: Change) -> Node:
+    if isinstance(node, source.Sequence):
+        return replace(node, items=tuple(form(item, change) for item in node.items))
+    if isinstance(node, source.Mapping):
+        return replace(node, entries={k: Entry(e.key, form(e.value, change)) for k, e in node.entries.items()})
+    return node
+
+
+def _build(node: Node, change: Change) -> Node:
+    if not isinstance(node, source.Mapping):
+        return _path(node, change)
+    if "context" not in node.entries:
+        here = Entry(node.span, Scalar(node.span, ".", "."))
+        node = replace(node, entries={"context": here, **node.entries})
+    return _mapped(node, {"context": _path, "additional_contexts": _contexts}, change)
+
+
+def _contexts(node: Node, change: Change) -> Node:
+    def after_sign(text: str) -> str:
+        name, sign, path = text.partition("=")
+        return name + sign + change(path)
+
+    return _each(node, _scalar, change if isinstance(node, source.Mapping) else after_sign)
+
+
+def _env_file(node: Node, change: Change) -> Node:
+    if isinstance(node, source.Sequence):
+        return _each(node, _env_file, change)
+    return _mapped(node, {"path": _path}, change) if isinstance(node, source.Mapping) else _path(node, change)
+
+
+def _volume(node: Node, change: Change) -> Node:
+    if isinstance(node, source.Mapping):
+        kind, bind = node.get("type"), isinstance(node.get("source"), Scalar)
+        is_bind = bind and isinstance(kind, Scalar) and kind.value == "bind"
+        return _mapped(node, {"source": _scalar}, change) if is_bind else node
+
+    def before_colon(text: str) -> str:
+        origin, *others = interpolation.split_outside(text, ":")
+        return ":".join([change(origin), *others]) if others and is_path(origin) else text
+
+    return _scalar(node, before_colon)
+
+
+def _security(node: Node, change: Change) -> Node:
+    def profile(text: str) -> str:
+        match = re.match(r"seccomp[:=](?!unconfined|builtin|\{)", text)
+        return match[0] + change(text[match.end() :]) if match else text
+
+    return _scalar(node, profile)
+
+
+def _file(node: Node, change: Change) -> Node:
+    return _mapped(node, {"file": _path}, change) if isinstance(node, source.Mapping) else node
+
+
+def _named_volume(node: Node, change: Change) -> Node:
+    options = node.get("driver_opts") if isinstance(node, source.Mapping) else None
+    if not isinstance(node, source.Mapping) or not isinstance(options, source.Mapping):
+        return node
+    kind = options.get("o")
+    if not isinstance(kind, Scalar) or "bind" not in kind.text.split(","):
+        return node
+    return _mapped(node, {"driver_opts": lambda o, c: _mapped(o, {"device": _scalar}, c)}, change)
+
+
+_SERVICE: dict[str, Callable[[Node, Change], Node]] = {
+    "build": _build,
+    "env_file": _env_file,
+    "label_file": _env_file,
+    "volumes": lambda node, change: _each(node, _volume, change),
+    "security_opt": lambda node, change: _each(node, _security, change),
+    "credential_spec": _file,
+}
+_TOP: dict[str, Callable[[Node, Change], Node]] = {"secrets": _file, "configs": _file, "volumes": _named_volume}

@@ -1,0 +1,107 @@
+"""What of a machine a service asks for: its hardware, and what no test can have to itself."""
+
+import posixpath
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from dodo_dsl.application.interpolation import split_outside
+
+MACHINE_CAPABILITIES = frozenset(
+    (
+        *("ALL", "BPF", "DAC_READ_SEARCH", "MKNOD", "PERFMON", "SYSLOG", "SYS_ADMIN", "SYS_BOOT"),
+        *("SYS_MODULE", "SYS_RAWIO", "SYS_TIME", "SYS_TTY_CONFIG", "WAKE_ALARM"),
+    )
+)
+HARDWARE_KEYS = ("devices", "device_cgroup_rules")
+NAMESPACES = ("network_mode", "ipc", "pid")
+
+_PLAIN_DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+_WHOLE = ("/", "/run", "/var/run", "/var", "/var/lib/docker")
+_SOCKET = re.compile(r"(docker|podman|containerd|crio)\.sock$")
+
+
+@dataclass(frozen=True)
+class Mount:
+    """An entry of ``volumes``: a path or a volume's name in ``source``, empty for an unnamed volume."""
+
+    source: str
+    target: str
+    read_only: bool = False
+
+    def below(self, folder: str) -> bool:
+        return self.source == folder or self.source.startswith(f"{folder}/")
+
+
+def mount(volume: Any) -> Mount:
+    """A mount from its short or its long form."""
+    if isinstance(volume, dict):
+        origin, target = str(volume.get("source") or ""), str(volume.get("target") or "")
+        return Mount(_clean(origin), _clean(target), volume.get("read_only") is True)
+    parts = split_outside(str(volume), ":")
+    if len(parts) == 1:
+        return Mount("", _clean(parts[0]))
+    return Mount(_clean(parts[0]), _clean(parts[1]), "ro" in ",".join(parts[2:]).split(","))
+
+
+def _clean(path: str) -> str:
+    return posixpath.normpath(path) if path.startswith("/") else path
+
+
+def is_shared_memory(found: Mount) -> bool:
+    return found.below("/dev/shm")
+
+
+def is_hardware(found: Mount) -> bool:
+    """A mount of devices, or of the kernel's settings of them."""
+    if is_shared_memory(found) or found.source in _PLAIN_DEVICES:
+        return False
+    return found.below("/dev") or (found.below("/sys") and not found.read_only)
+
+
+def is_machine(found: Mount) -> bool:
+    """A mount through which a service reaches the machine itself, or other tests' containers."""
+    is_process_table = found.below("/proc") and not found.read_only
+    return found.source in _WHOLE or is_process_table or bool(_SOCKET.search(found.source))
+
+
+def capability(word: object) -> str:
+    return str(word).upper().removeprefix("CAP_")
+
+
+def is_true(value: object) -> bool:
+    return value is True or (isinstance(value, str) and value.lower() not in ("false", ""))
+
+
+def reference(value: object) -> tuple[str, str]:
+    """``service:x`` and ``container:x`` as kind and name; two empty texts for other values."""
+    kind, sign, name = str(value or "").partition(":")
+    return (kind, name) if sign and kind in ("service", "container") else ("", "")
+
+
+def borrowed(entry: object) -> tuple[str, str, str]:
+    """An entry of ``volumes_from`` as kind, name and options."""
+    kind, name = reference(entry)
+    rest = name if kind else str(entry)
+    name, sign, options = rest.partition(":")
+    return kind or "service", name, sign + options
+
+
+def references(service: dict[str, Any], containers: dict[str, str]) -> Iterator[tuple[str, str]]:
+    """The services that a service needs, by the key that says so; containers of the application are its services."""
+    for key in NAMESPACES:
+        kind, name = reference(service.get(key))
+        if kind == "service" or name in containers:
+            yield key, containers.get(name, name) if kind == "container" else name
+    for entry in service.get("volumes_from") or ():
+        kind, name, _ = borrowed(entry)
+        if kind == "service" or name in containers:
+            yield "volumes_from", containers.get(name, name) if kind == "container" else name
+    for link in service.get("links") or ():
+        yield "links", str(link).partition(":")[0]
+    waits = service.get("depends_on") or {}
+    for name in waits:
+        options = waits[name] if isinstance(waits, dict) else {}
+        if not isinstance(options, dict) or options.get("required") is not False:
+            yield "depends_on", str(name)

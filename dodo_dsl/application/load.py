@@ -1,0 +1,101 @@
+"""All files of an application merged into one document: several files, and what they extend and include."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from dodo_dsl import source
+from dodo_dsl.application import compose_merge, compose_paths
+from dodo_dsl.application.compose_extends import Service, extended, moved
+from dodo_dsl.application.compose_files import Files
+from dodo_dsl.application.model import scalars
+from dodo_dsl.diagnostics import Span
+from dodo_dsl.source import Entry, Node, Scalar
+
+_NAMED = ("volumes", "secrets", "configs", "networks")
+
+
+def load(files: Files, names: Sequence[Path]) -> source.Mapping | None:
+    """The files merged in order, with paths relative to the first one's folder; None when one cannot be read."""
+    folder = names[0].parent
+    files.gather(folder / ".env", Span(str(names[0])))
+    return _all(files, names, folder, ())
+
+
+def _all(files: Files, names: Sequence[Path], folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
+    documents = [_whole(files, name, folder, chain) for name in names]
+    result: Node | None = None
+    for document in documents:
+        if document is None:
+            return None
+        result = document if result is None else compose_merge.merged(result, document)
+    settled = compose_merge.settled(result) if result is not None else None
+    return settled if isinstance(settled, source.Mapping) else None
+
+
+def _whole(files: Files, file: Path, folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
+    """A file with what it extends and includes."""
+    document = files.document(file)
+    if document is None:
+        return None
+    rest = source.Mapping(document.span, {k: e for k, e in document.entries.items() if k != "include"})
+    services = document.get("services")
+    if isinstance(services, source.Mapping):
+        entries = {
+            name: Entry(entry.key, extended(files, Service(file, folder, name), entry.value))
+            for name, entry in services.entries.items()
+        }
+        rest = _with(rest, "services", source.Mapping(services.span, entries, services.tag))
+    include = document.get("include")
+    for item in include.items if isinstance(include, source.Sequence) else (include,) if include else ():
+        rest = _included(files, rest, item, folder, (*chain, file))
+    return rest
+
+
+def _included(
+    files: Files, document: source.Mapping, item: Node, folder: Path, chain: tuple[Path, ...]
+) -> source.Mapping:
+    """The document with what an item of ``include`` brings; paths relative to ``folder``."""
+    words: Mapping[str, Node] = {"path": item}
+    if isinstance(item, source.Mapping):
+        words = {key: entry.value for key, entry in item.entries.items()}
+    names = scalars(words.get("path"))
+    if not names:
+        files.problem(item.span, "'include' names no file", "include: [sensors.yml]")
+        return document
+    found = [file for name in names if (file := files.other(name, folder))]
+    circle = next((name for name, file in zip(names, found, strict=False) if file in chain), None)
+    if circle:
+        files.problem(circle.span, f"'{circle.text}' is included in a circle")
+    if circle or len(found) < len(names):
+        return document
+    place = words.get("project_directory")
+    project = Path(os.path.normpath(folder / place.text)) if isinstance(place, Scalar) else found[0].parent
+    part = _all(files, found, project, chain)
+    own = [files.other(word, folder) for word in scalars(words.get("env_file"))] or [project / ".env"]
+    for file in own:
+        files.gather(file, names[0].span)
+    return document if part is None else _joined(files, document, part, project, folder)
+
+
+def _joined(
+    files: Files, document: source.Mapping, part: source.Mapping, project: Path, folder: Path
+) -> source.Mapping:
+    way = Path(os.path.relpath(project, folder)).as_posix()
+    named = {key: entry.value for key, entry in part.entries.items() if key in _NAMED}
+    for key, node in compose_paths.mapped_rest(named, lambda path: compose_paths.rebased(path, way)).items():
+        mine = document.get(key)
+        document = _with(document, key, compose_merge.merged(node, mine) if mine else node)
+    services, own = part.get("services"), document.get("services")
+    theirs = services.entries if isinstance(services, source.Mapping) else {}
+    ours = own.entries if isinstance(own, source.Mapping) else {}
+    for name in sorted(set(ours) & set(theirs)):
+        included = Path(theirs[name].key.file).name
+        files.problem(ours[name].key, f"'{name}' is a service of the included '{included}' too", "rename one of them")
+    joined = {name: Entry(e.key, moved(e.value, project, folder)) for name, e in theirs.items()}
+    return _with(document, "services", source.Mapping(document.span, {**joined, **ours}))
+
+
+def _with(document: source.Mapping, key: str, node: Node) -> source.Mapping:
+    place = document.entries[key].key if key in document.entries else node.span
+    return source.Mapping(document.span, {**document.entries, key: Entry(place, node)}, document.tag)

@@ -1,0 +1,103 @@
+"""OpenDLV flags in an application's command and environment: which CID and which memories it was told to use."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from dodo_dsl.application.interpolation import end_of_variable, names
+
+CID_VARIABLES = ("CID", "OD4SESSION_CID")
+
+_BRACES = r"\{[^{}]*\}"
+for _ in range(3):
+    _BRACES = rf"\{{(?:[^{{}}]|{_BRACES})*\}}"
+_VALUE = (
+    rf"(?:\$*{_BRACES}|\$+\([^()]*\)|\$+[A-Za-z_]\w*|\"[^\"]*\"|'[^']*'|\\+[\"'][^\"'\\]*\\+[\"']|[\w.])"
+    r"(?:\$*[\w.])*"
+)
+_CID = re.compile(rf"(?P<flag>(?<![\w-])--cid=)(?:{_VALUE})?|(?P<words>(?<![\w-])--cid[ \t\n]+){_VALUE}")
+_MEMORY = re.compile(r"(?P<flag>--name(?:\.[A-Za-z0-9]+)?=)(?P<name>.+)", re.DOTALL)
+_ENDS = ";&|<>"
+
+
+def split(command: str) -> tuple[str, ...]:
+    """A command's words as compose splits them, with variables left as they are, each part of one word.
+
+    What comes after an unquoted ``;``, ``&``, ``|``, ``<`` or ``>`` is no part of it: compose starts no shell. Raises
+    ValueError for an open quote and for a parenthesis outside quotes.
+    """
+    words: list[str] = []
+    word: str | None = None
+    quote, place = "", 0
+    while place < len(command):
+        character, end = command[place], place + 1
+        part = ""
+        if character == "$" and quote != "'":
+            end = _end_of_dollar(command, place)
+            part = command[place:end]
+        elif character == "\\" and quote != "'":
+            end = place + 2
+            part = command[place + 1 : end]
+        elif character == (quote or character) and character in "\"'":
+            quote = "" if quote else character
+        elif quote or not (character.isspace() or character in _ENDS + "()"):
+            part = character
+        elif character in "()":
+            raise ValueError("a parenthesis outside quotes; no shell reads this")
+        elif character in _ENDS:
+            break
+        else:
+            words.extend(() if word is None else (word,))
+            word, place = None, end
+            continue
+        word, place = (word or "") + part, end
+    if quote:
+        raise ValueError("a quotation mark is not closed")
+    return (*words, *(() if word is None else (word,)))
+
+
+def _end_of_dollar(command: str, place: int) -> int:
+    """The end of a variable, or of what is in parentheses behind ``$``."""
+    end = end_of_variable(command, place)
+    if command[end : end + 1] == "(":
+        closing = command.find(")", end)
+        return len(command) if closing < 0 else closing + 1
+    return end
+
+
+def _map_flag(argv: Sequence[str], flag: str, change: Callable[[str], str]) -> tuple[str, ...]:
+    """``--flag value`` in two words."""
+    return tuple(change(w) if i and argv[i - 1] == flag and w[:1] != "-" else w for i, w in enumerate(argv))
+
+
+def takes_cid(argv: Iterable[str], environment: Mapping[str, object]) -> bool:
+    """Whether a CID can be told: by flag, also within a shell's string, or by variable."""
+    return any(_CID.search(w) or w == "--cid" or names(w) & {*CID_VARIABLES} for w in argv) or any(
+        variable in environment for variable in CID_VARIABLES
+    )
+
+
+def takes_memory(argv: Sequence[str]) -> bool:
+    return any(_MEMORY.match(word) for word in argv)
+
+
+def with_cid(argv: Sequence[str], cid: int) -> tuple[str, ...]:
+    """The command with ``--cid=N`` (and ``--cid N``) set."""
+    return _map_flag([with_cid_text(word, cid) for word in argv], "--cid", lambda _: str(cid))
+
+
+def with_cid_text(text: str, cid: int) -> str:
+    """As ``with_cid`` in a command that is one text, be it compose's or a shell's."""
+    return _CID.sub(lambda match: f"{match['flag'] or match['words']}{cid}", text)
+
+
+def with_memory_prefix(argv: Sequence[str], prefix: str) -> tuple[str, ...]:
+    """The command with every ``--name=X`` and ``--name.kind=X`` naming ``<prefix>X``; a leading slash stays."""
+
+    def prefixed(match: re.Match[str]) -> str:
+        return match["flag"] + memory_name(match["name"], prefix)
+
+    return tuple(_MEMORY.sub(prefixed, word) if _MEMORY.match(word) else word for word in argv)
+
+
+def memory_name(name: str, prefix: str) -> str:
+    return f"/{prefix}{name[1:]}" if name.startswith("/") else prefix + name

@@ -1,0 +1,96 @@
+"""The rule catalogue: of each rule what it says, why, an example that breaks it and one that does not.
+
+``catalogue.yml`` is the one place; docs/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are made of it.
+"""
+
+import functools
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from dodo_dsl.source import plain, read
+
+FILE = Path(__file__).with_name("catalogue.yml")
+
+_INTRODUCTION = """\
+# Rules
+
+What `dodo compile` can find, by the name in square brackets; `dodo explain RULE` shows the same on a terminal.
+
+An example shows what it changes in a test `example.dodo.yml` that is fine otherwise. A line such as `# dodo.yml` begins
+another file. Each first example gives its rule and each second one is silent: the tests run them.
+
+This page is made of `dodo_dsl/check/catalogue.yml` by `scripts/make-rules`.
+"""
+
+
+@dataclass(frozen=True)
+class Page:
+    """One rule; ``encoding`` is that of the bad example's files."""
+
+    name: str
+    group: str
+    summary: str
+    why: str
+    bad: str
+    good: str
+    encoding: str = "utf-8"
+
+
+@functools.cache
+def pages() -> dict[str, Page]:
+    """Every rule by name, in the catalogue's order."""
+    node, problems = read(FILE)
+    if node is None or problems:
+        raise ValueError(f"{FILE.name}: {problems}")
+    return {
+        name: Page(name, group, **{key: text.strip("\n") for key, text in page.items()})
+        for group, members in plain(node).items()
+        for name, page in members.items()
+    }
+
+
+def text(page: Page) -> str:
+    """A rule's page for a terminal."""
+    parts = (
+        f"{page.name}: {page.summary}",
+        textwrap.fill(page.why, 100),
+        "This gives the error, or the warning:",
+        textwrap.indent(page.bad, "    "),
+        "This does not:",
+        textwrap.indent(page.good, "    "),
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def markdown() -> str:
+    """The whole of docs/rules.md."""
+    return "\n".join((_INTRODUCTION, *_contents(), *_sections()))
+
+
+def _groups() -> dict[str, list[Page]]:
+    groups: dict[str, list[Page]] = {}
+    for page in pages().values():
+        groups.setdefault(page.group, []).append(page)
+    return groups
+
+
+def _contents() -> Iterator[str]:
+    yield "| | rules |\n|---|---|"
+    for group, members in _groups().items():
+        yield f"| {group} | {', '.join(f'[{page.name}](#{page.name})' for page in members)} |"
+
+
+def _sections() -> Iterator[str]:
+    for group, members in _groups().items():
+        yield f"\n## {group}"
+        for page in members:
+            yield f"\n### {page.name}\n\n{page.summary}\n{page.why}\n"
+            yield f"```yaml\n{page.bad}\n```\n\nInstead:\n\n```yaml\n{page.good}\n```"
+    yield ""
+
+
+def write(file: Path) -> None:
+    """Makes docs/rules.md again."""
+    file.write_text(markdown(), encoding="utf-8")

@@ -1,0 +1,163 @@
+"""dodo rig: a rig by hand: where it is, home, to a place, calibrated, out of quarantine, and what its camera sees."""
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TextIO
+
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.rig import truth_command
+from dodo_dsl.diagnostics import format_text, has_errors
+from dodo_dsl.run import leases
+from dodo_dsl.run.rigs import rigs
+from dodo_dsl.source import Scalar
+from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.manifest import Parameter
+from dodo_dsl.spec.rig import EMULATED, Rig
+from dodo_dsl.spec.values import ValueProblem, convert
+
+EXAMPLES = """examples:
+  dodo rig status                       every rig of dodo.yml: whether it is fit, and where it is
+  dodo rig calibrate kiwi-dynamic       it finds its home; nothing may stand in its way
+  dodo rig goto kiwi-dynamic 0.2 -0.1 90
+  dodo rig home kiwi-dynamic            to the place at its switches
+  dodo rig clear kiwi-dynamic           its fault is mended: tests may run on it again
+  dodo rig goto emulated 0 0 0          on any machine with the firmware's emulator
+  dodo rig truth kiwi-static -o truths/desk.json --box yellow 199 329 36 55
+                                        a snapshot and the truth about it, for object-detection
+
+exit codes: 0 done, 1 a rig is in quarantine, 2 usage or a place out of the limits, 3 the rig cannot
+"""
+ACTIONS = {
+    "status": "whether a rig is fit, and where it is",
+    "home": "to the place at its switches",
+    "goto": "to a place within its limits",
+    "calibrate": "it finds its home",
+    "clear": "its fault is mended, tests may run on it again",
+}
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    for name, text in ACTIONS.items():
+        action = actions.add_parser(name, help=text, description=text)
+        count = "?" if name == "status" else None
+        action.add_argument("rig", nargs=count, metavar="RIG", help="a name of dodo.yml, or emulated")
+        for axis, unit in {"x": "m", "y": "m", "yaw": "degrees"}.items() if name == "goto" else ():
+            action.add_argument(axis, type=float, metavar=axis.upper(), help=f"{unit}, 0 the middle")
+        wait = "most time that a busy rig is waited for"
+        action.add_argument("--wait", type=float, default=60.0, metavar="S", help=wait)
+        action.add_argument("--json", action="store_true", help="as JSON")
+    text = "a snapshot of the camera, and the truth about it for object-detection"
+    formatter = argparse.RawDescriptionHelpFormatter
+    epilog = truth_command.EXAMPLES
+    truth_command.add(
+        actions.add_parser("truth", help=text, description=text, epilog=epilog, formatter_class=formatter)
+    )
+
+
+class _Usage(Exception):
+    """A sentence for the user; the exit code is 2."""
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    def say(text: str) -> None:
+        stderr.write(f"{text}\n")
+
+    try:
+        deployment, chosen = _chosen(options)
+        if options.action == "truth":
+            stdout.write(truth_command.make(options, deployment, chosen[0], say) + "\n")
+            return Exit.OK
+        results = [_one(options, rig, say) for rig in chosen]
+    except (_Usage, *truth_command.PROBLEMS) as error:
+        stderr.write(f"dodo rig: {error}\n")
+        return Exit.USAGE
+    except (rigs.RigProblem, leases.LeaseTimeout) as problem:
+        stderr.write(f"dodo rig: {problem}\n")
+        return Exit.USAGE if isinstance(problem, rigs.RigProblem) and problem.usage else Exit.ERROR
+    if options.json:
+        stdout.write(json.dumps(results, indent=2) + "\n")
+    else:
+        stdout.writelines(f"{_sentence(result)}\n" for result in results)
+        if not results:
+            stdout.write(f"{FILE_NAME} has no rigs; every machine has '{EMULATED}': dodo rig status {EMULATED}\n")
+    if any(result.get("error") for result in results):
+        return Exit.ERROR
+    return Exit.PROBLEMS if any(result["quarantine"] for result in results) else Exit.OK
+
+
+def _chosen(options: argparse.Namespace) -> tuple[Deployment, list[Rig]]:
+    deployment, problems = load_deployment(find_deployment(Path.cwd()))
+    if has_errors(problems):
+        raise _Usage(f"dodo.yml has problems:\n{format_text(problems)}")
+    if options.rig is None:
+        return deployment, list(deployment.rigs.values())
+    rig = deployment.rig(options.rig)
+    if rig is None:
+        raise _Usage(f"there is no rig '{options.rig}', expected one of {', '.join([EMULATED, *deployment.rigs])}")
+    return deployment, [rig]
+
+
+def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
+    """Does the action on one rig; a fault of it is part of a status."""
+    result: dict[str, Any] = {"rig": rig.name, "kind": rig.kind, "quarantine": ""}
+    if options.action == "clear":
+        rigs.clear(rig.name)
+        return result
+    if not rig.is_emulated:
+        result["quarantine"] = rigs.quarantined(rig.name)
+    if rig.entry("serial") is None:
+        if options.action != "status":
+            raise _Usage(f"rig '{rig.name}' has no serial port: nothing of it moves")
+        return result
+    try:
+        return {**result, **_moved(options, rig, say)}
+    except rigs.RigProblem as problem:
+        if options.action != "status":
+            raise
+        return {**result, "error": str(problem)}
+
+
+def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
+    place = (options.x, options.y, options.yaw) if options.action == "goto" else ()
+    words = [*_flags(rig), options.action, *(f"{number:g}" for number in place)]
+    return rigs.ask_alone(rig.cid, f"'dodo rig {options.action}'", (rigs.HAND, words), say, options.wait)
+
+
+def _flags(rig: Rig) -> list[str]:
+    """The rig's port and ranges as the gantry's flags; raises _Usage for a range that is none."""
+    flags = []
+    for key, flag, unit in (("serial", "serial", ""), *((f"limits.{a}", f"range-{a}", "m") for a in "xy"), YAW):
+        entry = rig.entry(key)
+        if entry is None or not isinstance(entry.value, Scalar):
+            continue
+        text = entry.value.text if flag == "serial" else _number(entry.value, flag, unit)
+        flags.append(f"--{flag}={text}")
+    return flags
+
+
+YAW = ("limits.yaw", "range-yaw", "deg")
+
+
+def _number(value: Scalar, flag: str, unit: str) -> str:
+    try:
+        return convert(Parameter(name=flag, type="number", unit=unit, help=""), value, Path.cwd()).text
+    except ValueProblem as problem:
+        raise _Usage(f"{flag}: {problem}") from None
+
+
+def _sentence(result: dict[str, Any]) -> str:
+    name = f"{result['rig']}:"
+    parts = []
+    if result.get("error"):
+        parts.append(str(result["error"]))
+    elif "says" in result:
+        at = ""
+        if result["x"] is not None:
+            at = f", x = {result['x']:.3f} m, y = {result['y']:.3f} m, " + (f"yaw = {result['yaw']:.1f} degrees")
+        parts.append(f"{result['says']}{at}")
+    if result["quarantine"]:
+        parts.append(f"in quarantine: {result['quarantine']}; `dodo rig clear {result['rig']}` ends that")
+    return f"{name} {'; '.join(parts) or 'not in quarantine'}"

@@ -1,0 +1,172 @@
+"""dodo run: run tests and judge the application."""
+
+import argparse
+import asyncio
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TextIO, cast
+
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.run import progress, summary
+from dodo_dsl.cli.run.forecast import at_once, expectation, forecast
+from dodo_dsl.cli.run.jobs import Usage, prepare
+from dodo_dsl.cli.run.uninterrupted import Robust, more_descriptors, stop_like_interrupt, undisturbed
+from dodo_dsl.diagnostics import printable
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.addresses import subnets
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.report.report_folder import Drawable, forget, write_report
+from dodo_dsl.run.backends import Backends, Containers, Job, Processes
+from dodo_dsl.run.history import History
+from dodo_dsl.run.rigs import rigs
+from dodo_dsl.run.runner import Policy, Runner, default_backend
+from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.spec.deployment import Deployment
+
+EXAMPLES = """examples:
+  dodo run                                     all tests of the deployment
+  dodo run sil-closed-straight                 one test
+  dodo run 'sil-*' -j 4                        by pattern, four at a time
+  dodo run --application ../app/docker-compose.yml --level sil
+  dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, up to the first that does not
+  dodo run --compiled generated/sil-closed-straight --report dodo-report
+
+exit codes: 0 all passed, 1 some failed, 2 usage or spec, 3 some ended in error, 130 interrupted
+"""
+
+
+_MOST_SECONDS = 864_000.0
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
+    parser.add_argument("--level", action="append", choices=("sil", "dil", "hil"), default=[], help="may be repeated")
+    parser.add_argument("--backend", choices=("process", "docker"), help="default: process when the application can")
+    parser.add_argument(
+        "-j", "--jobs", type=_positive, metavar="N", help="tests at once (default: as many as the cores carry)"
+    )
+    parser.add_argument("--clock", choices=("realtime", "lockstep"), help="instead of the specs'")
+    parser.add_argument("--wall-timeout", type=_seconds, metavar="S", help="most wall time of a test in lockstep")
+    parser.add_argument("--isolation", choices=("network", "host"), help="instead of the specs'")
+    parser.add_argument("--report", type=Path, default=Path("dodo-report"), metavar="DIR", help="default: dodo-report")
+    parser.add_argument("--seed", type=_seed, metavar="N", help="instead of the specs'")
+    parser.add_argument("--repeat", type=_positive, default=1, metavar="N", help="run every test N times")
+    parser.add_argument("--fail-fast", action="store_true", help="begin no further test when one did not pass")
+    parser.add_argument("--retry-errors", type=_positive, nargs="?", const=1, default=0, metavar="N",
+                        help="run a test that ended in error again, up to N times (1 when not written)")  # fmt: skip
+    parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="a test that dodo compile wrote")
+    parser.add_argument("--keep", action="store_true", help="leave everything up and say how to look inside")
+    selection.add_application(parser)
+
+
+def _seed(text: str) -> int:
+    number = int(text) if text.isdecimal() and len(text) < 12 else -1
+    if not 0 <= number < 1 << 32:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 to 4294967295")
+    return number
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text.removesuffix("s"))
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds <= _MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"'{text}' is no time in seconds, above 0 and at most {_MOST_SECONDS:g}")
+    return seconds
+
+
+def _positive(text: str) -> int:
+    number = int(text) if text.isdecimal() else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number of 1 or more")
+    return number
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, stop_like_interrupt)
+    more_descriptors()
+    stdout = cast(TextIO, Robust(stdout))
+    reap_folders()
+    with work_folder() as folder:
+        try:
+            jobs, deployment = prepare(options, folder.path, stdout)
+            _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
+            runner = _runner(options, jobs, deployment, stdout, folder.lease.descriptor)
+        except (Usage, selection.NoSuchTest) as error:
+            stderr.write(f"dodo run: {error}\n")
+            return Exit.USAGE
+        outcomes, is_reported = _run(runner, jobs, options.report, stdout)
+        if runner.kept:
+            stdout.write("\n".join(["", *runner.kept, ""]))
+            folder.kept = True
+    return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
+
+
+def _refuse_to_keep(plans: Sequence[Plan]) -> None:
+    for plan in plans:
+        if rigs.is_real(plan):
+            raise Usage(f"{plan.name} runs on rig '{plan.rig}', which --keep would leave driven: run it without")
+
+
+def _runner(
+    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, descriptor: int
+) -> Runner:
+    plans = [job.plan for job in jobs]
+    backend = options.backend or default_backend(plans)
+    order = schedule(options.jobs, expectation(backend))
+    stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
+    stdout.write(f"{forecast(order, jobs, backend)}\n")
+    shown = progress.choose(stdout, [p.slug for p in plans])
+    backends = _backends(options, backend, plans, deployment, descriptor)
+    return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
+
+
+def _backends(
+    options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, descriptor: int
+) -> Backends:
+    if backend == "docker":
+        if options.compiled and options.isolation not in (None, plans[0].isolation):
+            raise Usage(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
+        return Containers(subnets(deployment.subnets))
+    without = sorted({s.name for p in plans for s in p.application.services if not s.process})
+    if without:
+        way = "write for example 'x-dodo-process: [python, main.py]' at it, or run with --backend docker"
+        raise Usage(f"application service '{without[0]}' has no 'x-dodo-process', which processes need; {way}")
+    return Processes(deployment.cids, options.isolation, (descriptor,))
+
+
+def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> tuple[list[Outcome], bool]:
+    """The outcomes, and whether the report holds all of them; without it they are told all the same."""
+    gone = forget(report.resolve(), [job.plan.slug for job in jobs])
+    with runner.progress:
+        outcomes = asyncio.run(runner.run(jobs))
+    tests = {job.plan.slug: job.test for job in jobs}
+    with undisturbed():
+        history = History()
+        history.add((tests[outcome.slug], outcome) for outcome in outcomes)
+        times = history.times({(job.plan.spec, job.test) for job in jobs}, runner.backends.name)
+        drawables = {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs}
+        problems, unwritten = [], ""
+        try:
+            problems = write_report(report, outcomes, drawables, times)
+        except Exception as error:  # noqa: BLE001  (the outcomes are told all the same)
+            why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
+            unwritten = f"'{report}' cannot take the whole report: {why}"
+        history.save()
+    stdout.writelines(f"{printable(problem)}\n" for problem in problems)
+    summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
+    instead = f", in place of an earlier one with {progress.count(gone)} that did not run now" if gone else ""
+    stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}{instead}\n")
+    return outcomes, not unwritten
+
+
+def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:
+    if interrupted:
+        return Exit.INTERRUPTED
+    kinds = {o.outcome for o in outcomes}
+    return Exit.ERROR if "error" in kinds else Exit.PROBLEMS if "failed" in kinds else Exit.OK

@@ -1,0 +1,140 @@
+"""Generated files on disk: each is written beside its place and renamed, and what is stale goes."""
+
+import difflib
+import filecmp
+import functools
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+
+from dodo_dsl.emit.render import File, render_pipeline, render_plan
+from dodo_dsl.plan.build import Compiled
+from dodo_dsl.plan.test_files import Copy
+
+PLAN_FILE = "test.json"
+FILES = "files"
+
+
+def replace_file(path: Path, fill: Callable[[Path], object]) -> None:
+    """``fill`` writes a new file beside ``path``, which is then renamed onto it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        fill(temporary)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def pipeline_folder(out: Path) -> str:
+    """The output folder as a pipeline's jobs name it: as it was given, or its last part when that is absolute."""
+    return out.name if out.is_absolute() else out.as_posix()
+
+
+def write(compiled: Compiled, out: Path) -> None:
+    """Writes everything below ``out`` and removes tests of earlier compilations that are no longer there."""
+    _update(out, [render_pipeline(compiled.suite, pipeline_folder(out))])
+    for plan in compiled.suite.plans:
+        folder, files, copies = out / plan.slug, render_plan(plan), compiled.copies[plan.slug]
+        if folder.exists():
+            _update(out, files)
+            _write_copies(folder / FILES, copies)
+        else:
+            _write_new(folder, [(file.path.removeprefix(f"{plan.slug}/"), file.text) for file in files], copies)
+    for folder in stale_folders(compiled, out):
+        shutil.rmtree(folder)
+
+
+def _update(out: Path, files: Iterable[File]) -> None:
+    for file in files:
+        path = out / file.path
+        if not path.is_file() or path.read_bytes() != file.text.encode():
+            write_text(path, file.text)
+
+
+def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[Copy]) -> None:
+    """A test that is not there yet: its folder is filled beside its place and renamed as a whole."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    stage = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name[:40]}."))
+    try:
+        stage.chmod(0o755)
+        for name, text in files:
+            (stage / name).write_text(text, encoding="utf-8")
+        for parent in sorted({(stage / FILES / copy.target).parent for copy in copies}):
+            parent.mkdir(parents=True, exist_ok=True)
+        for copy in copies:
+            shutil.copyfile(copy.source, stage / FILES / copy.target)
+        stage.rename(folder)
+    except BaseException:
+        shutil.rmtree(stage, ignore_errors=True)
+        raise
+
+
+def _write_copies(folder: Path, wanted: Sequence[Copy]) -> None:
+    for copy in wanted:
+        target = folder / copy.target
+        if not target.is_file() or not filecmp.cmp(copy.source, target, shallow=False):
+            replace_file(target, functools.partial(shutil.copyfile, copy.source))
+    for path in _surplus(folder, wanted):
+        path.unlink()
+
+
+def _surplus(folder: Path, wanted: Sequence[Copy]) -> Iterator[Path]:
+    names = {copy.target for copy in wanted}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and path.relative_to(folder).as_posix() not in names:
+            yield path
+
+
+def stale_folders(compiled: Compiled, out: Path) -> list[Path]:
+    """Tests of earlier compilations that are not in this one."""
+    slugs = {plan.slug for plan in compiled.suite.plans}
+    return [path.parent for path in sorted(out.glob(f"*/{PLAN_FILE}")) if path.parent.name not in slugs and _ours(path)]
+
+
+def _ours(path: Path) -> bool:
+    try:
+        return bool(json.loads(path.read_text(encoding="utf-8")).get("dodo") == "plan")
+    except (OSError, ValueError, AttributeError):
+        return False
+
+
+def differences(compiled: Compiled, out: Path) -> dict[str, str]:
+    """What writing would change below ``out``, a unified diff by test, the pipeline's first; empty when up to date."""
+    child = render_pipeline(compiled.suite, pipeline_folder(out))
+    found = {child.path: _text_difference(child, out)}
+    for plan in compiled.suite.plans:
+        texts = (_text_difference(file, out) for file in render_plan(plan))
+        copies = _copy_differences(out / plan.slug / FILES, compiled.copies[plan.slug], out)
+        found[plan.slug] = "".join([*texts, *copies])
+    found.update((folder.name, f"only in {out.name}: {folder.name}\n") for folder in stale_folders(compiled, out))
+    return {name: text for name, text in found.items() if text}
+
+
+def _text_difference(file: File, out: Path) -> str:
+    path = out / file.path
+    before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    if before == file.text:
+        return ""
+    names = (f"a/{file.path}", f"b/{file.path}")
+    return "".join(difflib.unified_diff(before.splitlines(True), file.text.splitlines(True), *names))
+
+
+def _copy_differences(folder: Path, wanted: Sequence[Copy], out: Path) -> Iterator[str]:
+    for copy in wanted:
+        target = folder / copy.target
+        if not target.is_file() or not filecmp.cmp(copy.source, target, shallow=False):
+            yield f"differs: {target.relative_to(out)}\n"
+    for path in _surplus(folder, wanted):
+        yield f"no longer needed: {path.relative_to(out)}\n"

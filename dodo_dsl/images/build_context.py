@@ -1,0 +1,72 @@
+"""The build context: what ``services/Dockerfile`` copies, from a checkout or from an installed wheel."""
+
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from dodo_dsl import __version__, package_data
+from dodo_dsl.images.names import Image
+
+DEFINITION = "docker-bake.json"
+CONSTRAINTS = "constraints.txt"
+REQUIREMENTS = "services/requirements"
+_DOCKERFILE = "services/Dockerfile"
+_FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf")
+"""The emulated rig, where ``make firmware`` has built it: the gantry's image takes it along."""
+
+
+def assemble(folder: Path, wheels: Path | None) -> None:
+    """Copies sources, constraints and wheels into an empty folder, with their dates.
+
+    The engine knows a context by its folder's name, and takes over only what has another date than the last time.
+    """
+    root, package = package_data.root(), Path(package_data.__file__).parent
+    no_bytecode = shutil.ignore_patterns("__pycache__")
+    shutil.copy2(root / CONSTRAINTS, folder / CONSTRAINTS)
+    shutil.copytree(root / "services", folder / "services", ignore=no_bytecode)
+    shutil.copytree(package / "opendlv", folder / "dodo_dsl" / "opendlv", ignore=no_bytecode)
+    shutil.copy2(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")
+    if all((root / _FIRMWARE / name).is_file() for name in _RIG):
+        (folder / "rig").mkdir()
+        for name in _RIG:
+            shutil.copy2(root / _FIRMWARE / name, folder / "rig" / name)
+    if wheels is not None:
+        shutil.copytree(wheels, folder / "wheels", copy_function=_link)
+
+
+def _link(source: str, target: str) -> None:
+    """A wheel of some megabytes need not be copied where a hard link will do."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+
+
+def define(folder: Path, images: Sequence[Image], base_image: str | None, source: str) -> None:
+    """Writes the targets of ``docker buildx bake``, one an image; without a base image the Dockerfile's is taken."""
+    arguments = {"VERSION": __version__, "SOURCE": source}
+    if base_image:
+        arguments["BASE_IMAGE"] = base_image
+    targets = {
+        image.name: {
+            "context": ".",
+            "dockerfile": _DOCKERFILE,
+            "target": image.name,
+            "args": arguments,
+            "tags": [image.reference],
+            "output": ["type=docker"],
+        }
+        for image in images
+    }
+    definition = {"group": {"default": {"targets": list(targets)}}, "target": targets}
+    (folder / DEFINITION).write_text(json.dumps(definition, indent=2), encoding="utf-8")
+
+
+def default_base_image() -> str:
+    """The Dockerfile's own base image."""
+    for line in (package_data.root() / _DOCKERFILE).read_text(encoding="utf-8").splitlines():
+        if line.startswith("ARG BASE_IMAGE="):
+            return line.partition("=")[2].strip()
+    raise ValueError(f"{_DOCKERFILE} names no BASE_IMAGE")

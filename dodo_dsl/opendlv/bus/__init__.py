@@ -1,0 +1,1 @@
+"""The bus: sessions, envelopes, and the kernel's filter for them."""

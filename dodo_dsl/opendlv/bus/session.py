@@ -1,0 +1,230 @@
+"""A session on the bus: UDP multicast as libcluon's OD4Session speaks it, without threads."""
+
+import errno
+import itertools
+import select
+import socket
+import struct
+import time
+from collections.abc import Iterable
+from types import TracebackType
+from typing import Self
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.bus import kernel_filter
+from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, decode_frame, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+
+PORT = 12175
+MAX_DATAGRAM_BYTES = 65_507
+RECEIVE_BUFFER_BYTES = 26_214_400
+CIDS = range(1, 255)
+MAX_DROPPED = 1000  # before a flood of garbage can end a wait
+_NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
+_ID_PLACE, _ID_TAG = 5, 0x08  # behind the frame's header, the envelope's first field
+_IP_MULTICAST_ALL = 49  # Linux: linux/in.h
+_SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
+_SO_RXQ_OVFL = 40
+_TIMESPEC = struct.Struct("@qq")
+_COUNT = struct.Struct("@I")
+_ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
+
+Address = tuple[str, int]
+
+
+class SessionError(OSError):
+    """The bus cannot be joined or does not take a message."""
+
+
+class Session:
+    """One member of the group 225.0.0.<cid>; a context manager.
+
+    Datagrams of the session itself are dropped, as libcluon does. Bytes of others that are no frame are
+    counted in `garbage`, and in `lost` the datagrams for which the receive buffer had no room. Raises SessionError
+    for a cid outside 1 to 254 and where there is no route for multicast.
+    """
+
+    def __init__(self, cid: int, messages: MessageSet | None = None) -> None:
+        if cid not in CIDS:
+            raise SessionError(f"a session's cid is 1 to 254, not {cid}")
+        self.cid = cid
+        self.messages = messages or MessageSet.standard()
+        self.garbage = 0
+        self.lost = 0
+        self.is_member = True
+        self._only: frozenset[int] | None = None
+        self.source: Address = ("", 0)
+        """Host and port from which the last datagram came."""
+        group = (f"225.0.0.{cid}", PORT)
+        try:
+            self._receiver = _receiver(group)
+            self._sender = _sender(group, self._receiver)
+        except OSError as error:
+            hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
+            raise SessionError(f"the bus {group[0]}:{PORT} cannot be joined: {error.strerror}{hint}") from None
+        self._own_address = self._sender.getsockname()
+        self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
+        self._view = memoryview(self._buffer)
+        self._poll = select.poll()
+        self._poll.register(self._receiver, select.POLLIN)
+
+    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> bytes:
+        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now); returns the frame.
+
+        Raises MessageError, FrameError or SessionError.
+        """
+        now = time.time_ns() // 1000
+        sampled = now if sample_time is None else sample_time
+        id_, payload = self.messages.id(message), self.messages.encode(message)
+        return self.send_envelope(Envelope(id_, payload, now, 0, sampled, sender_stamp))
+
+    def send_envelope(self, envelope: Envelope) -> bytes:
+        """Send an envelope as it is, and return its frame; raises FrameError, and SessionError above 65,507 bytes."""
+        frame = encode_frame(envelope)
+        if len(frame) > MAX_DATAGRAM_BYTES:
+            raise SessionError(
+                f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
+            )
+        try:
+            self._sender.send(frame)
+        except OSError as error:
+            raise SessionError(f"the bus does not take a message: {error.strerror}") from None
+        return frame
+
+    def receive(self, timeout: float | None = 0.0) -> Envelope | None:
+        """The next envelope of another member, with `received` set; None when `timeout` seconds are over.
+
+        `None` waits without end. A signal whose handler returns does not end the wait.
+        """
+        deadline = None if timeout is None else time.monotonic() + timeout
+        for dropped in itertools.count():
+            try:
+                envelope = self._next()
+            except BlockingIOError:
+                if not self._wait(deadline):
+                    return None
+            else:
+                if envelope is not None:
+                    return envelope
+            if dropped > MAX_DROPPED and deadline is not None and time.monotonic() > deadline:
+                return None
+        raise AssertionError
+
+    def fileno(self) -> int:
+        """The file descriptor to select on for reading."""
+        return self._receiver.fileno()
+
+    def hear_only(self, ids: Iterable[int]) -> None:
+        """Receive messages with these ids from now on; where the kernel can, this process is not woken for others.
+
+        Losses are not counted any more, as the kernel counts the others with them.
+        """
+        self._only = frozenset(ids)
+        kernel_filter.attach(self._receiver, self._only)
+
+    def deafen(self) -> None:
+        """Hear nothing from now on, so that this process is not woken for it; sending goes on."""
+        if self.is_member:
+            membership = _membership(f"225.0.0.{self.cid}")
+            self._receiver.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
+            self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
+            self.is_member = False
+
+    @property
+    def port(self) -> int:
+        """From which this session's datagrams come."""
+        return int(self._own_address[1])
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._receiver.close()
+        self._sender.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _next(self) -> Envelope | None:
+        size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES)
+        if len(ancillary) > 1 and self._only is None:
+            self.lost = _lost(ancillary)
+        if address == self._own_address:
+            return None
+        if self._only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self._only:
+            return None
+        self.source = address
+        try:
+            return decode_frame(bytes(self._view[:size]), _received(ancillary))
+        except FrameError:
+            self.garbage += 1
+            return None
+
+    def _wait(self, deadline: float | None) -> bool:
+        if deadline is None:
+            return bool(self._poll.poll())
+        left = deadline - time.monotonic()
+        return left > 0 and bool(self._poll.poll(left * 1000))
+
+
+def _id(frame: bytearray) -> int:
+    """The id of the message in a frame that begins with it: a zigzag varint."""
+    value = shift = 0
+    for byte in frame[_ID_PLACE + 1 : _ID_PLACE + 6]:
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            break
+    return (value >> 1) ^ -(value & 1)
+
+
+def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
+    """When the kernel took the datagram, else now; microseconds since the epoch."""
+    for _, kind, data in ancillary:
+        if kind == _SO_TIMESTAMPNS and len(data) == _TIMESPEC.size:
+            seconds, nanoseconds = _TIMESPEC.unpack(data)
+            return int(seconds) * 1_000_000 + int(nanoseconds) // 1000
+    return time.time_ns() // 1000
+
+
+def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
+    """How many datagrams the kernel dropped so far; it says so once there are any."""
+    return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
+
+
+def _sender(group: tuple[str, int], receiver: socket.socket) -> socket.socket:
+    """Connected, so that the address its datagrams carry is known; time to live 1, loop on."""
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        sender.connect(group)
+    except OSError:
+        receiver.close()
+        sender.close()
+        raise
+    return sender
+
+
+def _receiver(group: tuple[str, int]) -> socket.socket:
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        receiver.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        receiver.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+        receiver.bind(group)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(group[0]))
+        receiver.setblocking(False)
+    except OSError:
+        receiver.close()
+        raise
+    return receiver
+
+
+def _membership(group: str) -> bytes:
+    return socket.inet_aton(group) + socket.inet_aton("0.0.0.0")  # noqa: S104

@@ -1,0 +1,1 @@
+"""Shared memory in both of libcluon's modes, and the pixel formats of frames in it."""

@@ -1,0 +1,1 @@
+"""Messages by name and id, and their encodings."""

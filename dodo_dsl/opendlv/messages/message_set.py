@@ -1,0 +1,121 @@
+"""The messages of OpenDLV by name and id, and their encoding as libcluon writes and reads it."""
+
+import builtins
+import difflib
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.messages import codec
+from dodo_dsl.opendlv.messages.codec import MessageError
+from dodo_dsl.opendlv.messages.protobuf_classes import Layout, build
+from dodo_dsl.opendlv.odvd import STANDARD, parser
+from dodo_dsl.opendlv.odvd.parser import Definition
+from dodo_dsl.opendlv.odvd.tokens import OdvdError
+
+OWN_IDS = range(2900, 3000)  # DoDo's
+
+
+class UnknownMessage(MessageError, KeyError):
+    """A name or an id that the message set does not hold."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class MessageSet:
+    """Messages by full name (`opendlv.proxy.GroundSteeringRequest`) and by id (1090).
+
+    Message classes are protobuf's, with the field names of the specification.
+    """
+
+    def __init__(self, definitions: Iterable[Definition]) -> None:
+        self._layouts = build(definitions)
+        self._by_id = {layout.definition.id: layout for layout in self._layouts.values()}
+
+    @classmethod
+    def standard(cls) -> "MessageSet":
+        """The messages that DoDo knows by itself, built once."""
+        return _standard()
+
+    @classmethod
+    def load(cls, *paths: Path) -> "MessageSet":
+        """The standard messages and those of the files, which replace standard ones of the same name or id.
+
+        Raises OdvdError, also where two of the files disagree or use DoDo's own ids.
+        """
+        if not paths:
+            return _standard()
+        own = _merged(definition for path in paths for definition in parser.load(path))
+        names, ids = {d.name for d in own}, {d.id for d in own}
+        kept = [d for d in parser.load(STANDARD) if d.name not in names and d.id not in ids]
+        return cls([*kept, *own])
+
+    def names(self) -> tuple[str, ...]:
+        """All full names, sorted."""
+        return tuple(sorted(self._layouts))
+
+    def type(self, key: str | int) -> builtins.type[Any]:
+        """The class of a message, by full name or id; raises UnknownMessage."""
+        return self.layout(key).type
+
+    def id(self, key: Message | builtins.type[Message] | str) -> int:
+        """The id of a message, of its class or of its full name; raises UnknownMessage."""
+        name = key if isinstance(key, str) else key.DESCRIPTOR.full_name
+        return self.layout(name).definition.id
+
+    def ids(self) -> frozenset[int]:
+        """All ids."""
+        return frozenset(self._by_id)
+
+    def name(self, id_: int) -> str:
+        """The full name for an id; raises UnknownMessage."""
+        return self.layout(id_).definition.name
+
+    def encode(self, message: Message) -> bytes:
+        """The payload as libcluon writes it: every field in order, zeros and defaults too.
+
+        Raises MessageError where a number does not fit its type, UnknownMessage for a message of another set.
+        """
+        return codec.encode(self.layout(message.DESCRIPTOR.full_name), message)
+
+    def decode(self, id_: int, payload: bytes) -> Any:
+        """The message in a payload: fields in any order, the first of equal ones counts, absent ones default.
+
+        Raises MessageError for bytes that are no such message, UnknownMessage for an unknown id.
+        """
+        return codec.decode(self.layout(id_), payload)
+
+    def layout(self, key: str | int) -> Layout:
+        """What a codec knows of a message, by full name or id; raises UnknownMessage."""
+        layout = self._by_id.get(key) if isinstance(key, int) else self._layouts.get(key)
+        if layout is None:
+            raise UnknownMessage(self._unknown(key))
+        return layout
+
+    def _unknown(self, key: str | int) -> str:
+        if isinstance(key, int):
+            return f"there is no message with id {key}"
+        close = [name for name in self._layouts if name.rpartition(".")[2] == key.rpartition(".")[2]]
+        close = close or difflib.get_close_matches(key, self._layouts, 1)
+        return f"there is no message `{key}`" + (f": did you mean `{close[0]}`?" if close else "")
+
+
+@cache
+def _standard() -> MessageSet:
+    return MessageSet(parser.load(STANDARD))
+
+
+def _merged(definitions: Iterable[Definition]) -> list[Definition]:
+    by_key: dict[str | int, Definition] = {}
+    for definition in definitions:
+        if definition.id in OWN_IDS:
+            raise OdvdError(f"{definition.place}: ids 2900 to 2999 are DoDo's own")
+        for key in (definition.name, definition.id):
+            earlier = by_key.setdefault(key, definition)
+            if not earlier.same_layout(definition):
+                raise OdvdError(f"{definition.place}: `{key}` is another message at {earlier.place}")
+    return list({id(definition): definition for definition in by_key.values()}.values())

@@ -1,0 +1,43 @@
+"""Which message set a recording was made with: 0.9 and 1.0 give some ids other meanings."""
+
+from pathlib import Path
+
+from dodo_dsl.opendlv.messages import columns
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.odvd import STANDARD_0_9
+from dodo_dsl.opendlv.recordings.frame_table import Fact
+from dodo_dsl.opendlv.recordings.recording import Recording
+
+OLD, NEW = "0.9", "1.0"
+_TELLING = (1001, 1003, *range(1128, 1137))  # ids that only one of the sets has, or that differ between them
+_LOOKS = 500  # messages of each id that are looked at
+
+
+def load(version: str, *own: Path) -> MessageSet:
+    """The messages of set 0.9 or 1.0 and those of the files; raises OdvdError."""
+    return MessageSet.load(*((STANDARD_0_9,) if version == OLD else ()), *own)
+
+
+def version_of(recording: Recording) -> str:
+    """The set that more of the telling messages fit in their fields; 1.0 where none tells.
+
+    ImageReading does not count: real applications of set 1.0 leave its last field out.
+    """
+    old, new = load(OLD), load(NEW)
+    fits_old = fits_new = 0
+    for id_ in _TELLING:
+        rows = recording.rows(messages=[id_])[:_LOOKS]
+        fits_old += _fitting(recording, old, id_, rows)
+        fits_new += _fitting(recording, new, id_, rows)
+    return OLD if fits_old > fits_new else NEW
+
+
+def _fitting(recording: Recording, messages: MessageSet, id_: int, rows: Numbers) -> int:
+    if id_ not in messages.ids():
+        return 0
+    count = 0
+    for batch in recording.batches(rows):
+        starts, ends = batch.table[Fact.PAYLOAD], batch.table[Fact.PAYLOAD_END]
+        count += int(columns.usual_rows(messages.layout(id_), batch.data, starts, ends).sum())
+    return count

@@ -1,0 +1,1 @@
+"""Video packets in recordings: decoded and encoded."""

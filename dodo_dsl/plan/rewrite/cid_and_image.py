@@ -1,0 +1,76 @@
+"""What a service is told: its CID, by flag or by variable, and its image."""
+
+from typing import Any
+
+from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.model import text
+from dodo_dsl.application.service_environment import image_variable
+from dodo_dsl.plan.rewrite.service_copy import Copy
+
+
+def tell_image(copy: Copy) -> None:
+    """The image of the file, unless a pipeline hands another one."""
+    service, variable = copy.service, image_variable(copy.name)
+    if service.get("image") is None and "build" not in service:
+        return
+    service["image"] = f"${{{variable}:-{service.get('image') or ''}}}"
+    copy.note(f"image from {variable}, where it is set")
+
+
+def tell_cid(copy: Copy, in_files: tuple[str, ...]) -> None:
+    """The CID everywhere it was written, and over what ``env_file`` would set."""
+    service, cid, told = copy.service, copy.setting.cid, []
+    for key in ("entrypoint", "command"):
+        before = service.get(key)
+        if before is not None:
+            service[key] = after = _command(before, cid)
+            told.extend([f"--cid={cid}"] if opendlv_flags.takes_cid(_words(after), {}) else [])
+    check = service.get("healthcheck")
+    if isinstance(check, dict) and check.get("test") is not None:
+        service["healthcheck"] = {**check, "test": _command(check["test"], cid)}
+    told.extend(_tell_environment(service, cid, in_files))
+    if told:
+        copy.note(", ".join(dict.fromkeys(told)))
+
+
+def _command(command: Any, cid: int) -> Any:
+    """A command with its CID, a text staying a text: compose splits it after it knows the variables."""
+    if isinstance(command, str):
+        return opendlv_flags.with_cid_text(command, cid)
+    before = [text(word) for word in command]
+    return list(opendlv_flags.with_cid(before, cid))
+
+
+def _words(command: Any) -> list[str]:
+    return [command] if isinstance(command, str) else command
+
+
+def _tell_environment(service: dict[str, Any], cid: int, in_files: tuple[str, ...]) -> list[str]:
+    """Changes ``environment``, which keeps its form, and returns what was told."""
+    raw = service.get("environment") or {}
+    if isinstance(raw, list):
+        pairs: dict[str, Any] = {str(item).partition("=")[0]: str(item) for item in raw}
+        changed: Any = {name: _pair(name, item, cid) for name, item in pairs.items()}
+        changed.update({name: f"{name}={cid}" for name in in_files})
+    else:
+        pairs = raw
+        changed = {name: _value(str(name), value, cid) for name, value in raw.items()}
+        changed.update({name: str(cid) for name in in_files})
+    if changed == pairs:
+        return []
+    service["environment"] = list(changed.values()) if isinstance(raw, list) else changed
+    return [
+        f"{name}={cid}" if name in opendlv_flags.CID_VARIABLES else f"--cid={cid} in {name}"
+        for name, value in changed.items()
+        if pairs.get(name) != value
+    ]
+
+
+def _pair(name: str, item: str, cid: int) -> str:
+    return f"{name}={cid}" if name in opendlv_flags.CID_VARIABLES else opendlv_flags.with_cid_text(item, cid)
+
+
+def _value(name: str, value: Any, cid: int) -> Any:
+    if name in opendlv_flags.CID_VARIABLES:
+        return str(cid)
+    return opendlv_flags.with_cid_text(value, cid) if isinstance(value, str) else value

@@ -1,0 +1,106 @@
+"""``plan_application``: the application's compose file in a copy that a test has to itself."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import source
+from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
+from dodo_dsl.application.model import KEYS, ApplicationSource, environment, plain, text
+from dodo_dsl.application.service_environment import env_files, told_in_files
+from dodo_dsl.plan.model import Application, ApplicationService
+from dodo_dsl.plan.rewrite import cid_and_image, removals, service_namespaces, volumes
+from dodo_dsl.plan.rewrite.service_copy import Copy, Setting
+
+_STEPS: tuple[Callable[[Copy], None], ...] = (
+    cid_and_image.tell_image,
+    removals.let_go,
+    removals.take_hardware,
+    service_namespaces.give_spaces,
+    volumes.own_mounts,
+    service_namespaces.give_order,
+)
+_NOT_CARRIED = ("COMPOSE_", "DODO_")
+
+
+def plan_application(
+    application: ApplicationSource,
+    cid: int,
+    isolation: str,
+    folder: Path,
+    after: tuple[str, ...],
+    *,
+    hil: bool = False,
+    privileged_allowed: bool = False,
+) -> Application:
+    """The application as a test runs it; ``folder`` is the compiled test's, ``after`` the services it waits for.
+
+    With ``hil`` devices stay; privilege stays only where ``privileged_allowed`` says so too.
+    """
+    base = Path(os.path.relpath(application.folder, folder)).as_posix()
+    names = frozenset(application.services)
+    setting = Setting(cid, isolation, after, names, application.containers, hil, privileged_allowed)
+    changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
+    path_variables: set[str] = set()
+
+    def change(path: str) -> str:
+        path_variables.update(interpolation.names(path) if path.startswith("$") else ())
+        return compose_paths.rebased(path, base)
+
+    services = {
+        name: _copied(
+            name, compose_paths.mapped_service(node, change), told_in_files(node, application.folder), setting, changes
+        )
+        for name, node in application.services.items()
+    }
+    rest = {key: plain(node) for key, node in compose_paths.mapped_rest(application.rest, change).items()}
+    if "volumes" in rest:
+        rest["volumes"] = volumes.own_volumes(rest["volumes"], changes)
+    planned = tuple(_planned(name, node, application.folder, cid) for name, node in application.services.items())
+    carried = _carried(application, cid, base, path_variables)
+    return Application(base, planned, {"services": services, **rest}, tuple(changes), carried)
+
+
+def _copied(
+    name: str, node: source.Mapping, in_files: tuple[str, ...], setting: Setting, changes: list[str]
+) -> dict[str, Any]:
+    copy = Copy(name, {key: value for key, value in plain(node).items() if key not in KEYS}, setting, changes)
+    cid_and_image.tell_cid(copy, in_files)
+    for step in _STEPS:
+        step(copy)
+    return copy.service
+
+
+def _planned(name: str, node: source.Mapping, folder: Path, cid: int) -> ApplicationService:
+    """The service as the process backend starts it."""
+    service = plain(node)
+    raw = service.get("command")
+    command = opendlv_flags.split(raw) if isinstance(raw, str) else tuple(text(word) for word in raw or ())
+    told_variables = {
+        k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in environment(service.get("environment")).items()
+    }
+    in_files = told_in_files(node, folder)
+    told_variables.update({v: str(cid) for v in opendlv_flags.CID_VARIABLES if v in told_variables or v in in_files})
+    process = service.get("x-dodo-process")
+    words = (*(process or ()), *command)
+    return ApplicationService(
+        name=name,
+        process=tuple(str(w) for w in process) if process else None,
+        command=opendlv_flags.with_cid(command, cid),
+        environment=told_variables,
+        takes_cid=opendlv_flags.takes_cid((*words, *(v for v in told_variables.values() if v)), told_variables),
+        takes_memory=opendlv_flags.takes_memory(words),
+        env_files=tuple(word.text for word, _ in env_files(node)),
+    )
+
+
+def _carried(application: ApplicationSource, cid: int, base: str, path_variables: set[str]) -> dict[str, str]:
+    """The variables of the application's own ``.env``, with the test's CID, and paths as they are from the test."""
+    carried = {}
+    for name, value in application.variables.items():
+        if name.startswith(_NOT_CARRIED):
+            continue
+        is_path = name in path_variables and (value in (".", "..") or value.startswith(("./", "../")))
+        carried[name] = compose_paths.rebased(value, base) if is_path else value
+    return {**carried, **{name: str(cid) for name in opendlv_flags.CID_VARIABLES if name in carried}}

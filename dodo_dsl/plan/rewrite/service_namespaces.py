@@ -1,0 +1,103 @@
+"""Network, IPC and other namespaces of a service: the test's own, or the rig's."""
+
+from typing import Any
+
+from dodo_dsl.application import host_access
+from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.plan.rewrite.service_copy import Copy
+
+
+def give_spaces(copy: Copy) -> None:
+    """The namespaces of a test; references between the application's services hold on."""
+    for key in host_access.NAMESPACES:
+        _own_reference(copy, key)
+    if copy.setting.own_network:
+        _own_network(copy)
+    else:
+        _host_network(copy)
+
+
+def _own_reference(copy: Copy, key: str) -> None:
+    """``container:x`` becomes ``service:x`` where x is a service of the application that starts."""
+    kind, name = host_access.reference(copy.service.get(key))
+    if kind == "container":
+        name = copy.setting.containers.get(name, "")
+        copy.service[key] = f"service:{name}"
+        copy.note(f"{key} is service:{name}")
+    if kind and name not in copy.setting.names:
+        copy.remove(key, "that service does not start")
+
+
+def _own_network(copy: Copy) -> None:
+    service = copy.service
+    mode = service.get("network_mode")
+    stays = mode == "none" or host_access.reference(mode)[0] == "service"
+    if not stays:
+        copy.remove("network_mode", "the test has a network of its own")
+    _own_names(copy, stays)
+    for key in ("userns_mode", "uts"):
+        copy.remove(key)
+    if service.get("ipc") is not None:
+        copy.note("ipc is the test's own")
+    service["ipc"] = f"service:{SANDBOX}"
+
+
+def _own_names(copy: Copy, stays: bool) -> None:
+    """``networks`` leave, but the names that a service has there stay."""
+    networks = copy.service.pop("networks", None)
+    if networks is None:
+        return
+    about = networks.values() if isinstance(networks, dict) else ()
+    names = list(dict.fromkeys(str(a) for n in about if isinstance(n, dict) for a in n.get("aliases") or ()))
+    if names and not stays:
+        copy.service["networks"] = {"default": {"aliases": names}}
+    copy.note("networks removed, the test has one of its own")
+
+
+def _host_network(copy: Copy) -> None:
+    service = copy.service
+    mode = service.get("network_mode")
+    if mode not in ("host", "none") and host_access.reference(mode)[0] != "service":
+        service["network_mode"] = "host"
+        copy.note("network_mode is host, as the rig's")
+    if service["network_mode"] != "host":
+        return
+    for key in ("networks", "links", "mac_address"):
+        copy.remove(key, "the network is the host's")
+    sysctls = service.get("sysctls")
+    if sysctls:
+        copy.keep_items("sysctls", _without_network(sysctls))
+        if service.get("sysctls") != sysctls:
+            copy.note("sysctls of the host's network removed")
+
+
+def _without_network(sysctls: Any) -> Any:
+    if isinstance(sysctls, dict):
+        return {key: value for key, value in sysctls.items() if not str(key).startswith("net.")}
+    return [item for item in sysctls if not str(item).startswith("net.")]
+
+
+def give_order(copy: Copy) -> None:
+    """``depends_on`` of services that start, and of DoDo's that must be ready before."""
+    service, setting = copy.service, copy.setting
+    raw = service.get("depends_on") or {}
+    started = {"condition": "service_started"}
+    own = {str(name): dict(started) for name in raw} if isinstance(raw, list) else dict(raw)
+    for name in [name for name in own if name not in setting.names]:
+        copy.note(f"does not wait for {name}, which does not start")
+        del own[name]
+    waits = {name: {"condition": "service_healthy"} for name in setting.waits}
+    if setting.own_network:
+        waits = {SANDBOX: started, **waits}
+    service.pop("depends_on", None)
+    if waits or own:
+        service["depends_on"] = {**own, **waits}
+    links = service.get("links") or []
+    copy.keep_items("links", [link for link in links if str(link).partition(":")[0] in setting.names])
+    borrowed = [_borrowed(copy, entry) for entry in service.get("volumes_from") or ()]
+    copy.keep_items("volumes_from", borrowed)
+
+
+def _borrowed(copy: Copy, entry: Any) -> Any:
+    kind, name, options = host_access.borrowed(entry)
+    return f"{copy.setting.containers[name]}{options}" if kind == "container" else entry

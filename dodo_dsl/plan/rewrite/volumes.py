@@ -1,0 +1,70 @@
+"""Volumes of a service: ``/tmp`` and shared memory are the test's own, and so are the volumes that have a name."""
+
+from collections.abc import MutableSequence
+from typing import Any
+
+from dodo_dsl.application import host_access
+from dodo_dsl.application.interpolation import split_outside
+from dodo_dsl.plan.rewrite.service_copy import Copy
+
+TAKEN = ("tmp", "report")
+"""Volumes of DoDo's own."""
+
+_DISPLAYS = "/tmp/.X11-unix"
+
+
+def renamed(name: str) -> str:
+    """The name of an application's volume in the test's project."""
+    return f"application-{name}" if name in TAKEN else name
+
+
+def own_mounts(copy: Copy) -> None:
+    volumes = copy.service.get("volumes")
+    if not isinstance(volumes, list):
+        return
+    changed = [_renamed(copy, volume) for volume in volumes]
+    if copy.setting.own_network:
+        changed = [own for volume in changed if (own := _own(copy, volume)) is not None]
+    once = {repr((host_access.mount(v).source, host_access.mount(v).target)): v for v in changed}
+    copy.keep_items("volumes", list(once.values()))
+
+
+def _renamed(copy: Copy, volume: Any) -> Any:
+    found = host_access.mount(volume)
+    if found.source not in TAKEN or (isinstance(volume, dict) and volume.get("type", "volume") != "volume"):
+        return volume
+    copy.note(f"volume {found.source} is called {renamed(found.source)}")
+    if isinstance(volume, dict):
+        return {**volume, "source": renamed(found.source)}
+    return ":".join([renamed(found.source), *split_outside(volume, ":")[1:]])
+
+
+def _own(copy: Copy, volume: Any) -> Any:
+    """The mount as an isolated test has it, None for what it has already."""
+    found = host_access.mount(volume)
+    if host_access.is_shared_memory(found):
+        copy.note(f"{found.source} removed, shared memory is the test's own")
+        return None
+    is_token = found.below("/tmp") and found.source == found.target and not found.below(_DISPLAYS)
+    if found.source != "/tmp" and not is_token:
+        return volume
+    copy.note("/tmp is the test's own")
+    target = "/tmp" if is_token else found.target
+    if isinstance(volume, str):
+        options = [word for part in split_outside(volume, ":")[2:] for word in part.split(",") if word in ("ro", "rw")]
+        return f"tmp:{target}:" + ",".join([*options, "nocopy"])  # the image's own /tmp must not change the test's
+    read_only = {"read_only": True} if found.read_only else {}
+    return {"type": "volume", "source": "tmp", "target": target, **read_only, "volume": {"nocopy": True}}
+
+
+def own_volumes(volumes: Any, changes: MutableSequence[str]) -> dict[str, Any]:
+    """Top-level ``volumes``: each test has its own, so a name for all of the machine leaves."""
+    found = {}
+    for name, about in (volumes or {}).items():
+        is_external = isinstance(about, dict) and host_access.is_true(about.get("external", False))
+        if isinstance(about, dict) and "name" in about and not is_external:
+            changes.append(f"volume {renamed(name)}: name removed, each test has its own")
+            found[renamed(name)] = {key: value for key, value in about.items() if key != "name"}
+        else:
+            found[renamed(name)] = about
+    return found

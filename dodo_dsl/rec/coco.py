@@ -1,0 +1,183 @@
+"""Frames with detections as a labelled data set in the COCO format (pictures, and one `annotations.json`).
+
+A detection is a DetectionBoundingBox; its class is the DetectionProperty (without `color:`) or else the DetectionType
+of the same sender, sample time and detection. It belongs to the frame of the same sample time.
+Reference: cocodataset.org, "Data format", object detection.
+"""
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dodo_dsl.opendlv.messages.codec import MessageError
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.video.decoder import Frame
+from dodo_dsl.rec.frames import IMAGE, Packet, decoded
+
+ANNOTATIONS = "annotations.json"
+PICTURES = "images"
+_PREFIX = "opendlv.logic.perception.Detection"
+_KINDS = ("BoundingBox", "Property", "Type")
+_JPEG_QUALITY = 95
+
+
+class Key(NamedTuple):
+    """What the messages of one detection have in common."""
+
+    sample_time: int
+    sender_stamp: int
+    detection_id: int
+
+
+@dataclass
+class Detection:
+    """One labelled box; fractions of the picture, from its upper left."""
+
+    box: tuple[float, float, float, float] | None = None
+    label: str = ""
+    type: int | None = None
+
+    @property
+    def category(self) -> str:
+        """The class's name."""
+        return self.label or ("object" if self.type is None else f"type {self.type}")
+
+
+@dataclass
+class DataSet:
+    """What is written: pictures and boxes so far."""
+
+    images: list[dict[str, Any]] = field(default_factory=list)
+    boxes: list[tuple[int, str, list[float]]] = field(default_factory=list)
+    lost: int = 0
+
+    def text(self) -> str:
+        """The content of annotations.json."""
+        names = sorted({name for _, name, _ in self.boxes})
+        numbers = {name: number for number, name in enumerate(names, 1)}
+        annotations = [
+            {
+                "id": number,
+                "image_id": image,
+                "category_id": numbers[name],
+                "bbox": box,
+                "area": round(box[2] * box[3], 3),
+                "iscrowd": 0,
+            }
+            for number, (image, name, box) in enumerate(self.boxes, 1)
+        ]
+        categories = [{"id": number, "name": name, "supercategory": ""} for name, number in numbers.items()]
+        content = {"images": self.images, "annotations": annotations, "categories": categories}
+        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+class LabelError(ValueError):
+    """Frames or labels that cannot be told apart; one sentence."""
+
+
+def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Numbers:
+    """The image messages of one camera among some rows; raises LabelError for none, or for several."""
+    index = recording.index[rows]
+    images: Numbers = rows[index["data_type"] == IMAGE]
+    stamps = sorted(set(recording.index["sender_stamp"][images].tolist()))
+    if not stamps:
+        raise LabelError(f"the selection of {recording.path} holds no camera frames (opendlv.proxy.ImageReading)")
+    told = ", ".join(map(str, stamps))
+    if camera is None and len(stamps) > 1:
+        raise LabelError(f"{recording.path} holds frames of the cameras {told}; choose one with --camera")
+    if camera is not None and camera not in stamps:
+        raise LabelError(f"{recording.path} holds no frames of camera {camera}; there is {told}")
+    return images if camera is None else images[recording.index["sender_stamp"][images] == camera]
+
+
+def detections(
+    recording: Recording, messages: MessageSet, rows: Numbers, sender_stamp: int | None
+) -> Mapping[int, list[Detection]]:
+    """The detections with a box among the messages of `rows`, by sample time; of one sender or all."""
+    known = messages.names()
+    kinds = {messages.id(_PREFIX + name): name for name in _KINDS if _PREFIX + name in known}
+    found: defaultdict[Key, Detection] = defaultdict(Detection)
+    chosen = rows[np.isin(recording.index["data_type"][rows], list(kinds))]
+    for envelope in recording.envelopes(chosen):
+        if sender_stamp not in (None, envelope.sender_stamp):
+            continue
+        try:
+            message = messages.decode(envelope.data_type, envelope.payload)
+        except MessageError:
+            continue
+        key = Key(envelope.sample_time, envelope.sender_stamp, message.detectionId)
+        _take(found[key], kinds[envelope.data_type], message)
+    by_time: dict[int, list[Detection]] = {}
+    for key in sorted(found):
+        if all(map(math.isfinite, found[key].box or (math.nan,))):
+            by_time.setdefault(key.sample_time, []).append(found[key])
+    return by_time
+
+
+@dataclass(frozen=True)
+class Export:
+    """How frames are written into `folder`: pictures of type `png` or `jpg`, with a label or `everything`.
+
+    `progress` is told how many packets are done, `problem` what cannot be decoded at all.
+    """
+
+    folder: Path
+    picture_type: str
+    everything: bool
+    progress: Callable[[int], None]
+    problem: Callable[[str], None]
+
+    def write(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]]) -> DataSet:
+        """Write pictures and annotations.json; raises LabelError where not one frame is wanted, and OSError."""
+        result = DataSet()
+        (self.folder / PICTURES).mkdir()
+        for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
+            wanted = labels.get(packet.sample_time, ())
+            if frame is None:
+                result.lost += 1
+            elif wanted or self.everything:
+                name = f"{PICTURES}/{packet.sender_stamp}-{packet.sample_time}.{self.picture_type}"
+                _write_picture(self.folder / name, frame)
+                _add(result, packet, frame, name, wanted)
+            self.progress(done)
+        if not result.images:
+            raise LabelError(f"no frame of {recording.path} could be decoded at the sample time of a detection")
+        (self.folder / ANNOTATIONS).write_text(result.text(), encoding="utf-8")
+        return result
+
+
+def _take(detection: Detection, kind: str, message: Any) -> None:
+    if kind == "BoundingBox":
+        detection.box = (message.x, message.y, message.width, message.height)
+    elif kind == "Property":
+        detection.label = message.property.removeprefix("color:").strip()
+    else:
+        detection.type = message.type
+
+
+def _add(result: DataSet, packet: Packet, frame: Frame, name: str, wanted: Iterable[Detection]) -> None:
+    number = len(result.images) + 1
+    size = {"width": frame.width, "height": frame.height}
+    result.images.append({"id": number, "file_name": name, **size, "sample_time": packet.sample_time})
+    for detection in wanted:
+        x, y, width, height = detection.box or (0.0, 0.0, 0.0, 0.0)
+        box = [x * frame.width, y * frame.height, width * frame.width, height * frame.height]
+        result.boxes.append((number, detection.category, [round(value, 3) for value in box]))
+
+
+def _write_picture(path: Path, frame: Frame) -> None:
+    import cv2
+
+    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if path.suffix == ".jpg" else []
+    done, data = cv2.imencode(path.suffix, frame.pixels("bgr"), options)
+    if not done:
+        raise OSError(f"{path.name} cannot be encoded")
+    path.write_bytes(data.tobytes())

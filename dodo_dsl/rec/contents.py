@@ -1,0 +1,131 @@
+"""What a recording holds: messages with their rates and gaps, frames, times, and what was skipped."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.rec.frames import IMAGE, decoded
+
+_DAY = 86_400_000_000
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The messages of one id and sender; rate in Hz and the largest gap in s are None where one message tells none."""
+
+    id: int
+    name: str | None
+    sender_stamp: int
+    count: int
+    bytes: int
+    rate: float | None
+    largest_gap: float | None
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Packets with camera frames, and how many of them give a picture (None where nobody tried)."""
+
+    packets: int
+    decoded: int | None
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Begin and duration in s, from sample times where there are any; `unordered` counts steps back in time.
+
+    `apart` messages are more than a day away from most others and do not count for these: in lockstep, what an
+    application stamps with the time of its machine lies years from the time of the test.
+    """
+
+    size: int
+    envelopes: int
+    begin: float | None
+    duration: float
+    unordered: int
+    apart: int
+    untimed: int
+    message_set: str
+    streams: list[Stream]
+    frames: Frames
+
+    def as_json(self, recording: Recording) -> dict[str, Any]:
+        """For programs; see docs/recordings.md."""
+        facts = asdict(self)
+        facts["messages"] = facts.pop("streams")
+        facts["skipped"] = [asdict(place) for place in recording.damage.places]
+        facts["skipped_bytes"], facts["skipped_places"] = recording.damage.size, recording.damage.count
+        return {"file": str(recording.path), **facts}
+
+
+def look(
+    recording: Recording,
+    messages: MessageSet,
+    message_set: str,
+    progress: Callable[[int], None] | None,
+    problem: Callable[[str], None],
+) -> Contents:
+    """Count everything; frames are decoded where `progress`, told how many are, is given.
+
+    `problem` is told what cannot be decoded at all.
+    """
+    times = recording.index["time"]
+    stamped = times[times != 0]
+    known = _together(stamped)
+    return Contents(
+        size=recording.size,
+        envelopes=len(recording),
+        begin=int(known.min()) / 1e6 if len(known) else None,
+        duration=int(known.max() - known.min()) / 1e6 if len(known) else 0.0,
+        unordered=int((np.diff(known) < 0).sum()),
+        apart=len(stamped) - len(known),
+        untimed=int((recording.index["sampled"] == 0).sum()),
+        message_set=message_set,
+        streams=_streams(recording, messages),
+        frames=_frames(recording, progress, problem),
+    )
+
+
+def _together(times: Numbers) -> Numbers:
+    """The times in us, as they stand, of the largest group without a gap of a day; the earliest of such groups."""
+    ordered = np.sort(times)
+    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _DAY) + 1)
+    largest = max(groups, key=len)
+    return times[(times >= largest[0]) & (times <= largest[-1])] if len(largest) else times
+
+
+def _streams(recording: Recording, messages: MessageSet) -> list[Stream]:
+    index, known = recording.index, messages.ids()
+    keys = index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]
+    order = np.argsort(keys, kind="stable")
+    found = []
+    for rows in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1) if len(order) else ():
+        id_, stamp = int(index["data_type"][rows[0]]), int(index["sender_stamp"][rows[0]])
+        size = int(index["size"][rows].sum(dtype=np.int64))
+        name = messages.name(id_) if id_ in known else None
+        found.append(Stream(id_, name, stamp, len(rows), size, *_rate(index["time"][rows])))
+    return found
+
+
+def _rate(times: Numbers) -> tuple[float | None, float | None]:
+    ordered = np.sort(times[times != 0])
+    span = int(ordered[-1] - ordered[0]) if len(ordered) > 1 else 0
+    if not span:
+        return None, None
+    return round((len(ordered) - 1) * 1e6 / span, 3), int(np.diff(ordered).max()) / 1e6
+
+
+def _frames(recording: Recording, progress: Callable[[int], None] | None, problem: Callable[[str], None]) -> Frames:
+    rows = recording.rows(messages=[IMAGE])
+    if progress is None:
+        return Frames(len(rows), None)
+    count = 0
+    for done, (_, frame) in enumerate(decoded(recording, rows, problem), 1):
+        count += frame is not None
+        progress(done)
+    return Frames(len(rows), count)

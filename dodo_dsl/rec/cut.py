@@ -1,0 +1,20 @@
+"""A part of a recording as a recording of its own, byte for byte."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+
+
+def write(recording: Recording, rows: Numbers, path: Path, progress: Callable[[int], None]) -> None:
+    """Write some rows as they are into a new file; `progress` is told how many are done.
+
+    Raises OSError and RecordingError.
+    """
+    with RecordingWriter(path) as writer:
+        for batch in recording.batches(rows):
+            writer.write_frames(batch.frames())
+            progress(writer.frames)
+        writer.flush_to_disk()

@@ -1,0 +1,151 @@
+"""True boxes of one picture: written by hand or read from COCO JSON, checked, drawn, and written as COCO JSON.
+
+Reference: cocodataset.org, "Data format", object detection; boxes are in pixels from the picture's upper left corner.
+"""
+
+import json
+import math
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from dodo_dsl.opendlv.memory.pixels import Picture
+
+MOST_BYTES, MOST_BOXES, MOST_PIXELS = 16_000_000, 10_000, 100_000
+_SLACK = 0.01
+"""px by which a rounded box may reach over the picture's edge."""
+_LEAST_SHOWN = 1000
+"""px: a picture of less width is drawn twice as large, as boxes are small."""
+
+
+class TruthError(ValueError):
+    """Boxes that are no truth of a picture; one sentence."""
+
+
+class Mark(NamedTuple):
+    """A box with its class; upper left corner and size in pixels."""
+
+    label: str
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def __str__(self) -> str:
+        return " ".join([self.label, *(f"{number:g}" for number in self[1:])])
+
+
+def mark(label: object, numbers: Sequence[object], place: str) -> Mark:
+    """A box of a class and its four numbers; raises TruthError, which names the place."""
+    name = str(label).strip().removeprefix("color:").strip()
+    if not name or not name.isprintable():
+        raise TruthError(f"{place}: the class is empty or no text")
+    try:
+        x, y, width, height = (float(str(number)) for number in numbers)
+    except ValueError:
+        x = y = width = height = math.nan
+    if not all(map(math.isfinite, (x, y, width, height))):
+        raise TruthError(f"{place}: expected a class and four numbers X Y WIDTH HEIGHT in pixels")
+    return Mark(name, x, y, width, height)
+
+
+def check(marks: Sequence[Mark], width: int, height: int, classes: Collection[str]) -> None:
+    """Raises TruthError for the first box that a picture of this size cannot have; without classes any will do."""
+    for number, each in enumerate(marks, 1):
+        place = f"box {number} ({each})"
+        if classes and each.label not in classes:
+            raise TruthError(f"{place}: there is no class '{each.label}', expected one of {', '.join(classes)}")
+        if each.width <= 0 or each.height <= 0:
+            raise TruthError(f"{place}: has no area, expected a width and a height above 0")
+        ends = each.x + each.width, each.y + each.height
+        if min(each.x, each.y) < 0 or ends[0] > width + _SLACK or ends[1] > height + _SLACK:
+            raise TruthError(f"{place}: lies outside of the picture, which has {width} x {height} pixels")
+
+
+def read(path: Path, width: int, height: int) -> list[Mark]:
+    """The boxes of a COCO file of one picture of this size; raises TruthError."""
+    size, marks = load(path)
+    if size != (width, height):
+        has = f"a picture of {size[0]} x {size[1]} pixels"
+        raise TruthError(f"{path}: has boxes of {has}, expected one of {width} x {height} pixels")
+    return marks
+
+
+def load(path: Path) -> tuple[tuple[int, int], list[Mark]]:
+    """Width and height of the one picture of a COCO file, and its boxes; raises TruthError."""
+    document = _document(path)
+    images = _entries(document, "images", path)
+    if len(images) != 1:
+        raise TruthError(f"{path}: has {len(images)} images, expected one picture")
+    width, height = (_side(images[0].get(name), name, path) for name in ("width", "height"))
+    names = {_key(entry.get("id")): entry.get("name") for entry in _entries(document, "categories", path)}
+    boxes = enumerate(_entries(document, "annotations", path))
+    return (width, height), [_read_one(entry, names, f"{path}: annotations[{index}]") for index, entry in boxes]
+
+
+def text(marks: Sequence[Mark], picture: str, width: int, height: int) -> str:
+    """COCO JSON of a picture's file name and size, and its boxes."""
+    from dodo_dsl.rec.coco import DataSet
+
+    images = [{"id": 1, "file_name": picture, "width": width, "height": height}]
+    return DataSet(images, [(1, each.label, [round(number, 3) for number in each[1:]]) for each in marks]).text()
+
+
+def drawn(picture: "Picture", marks: Sequence[Mark]) -> "Picture":
+    """A picture (height, width, 3; B, G, R) with the boxes and their classes; twice as large where it is small."""
+    import cv2
+
+    scale = 2 if picture.shape[1] < _LEAST_SHOWN else 1
+    shown: Picture = picture.repeat(scale, axis=0).repeat(scale, axis=1)
+    colours = {label: _COLOURS[n % len(_COLOURS)] for n, label in enumerate(sorted({each.label for each in marks}))}
+    for number, each in enumerate(marks, 1):
+        corners = [round(scale * value) for value in (each.x, each.y, each.x + each.width, each.y + each.height)]
+        first, last = (corners[0], corners[1]), (corners[2] - 1, corners[3] - 1)
+        name, at = f"{number} {each.label}", (first[0], max(first[1] - 5, 12))
+        for colour, thick in (((0, 0, 0), 3), (colours[each.label], 1)):
+            cv2.rectangle(shown, first, last, colour, thick)
+            cv2.putText(shown, name, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, thick, cv2.LINE_AA)
+    return shown
+
+
+_COLOURS = ((255, 80, 255), (255, 255, 60), (80, 255, 120), (255, 255, 255), (60, 160, 255))
+"""B, G, R; none is that of a cone."""
+
+
+def _document(path: Path) -> Any:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8")) if path.stat().st_size <= MOST_BYTES else None
+    except (OSError, ValueError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise TruthError(f"{path}: cannot be read as COCO JSON: {reason}") from None
+    if document is None:
+        raise TruthError(f"{path}: is empty, or larger than {MOST_BYTES} bytes")
+    return document
+
+
+def _entries(document: Any, name: str, path: Path) -> list[dict[str, Any]]:
+    entries = document.get(name) if isinstance(document, dict) else None
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise TruthError(f"{path}: expected an object with a list of objects '{name}'")
+    if len(entries) > MOST_BOXES:
+        raise TruthError(f"{path}: has {len(entries)} {name}, expected at most {MOST_BOXES}")
+    return entries
+
+
+def _side(pixels: Any, name: str, path: Path) -> int:
+    if not isinstance(pixels, int) or not 0 < pixels <= MOST_PIXELS:
+        raise TruthError(f"{path}: images[0].{name}: expected a whole number of pixels above 0")
+    return pixels
+
+
+def _read_one(entry: dict[str, Any], names: dict[str, Any], place: str) -> Mark:
+    label, numbers = names.get(_key(entry.get("category_id"))), entry.get("bbox")
+    if not isinstance(label, str):
+        raise TruthError(f"{place}.category_id: there is no class of this id")
+    return mark(label, numbers if isinstance(numbers, list) else (), place)
+
+
+def _key(number: Any) -> str:
+    """An id as something that can be looked up, whatever it is."""
+    return json.dumps(number)

@@ -1,0 +1,74 @@
+"""A truth on disk: the COCO file, the picture that it is about, and the same picture with the boxes drawn."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from dodo_dsl.rec import truth
+from dodo_dsl.rec.outputs import new_file
+from dodo_dsl.rec.truth import Mark, TruthError
+
+if TYPE_CHECKING:
+    from dodo_dsl.opendlv.memory.pixels import Picture
+
+MOST_BYTES = 64_000_000
+
+
+@dataclass(frozen=True)
+class TruthFiles:
+    """What is written: the truth, the picture, and the picture with boxes."""
+
+    truth: Path
+    picture: Path
+    marked: Path
+
+    @classmethod
+    def beside(cls, path: Path) -> Self:
+        """``FILE.json``, ``FILE.png`` and ``FILE-boxes.png``; raises TruthError for another ending."""
+        if path.suffix != ".json":
+            raise TruthError(f"--output is '{path}', expected a file that ends in .json")
+        return cls(path, path.with_suffix(".png"), path.with_name(f"{path.stem}-boxes.png"))
+
+    def wanted(self, has_boxes: bool, is_new: bool) -> list[Path]:
+        """The files that will be written, for a picture that is ``is_new``."""
+        return [*([self.truth, self.marked] if has_boxes else []), *([self.picture] if is_new else [])]
+
+    def write(self, picture: "Picture", marks: Sequence[Mark], is_new: bool) -> None:
+        """Each appears whole; the pictures first, so that who finds the truth finds them, too."""
+        height, width = picture.shape[:2]
+        if is_new:
+            _write_picture(self.picture, picture)
+        if marks:
+            _write_picture(self.marked, truth.drawn(picture, marks))
+            with new_file(self.truth) as path:
+                path.write_text(truth.text(marks, self.picture.name, width, height), encoding="utf-8")
+
+
+def given(path: Path) -> bytes:
+    """The bytes of a picture that is there; raises TruthError."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise TruthError(f"{path}: is larger than {MOST_BYTES} bytes")
+        return path.read_bytes()
+    except OSError as error:
+        raise TruthError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def decoded(data: bytes, name: str) -> "Picture":
+    """The bytes of a picture as blue, green, red (height, width, 3); raises TruthError, which names it."""
+    import cv2
+    import numpy as np
+
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
+    if picture is None:
+        raise TruthError(f"{name}: holds no picture")
+    return np.asarray(picture, np.uint8)
+
+
+def _write_picture(target: Path, picture: "Picture") -> None:
+    import cv2
+
+    _, png = cv2.imencode(".png", picture)
+    with new_file(target) as path:
+        path.write_bytes(png.tobytes())

@@ -1,0 +1,151 @@
+"""A run's report folder."""
+
+import contextlib
+import os
+import platform
+import re
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dodo_dsl.emit.output_folder import replace_file, write_text
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.report import html, junit, metrics, results
+from dodo_dsl.report.duration_plot import Times
+from dodo_dsl.report.duration_plot import draw as draw_times
+from dodo_dsl.report.trajectory import read_drive
+from dodo_dsl.spec.registry import SUFFIX
+
+RECORDING = "test.rec"
+TRAJECTORY = "trajectory.png"
+SNAPSHOT = "snapshot.png"
+TIMES = "times.png"
+LOGS, ATTEMPTS = "logs", "attempts"
+SANDBOX_LOG = "sandbox.log"
+_LONGEST_PATH = 1000
+SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
+
+
+@dataclass(frozen=True)
+class Drawable:
+    """A test's Plan and the folder that it was compiled into, for the map under its path."""
+
+    plan: Plan
+    folder: Path
+
+
+def forget(folder: Path, slugs: Sequence[str]) -> int:
+    """Removes what earlier runs wrote for the tests that they name, and for ``slugs``; other files stay.
+
+    Returns how many tests of the earlier run are not among ``slugs``.
+    """
+    try:
+        earlier = [outcome.slug for outcome in results.load(folder / results.FILE_NAME)]
+    except results.ResultsError:
+        earlier = []
+    for slug in {*slugs, *earlier}:
+        if SLUG.fullmatch(slug):
+            _forget_test(folder / slug)
+    return len({*earlier} - {*slugs})
+
+
+def _forget_test(place: Path) -> None:
+    for name in (LOGS, ATTEMPTS):
+        shutil.rmtree(place / name, ignore_errors=True)
+    for name in (RECORDING, TRAJECTORY, SNAPSHOT, SANDBOX_LOG):
+        (place / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):  # there is none, or it holds what others put there
+        place.rmdir()
+
+
+def write_report(
+    folder: Path,
+    outcomes: Sequence[Outcome],
+    tests: Mapping[str, Drawable],
+    times: Mapping[str, Sequence[Times]] | None = None,
+) -> list[str]:
+    """Writes the results first, draws each drive, and returns sentences on what could not be drawn.
+
+    ``times`` are those of all runs of these tests on this machine; they are drawn as well.
+    """
+    outcomes = [results.writable(outcome) for outcome in outcomes]
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    problems = []
+    for outcome in outcomes:
+        if outcome.slug in tests:
+            try:
+                _draw(folder / outcome.slug, outcome, tests[outcome.slug])
+            except Exception as error:  # noqa: BLE001  (what is drawn comes from services; no picture costs a verdict)
+                problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
+    (folder / TIMES).unlink(missing_ok=True)
+    if times:
+        try:
+            replace_file(folder / TIMES, lambda path: draw_times(times, platform.node() or "this machine", path))
+        except Exception as error:  # noqa: BLE001  (as above)
+            problems.append(f"the times of these tests cannot be drawn: {error}")
+    write_summaries(folder, outcomes)
+    return problems
+
+
+def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
+    """The four files that stand for the whole run."""
+    pictures = {o.slug: _pictures(folder, o) for o in outcomes}
+    attachments = {slug: f"{_shown(folder)}/{found[0].path}" for slug, found in pictures.items() if found}
+    times = TIMES if (folder / TIMES).is_file() else ""
+    write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    replace_file(folder / "junit.xml", lambda path: junit.write(path, outcomes, attachments))
+    write_text(folder / "metrics.txt", metrics.to_text(outcomes))
+    files = html.Files(
+        pictures, _logs(folder, outcomes), _recordings(folder, outcomes), _specs(folder, outcomes), times
+    )
+    write_text(folder / "index.html", html.render(outcomes, files))
+
+
+def _pictures(folder: Path, outcome: Outcome) -> list[html.Picture]:
+    """Those that a test has, the one that says most first: GitLab shows one beside a test case."""
+    known = (
+        (TRAJECTORY, f"The drive of {outcome.name} from above"),
+        (SNAPSHOT, f"What the camera of {outcome.name} saw"),
+    )
+    place = outcome.slug
+    return [html.Picture(f"{place}/{name}", text) for name, text in known if (folder / place / name).is_file()]
+
+
+def _shown(folder: Path) -> str:
+    """The folder relative to the working folder, which GitLab's attachments are relative to."""
+    path = folder.resolve()
+    return path.relative_to(Path.cwd()).as_posix() if path.is_relative_to(Path.cwd()) else path.name
+
+
+def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
+    return {
+        o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / LOGS).glob("*.log"))]
+        for o in outcomes
+    }
+
+
+def _recordings(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
+    names = {o.slug: f"{o.slug}/{RECORDING}" for o in outcomes}
+    return {slug: name for slug, name in names.items() if (folder / name).is_file()}
+
+
+def _specs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
+    """The specs that lie below the working folder, as seen from the report."""
+    paths = {o.slug: Path.cwd() / o.spec for o in outcomes if len(o.spec) < _LONGEST_PATH}
+    return {
+        slug: Path(os.path.relpath(path, folder.resolve())).as_posix()
+        for slug, path in paths.items()
+        if path.name.endswith(SUFFIX) and path.is_file()
+    }
+
+
+def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
+    drive = read_drive(test.plan, test.folder, folder / RECORDING)
+    if drive is None:
+        return
+    from dodo_dsl.report.trajectory_plot import draw
+
+    replace_file(folder / TRAJECTORY, lambda path: draw(drive, outcome, path))

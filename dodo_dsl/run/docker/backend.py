@@ -1,0 +1,228 @@
+"""The docker backend: the containers that ``docker compose`` creates, watched by the engine's events."""
+
+import asyncio
+import contextlib
+import os
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run import service_lines
+from dodo_dsl.run.announce import begin_frame, send_on_host
+from dodo_dsl.run.docker.archive import copy_out
+from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, remove_project, stop_project
+from dodo_dsl.run.docker.client import said
+from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.docker.events import Watch
+from dodo_dsl.run.docker.pulls import Pulls, Say
+from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
+from dodo_dsl.run.service_output import Output
+
+_PORT = 12175
+_REPORT = "/dodo/report"
+# dd makes one datagram of it: bash itself would write one a line, and a frame may hold a byte that is a line's end
+_TELL = 'printf "%b" "$1" | dd bs=65507 iflag=fullblock status=none > "/dev/udp/$2/$3"'
+
+
+class DockerBackend:
+    """One test as a compose project of its own; ``subnets`` are tried in turn until the engine takes one."""
+
+    name = "docker"
+
+    def __init__(
+        self,
+        plan: Plan,
+        folder: Path,
+        report: Path,
+        client: Any,
+        pulls: Pulls,
+        project: str,
+        subnets: Iterable[str],
+        say: Say,
+    ) -> None:
+        self.plan = plan
+        self.cid = plan.cid
+        self.report = report
+        self.project = project
+        self._client = client
+        self._pulls = pulls
+        self._subnets = subnets
+        self._say = say
+        self._queue: asyncio.Queue[Event] = asyncio.Queue()
+        self._compose = Compose(plan, folder, report, project, say)
+        self._containers: dict[str, Any] = {}
+        self._outputs: dict[str, Output] = {}
+        self._out_of_memory: set[str] = set()
+        self._watch = Watch(self._heard, lambda why: self._queue.put_nowait(Lost(why)))
+        self.left_behind = False
+
+    async def open(self) -> None:
+        await self._compose.read()
+        await self._compose.provide_images(self._pulls)
+        await self._compose.create(self._subnets)
+        await self._begin_to_watch()
+
+    async def _begin_to_watch(self) -> None:
+        from docker.errors import DockerException
+
+        try:
+            self._containers = await asyncio.to_thread(self._find_containers)
+            await asyncio.to_thread(self._watch.begin, self._client, self.project)
+            if SANDBOX in self._containers:
+                await asyncio.to_thread(self._containers[SANDBOX].start)
+        except (DockerException, OSError) as error:
+            raise BackendError(f"the Docker engine cannot start the test: {said(error)}") from error
+
+    def _find_containers(self) -> dict[str, Any]:
+        found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self.project}"})
+        return {c.labels[SERVICE_LABEL]: c for c in found}
+
+    def _heard(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
+        if action == "oom":
+            self._out_of_memory.add(name)
+        elif action == "health_status: healthy":
+            self._queue.put_nowait(Ready(name))
+        elif action == "die" and name in self._outputs:
+            task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
+            task.add_done_callback(lambda t: t.exception())
+        elif action == "die":
+            self._queue.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+
+    async def _died(self, name: str, code: int) -> None:
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
+        self._queue.put_nowait(Exited(name, code, name in self._out_of_memory))
+
+    async def start(self, layer: str) -> dict[str, bool]:
+        names = [s.name for s in self.plan.layer(layer)]
+        if layer == "application":
+            names = [s.name for s in self.plan.application.services if s.name in self._containers]
+        judges = {s.name for s in self.plan.services if s.judge}
+        for name in names:
+            self._outputs[name] = Output(
+                self.report / "logs" / f"{layer}.{name}.log", self._reader(layer, name, judges)
+            )
+        await asyncio.gather(*(self._start(name) for name in self._compose.in_order(names)))
+        is_ours = layer != "application"
+        return {name: is_ours or self._compose.has_healthcheck(name) for name in names}
+
+    def _reader(self, layer: str, name: str, judges: set[str]) -> Any:
+        def on_line(line: bytes) -> bool:
+            event = None if layer == "application" else service_lines.read_line(name, name in judges, line)
+            if event is not None:
+                self._queue.put_nowait(event)
+            return event is not None
+
+        return on_line
+
+    async def _start(self, name: str) -> None:
+        from docker.errors import DockerException
+
+        container, output = self._containers[name], self._outputs[name]
+        try:
+            await asyncio.to_thread(container.start)
+        except (DockerException, OSError) as error:
+            output.release_writer()
+            why = said(error)
+            self._queue.put_nowait(Unstartable(name, why))
+            return
+        threading.Thread(target=self._follow, args=(container, output.writer), daemon=True).start()
+
+    @staticmethod
+    def _follow(container: Any, writer: int) -> None:
+        """The thread that copies a container's output into the pipe of its Output."""
+        with contextlib.suppress(Exception):
+            for chunk in container.logs(stream=True, follow=True):
+                os.write(writer, chunk)
+        with contextlib.suppress(OSError):
+            os.close(writer)
+
+    async def next_event(self) -> Event:
+        return await self._queue.get()
+
+    async def begin(self) -> None:
+        frame, group = begin_frame(self.plan.seed), f"225.0.0.{self.cid}"
+        if SANDBOX not in self._containers:
+            try:
+                send_on_host(self.cid, frame)
+            except OSError as error:
+                raise BackendError(f"the test's bus cannot be told that the test begins: {error}") from error
+            return
+        escaped = "".join(f"\\x{byte:02x}" for byte in frame)
+        words = ["bash", "-c", _TELL, "tell", escaped, group, str(_PORT)]
+        problem = await asyncio.to_thread(self._exec_problem, words)
+        if problem:
+            raise BackendError(f"the test's bus cannot be told that the test begins: {problem}")
+
+    def _exec_problem(self, words: list[str]) -> str:
+        """What a command in the sandbox container failed with, or nothing."""
+        from docker.errors import DockerException
+
+        try:
+            code, output = self._containers[SANDBOX].exec_run(words)
+        except (DockerException, OSError) as error:
+            return str(error)
+        return "" if code == 0 else (output or b"").decode("utf-8", "replace").strip() or f"exit code {code}"
+
+    async def close(self, keep: bool) -> list[str]:
+        self._watch.ignores = True
+        kept = []
+        if keep and self._containers:
+            kept = self._kept()
+        else:
+            await asyncio.to_thread(self._take_down)
+        self._watch.close()
+        for output in self._outputs.values():
+            output.close()
+        return kept
+
+    def _take_down(self) -> None:
+        """What cannot be removed, as when the engine has gone, is left to the next run."""
+        try:
+            stop_project(self._client, self.project)
+            for container in self._containers.values():
+                if self._records(container):
+                    self._copy_report(container)
+            remove_project(self._client, self.project)
+        except Exception:  # noqa: BLE001  (whatever it was, the record of what is there has to stay)
+            self.left_behind = True
+            self._note("the engine does not take it down: the next run does, or dodo doctor --clean")
+
+    def _copy_report(self, container: Any) -> None:
+        from docker.errors import DockerException
+
+        try:
+            copy_out(container, f"{_REPORT}/.", self.report)
+        except (DockerException, OSError) as error:
+            why = said(error)
+            self._note(f"the report misses files of {container.labels[SERVICE_LABEL]}: {why}")
+
+    def _note(self, text: str) -> None:
+        """Said at once, and with the outcome."""
+        self._say(text)
+        self._watch.tell(self._queue.put_nowait, Noted(text))
+
+    def _records(self, container: Any) -> bool:
+        name = container.labels[SERVICE_LABEL]
+        return any(f.kind == "report" for s in self.plan.services if s.name == name for f in s.flags)
+
+    def _kept(self) -> list[str]:
+        compose = f"docker compose -p {self.project}"
+        return [
+            f"{self.plan.slug} is kept up as compose project {self.project}",
+            f"look inside:  {compose} ps;  {compose} logs camera;  {compose} exec {SANDBOX} bash",
+            f"take it down: {compose} down -v",
+        ]
+
+    def tail(self, service: str) -> list[str]:
+        output = self._outputs.get(service)
+        return output.tail() if output else []
+
+
+def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
+    """The planned subnet, then the rest of the deployment's."""
+    yield first
+    yield from (subnet for subnet in all_subnets if subnet != first)

@@ -1,0 +1,90 @@
+"""Compose projects on an engine, by label: stop, remove, and find what killed runs left."""
+
+import contextlib
+import functools
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+from dodo_dsl.run import leases
+from dodo_dsl.run.docker.client import said
+
+PROJECT_LABEL = "com.docker.compose.project"
+SERVICE_LABEL = "com.docker.compose.service"
+_STOP_S = 2
+
+
+@dataclass
+class Reaped:
+    """What became of what killed runs left, each a phrase: what was removed, and what could not be."""
+
+    removed: list[str] = field(default_factory=list)
+    left: list[str] = field(default_factory=list)
+
+
+def _filters(project: str) -> dict[str, str]:
+    return {"label": f"{PROJECT_LABEL}={project}"}
+
+
+def stop_project(client: Any, project: str) -> None:
+    """SIGTERM to all containers at once, SIGKILL to those that do not end within 2 s."""
+    from docker.errors import DockerException
+
+    containers = client.containers.list(filters=_filters(project))
+    with (
+        ThreadPoolExecutor(max_workers=max(1, len(containers))) as pool,
+        contextlib.suppress(DockerException, OSError),
+    ):
+        list(pool.map(lambda c: c.stop(timeout=_STOP_S), containers))
+
+
+def remove_project(client: Any, project: str) -> int:
+    """Removes containers, networks and volumes of a project, and says how many; what is gone already is no error.
+
+    Goes on where one cannot be removed, and raises the first such error of the engine's at the end.
+    """
+    from docker.errors import DockerException, NotFound
+
+    removed, problems = 0, []
+    for remove in _removals(client, project):
+        try:
+            remove()
+            removed += 1
+        except NotFound:
+            continue
+        except (DockerException, OSError) as error:
+            problems.append(error)
+    if problems:
+        raise problems[0]
+    return removed
+
+
+def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
+    """In this order, as networks and volumes go only when no container has them."""
+    for container in client.containers.list(all=True, filters=_filters(project)):
+        yield functools.partial(container.remove, force=True, v=True)
+    yield from (network.remove for network in client.networks.list(filters=_filters(project)))
+    yield from (volume.remove for volume in client.volumes.list(filters=_filters(project)))
+
+
+def reap_projects(client: Any) -> Reaped:
+    """Removes the projects of killed runs: those whose lease nobody holds, and nothing else.
+
+    One that cannot be removed keeps its record for the next time, and the others go all the same.
+    """
+    from docker.errors import DockerException
+
+    reaped = Reaped()
+    for lease, about in leases.orphans(leases.PROJECT):
+        project, test = lease.name.removeprefix(leases.PROJECT), about.get("test", "?")
+        try:
+            count = remove_project(client, project)
+        except (DockerException, OSError) as error:
+            reaped.left.append(f"{test}: project {project}: {said(error)}")
+            lease.leave()
+            continue
+        if count:
+            reaped.removed.append(f"{test}: {count} containers, networks and volumes")
+        lease.release()
+    return reaped

@@ -1,0 +1,115 @@
+"""``docker compose`` for one compiled test: what its files mean, its images, its network, volumes and containers."""
+
+import asyncio
+import contextlib
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.trace import traced
+from dodo_dsl.run.docker.pulls import Pulls, Say
+from dodo_dsl.run.protocol import BackendError
+
+_BUILD_PROJECT = "dodo-build"
+_OVERLAP = "overlaps"
+_YIELDING = ("nice", "-n", "10")  # the set-up of one test leaves the processor to those that drive already
+
+
+class Compose:
+    """The test compiled into ``folder``, as a project; ``services`` are those of its files once they are read."""
+
+    def __init__(self, plan: Plan, folder: Path, report: Path, project: str, say: Say) -> None:
+        self.plan = plan
+        self.folder = folder
+        self.report = report
+        self.project = project
+        self.services: dict[str, Any] = {}
+        self._say = say
+
+    async def read(self) -> None:
+        """Fills ``services``; raises BackendError."""
+        code, out, problem = await self._run("config", "--format", "json")
+        if code:
+            raise BackendError(f"docker compose does not take the compiled test: {traced(self.plan, problem)}")
+        self.services = json.loads(out)["services"]
+
+    def has_healthcheck(self, name: str) -> bool:
+        check = self.services.get(name, {}).get("healthcheck")
+        return bool(check) and not check.get("disable") and check.get("test") != ["NONE"]
+
+    def in_order(self, names: list[str]) -> list[str]:
+        """Services that others of the same layer depend on come first."""
+        ordered: list[str] = []
+
+        def add(name: str) -> None:
+            if name in names and name not in ordered:
+                for other in self.services.get(name, {}).get("depends_on") or {}:
+                    add(other)
+                ordered.append(name)
+
+        for name in names:
+            add(name)
+        return ordered
+
+    async def provide_images(self, pulls: Pulls) -> None:
+        """Pulls and builds what the services name, once for all tests of a run; raises BackendError."""
+        application = {s.name for s in self.plan.application.services}
+        built = [name for name, s in self.services.items() if "build" in s and "@" not in s.get("image", "")]
+        own = {s["image"] for name, s in self.services.items() if name not in application}
+        foreign = {s["image"] for name, s in self.services.items() if name in application and name not in built}
+        for note in await pulls.provide(own, foreign, self._say):
+            self._say(note)
+        named = [name for name in built if "image" in self.services[name]]
+        if named:
+            key = json.dumps([self.services[name]["build"] for name in named])
+            await pulls.once(key, lambda: self._build(named, _BUILD_PROJECT))
+        if len(named) < len(built):
+            await self._build([name for name in built if name not in named], self.project)
+
+    async def _build(self, names: list[str], project: str) -> str:
+        """Builds images; compose writes the project into them, so images with names of their own get one for all."""
+        self._say(f"building {', '.join(names)}")
+        log = self.report / "logs" / "build.log"
+        code, _, problem = await self._run("build", *names, log=log, project=project)
+        if code:
+            raise BackendError(f"the application's images cannot be built: {problem}; {log} has the whole output")
+        return ""
+
+    async def create(self, subnets: Iterable[str]) -> None:
+        """Network, volumes and containers; a subnet that the engine has in use is left to others. BackendError."""
+        code, problem = 1, "no subnet is free"
+        for subnet in subnets:
+            code, _, problem = await self._run("create", "--no-build", "--pull", "never", subnet=subnet)
+            if not code or _OVERLAP not in problem:
+                break
+        if code:
+            raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
+
+    async def _run(
+        self, *words: str, subnet: str = "", log: Path | None = None, project: str = ""
+    ) -> tuple[int, str, str]:
+        """Exit code, standard output and the last line of standard error of a compose command."""
+        environment = {**os.environ, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
+        for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
+            environment.pop(name, None)  # the test's own .env decides
+        if subnet:
+            environment["DODO_SUBNET"] = subnet
+        process = await asyncio.create_subprocess_exec(
+            *_YIELDING, "docker", "compose", *words, cwd=self.folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
+        )  # fmt: skip
+        try:
+            out, err = await process.communicate()
+        except asyncio.CancelledError:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+            raise
+        if log is not None:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            log.write_bytes(out + err)
+        said = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
+        return process.returncode or 0, out.decode("utf-8", "replace"), said[-1].strip() if said else ""

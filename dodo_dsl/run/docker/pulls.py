@@ -1,0 +1,133 @@
+"""Images before a test's clock starts: DoDo's own are pulled when missing, the application's are resolved anew."""
+
+import asyncio
+import threading
+from collections.abc import Callable, Coroutine, Iterable
+from typing import Any
+
+from dodo_dsl.run.docker.client import said
+from dodo_dsl.run.protocol import BackendError
+
+Say = Callable[[str], None]
+
+
+class Pulls:
+    """Pulls for all tests of a run: each image once, several at a time."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._tasks: dict[str, asyncio.Task[str]] = {}
+        self._over = threading.Event()
+
+    async def provide(self, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
+        """Makes the images local; returns notes on what was taken as it is. Raises BackendError."""
+        waits = [self._pull_once(image, self._own, say) for image in sorted(set(own))]
+        waits += [self._pull_once(image, self._application, say) for image in sorted(set(application))]
+        return [note for note in await asyncio.gather(*waits) if note]
+
+    async def _pull_once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str:
+        return await self.once(image, lambda: self._in_thread(work, image, say))
+
+    async def _in_thread(self, work: Callable[[str, Say], str], image: str, say: Say) -> str:
+        """Pulls on while tests wait for it; the end of an interrupted run does not."""
+        try:
+            return await asyncio.to_thread(work, image, say)
+        except asyncio.CancelledError:
+            self._over.set()
+            raise
+
+    async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str]]) -> str:
+        """Does a piece of work once for all tests of the run; those that come later wait for the first.
+
+        What failed is forgotten, so that a test that is tried again tries it again.
+        """
+        task = self._tasks.get(key)
+        if task is None:
+            task = self._tasks[key] = asyncio.ensure_future(work())
+            task.add_done_callback(lambda done: self._forget_failed(key, done))
+        return await asyncio.shield(task)
+
+    def _forget_failed(self, key: str, task: "asyncio.Task[str]") -> None:
+        if task.cancelled() or task.exception() is not None:
+            del self._tasks[key]
+
+    def _own(self, image: str, say: Say) -> str:
+        if not self._is_local(image):
+            self._pull(image, say)
+        return ""
+
+    def _application(self, image: str, say: Say) -> str:
+        try:
+            self._pull(image, say)
+        except BackendError as error:
+            if not self._is_local(image):
+                raise
+            return f"{error}; the one on this machine is taken"
+        return ""
+
+    def _is_local(self, image: str) -> bool:
+        from docker.errors import DockerException, ImageNotFound
+
+        try:
+            self._client.api.inspect_image(image)
+        except ImageNotFound:
+            return False
+        except (DockerException, OSError) as error:
+            raise BackendError(f"the Docker engine does not answer about image {image}: {error}") from error
+        return True
+
+    def _pull(self, image: str, say: Say) -> None:
+        from docker.errors import DockerException
+
+        progress = _Progress(image, say)
+        try:
+            for line in self._client.api.pull(*split_reference(image), stream=True, decode=True):
+                if self._over.is_set():
+                    return
+                progress.take(line)
+        except (DockerException, OSError) as error:
+            raise BackendError(f"image {image} cannot be pulled: {_reason(said(error))}") from error
+
+
+def split_reference(image: str) -> tuple[str, str]:
+    """An image's repository, and its tag (``latest`` by default) or digest."""
+    repository, sign, digest = image.partition("@")
+    if sign:
+        return repository, digest
+    repository, sign, tag = image.rpartition(":")
+    return (repository, tag) if sign and "/" not in tag else (image, "latest")
+
+
+def _reason(text: str) -> str:
+    if any(word in text for word in ("unauthorized", "denied", "no basic auth")):
+        return f"{text}; the registry wants a log-in: docker login"
+    return text
+
+
+class _Progress:
+    """Megabytes of an image's layers, told once a tenth, and that the engine has to try again, told once."""
+
+    def __init__(self, image: str, say: Say) -> None:
+        self._image = image
+        self._say = say
+        self._layers: dict[str, tuple[int, int]] = {}
+        self._told = -1
+        self._retried = False
+
+    def take(self, line: dict[str, Any]) -> None:
+        if "error" in line:
+            raise BackendError(f"image {self._image} cannot be pulled: {_reason(str(line['error']))}")
+        if str(line.get("status")).startswith("Retrying") and not self._retried:
+            self._retried = True
+            self._say(f"pulling {self._image}: the connection broke, the engine tries again")
+        detail = line.get("progressDetail") or {}
+        if line.get("status") == "Downloading" and detail.get("total"):
+            self._layers[line["id"]] = (detail["current"], detail["total"])
+            self._tell()
+
+    def _tell(self) -> None:
+        done, total = (sum(part) for part in zip(*self._layers.values(), strict=True))
+        tenth = 10 * done // max(total, 1)
+        if tenth > self._told:
+            self._told = tenth
+            self._say(f"pulling {self._image}: {done / 1e6:.0f} of {total / 1e6:.0f} MB")

@@ -1,0 +1,1 @@
+"""The process backend: local processes in a sandbox of their own."""

@@ -1,0 +1,78 @@
+"""The runner's end of the nursery, and of the sandboxes that are its forks and not the runner's own children."""
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+
+from dodo_dsl.run.process.commands import package_path
+
+END_S = 10.0
+
+
+class Nursery:
+    """The runner's end of the process that forks sandboxes; it ends when this is closed, or with the runner."""
+
+    def __init__(self, descriptors: tuple[int, ...]) -> None:
+        """``descriptors`` are of leases that sandboxes hold, too."""
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "dodo_dsl.run.process.fork_server", str(theirs.fileno())],
+                pass_fds=(theirs.fileno(), *descriptors),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                env={**os.environ, "PYTHONPATH": package_path()},
+            )
+
+    def fork(self, channel: socket.socket, log: int, lane: str) -> None:
+        """A sandbox at the other end of ``channel``; raises OSError when the nursery has gone."""
+        socket.send_fds(self._socket, [json.dumps({"lane": lane}).encode()], [channel.fileno(), log])
+
+    def close(self) -> None:
+        """Ends the nursery; the sandboxes stay."""
+        self._socket.close()
+        end(self._process)
+
+
+class Fork:
+    """A process that is another's child, as subprocess has its own."""
+
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        try:
+            self._descriptor = os.pidfd_open(pid)
+        except ProcessLookupError:
+            self._descriptor = -1
+
+    def poll(self) -> int | None:
+        """0 when it has ended."""
+        return 0 if self._descriptor < 0 or select.select([self._descriptor], [], [], 0)[0] else None
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Until it has ended; raises TimeoutExpired."""
+        if self._descriptor >= 0:
+            if not select.select([self._descriptor], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired("sandbox", timeout or 0.0)
+            os.close(self._descriptor)
+            self._descriptor = -1
+        return 0
+
+    def kill(self) -> None:
+        """End it at once."""
+        if self._descriptor >= 0:
+            signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
+
+
+def end(process: "subprocess.Popen[bytes] | Fork") -> None:
+    """Wait for a process that was told to end, and kill it where it does not."""
+    try:
+        process.wait(END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,1 @@
+"""Rigs: exclusive access, checks, quarantine, camera."""

@@ -1,0 +1,71 @@
+"""A rig's camera by hand: which program looks through it, and with which flags."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from dodo_dsl.plan.emulated_rig import CAMERA, DRAWN, hardware
+from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.run.rigs.rigs import RigProblem
+from dodo_dsl.spec import arguments
+from dodo_dsl.spec.manifest import Manifest
+from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.rig import Rig
+from dodo_dsl.spec.values import ValueProblem, convert, default_value
+
+PROGRAMS = {
+    CAMERA: ("python", "-m", "services.camera.snapshot"),
+    DRAWN: ("python", "-m", "services.virtual_camera.snapshot"),
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    """A program that takes a snapshot, and its words but for the output; ``is_drawn`` when it knows the truth, too."""
+
+    program: tuple[str, ...]
+    words: tuple[str, ...]
+    is_drawn: bool
+
+
+def look(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> Look:
+    """How the service ``camera`` of a test on this rig looks, or the rig's camera alone; raises RigProblem."""
+    use = next((use for use in spec.uses if use.uses.text == CAMERA), None) if spec else None
+    if spec and use is None:
+        raise RigProblem(f"test {spec.title} has no service '{CAMERA}', which a rig looks through", usage=True)
+    if use is None and rig.is_emulated:
+        raise RigProblem("the emulated rig's camera sees the map of a test: name one with --test", usage=True)
+    if use is None and rig.entry("camera.source") is None:
+        raise RigProblem(f"rig '{rig.name}' has no camera in dodo.yml", usage=True)
+    try:
+        flags = _flags(rig, manifests[CAMERA], spec, use)
+    except ValueProblem as problem:
+        span = problem.diagnostic.span
+        raise RigProblem(f"{span.file}:{span.line}:{span.column}: {problem}", usage=True) from None
+    real = Service("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
+    service = hardware(real, manifests, "")
+    words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags)
+    return Look(PROGRAMS[service.uses], words, service.uses == DRAWN)
+
+
+def _flags(rig: Rig, manifest: Manifest, spec: Spec | None, use: Use | None) -> tuple[Flag, ...]:
+    flags = []
+    for parameter in manifest.parameters.values():
+        if spec and use:
+            value = arguments.value(spec, use, parameter, rig)
+        else:
+            entry = rig.entry(parameter.rig) if parameter.rig else None
+            value = convert(parameter, entry.value, Path.cwd()) if entry else default_value(parameter)
+        if value is not None:
+            flags.append(Flag(parameter.name, str(value.path or value.text)))
+    return tuple(flags)
+
+
+def judged_classes(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec) -> list[str]:
+    """The classes that count in a test; empty when it names none."""
+    texts = (
+        arguments.texts(spec, use, manifests[use.uses.text], rig).get("classes", "")
+        for use in spec.uses
+        if use.layer == "evaluation" and use.uses.text in manifests
+    )
+    return sorted({name for text in texts for name in text.split(",") if name})

@@ -1,0 +1,96 @@
+"""Lines that services print: JSON with the key ``dodo`` is meant for the runner, the rest is log."""
+
+import json
+import math
+from typing import Any
+
+from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.run.protocol import Event, Malformed, Overrun, Ready, Stopped, Time, Verdict
+
+_OUTCOMES = ("passed", "failed")
+_STOPS = ("unanswered", "stuck", "timedout")
+_MAX_TEXT = 2000
+_CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
+
+
+def read_line(service: str, judge: bool, line: bytes) -> Event | None:
+    """The event that a line stands for, or None for a line of log; only judges give verdicts."""
+    text = line.strip()
+    if not text.startswith(b"{") or b'"dodo"' not in text:
+        return None
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        return Malformed(service, "its JSON cannot be read") if judge and b'"verdict"' in text else None
+    if not isinstance(message, dict):
+        return None
+    kind = message.get("dodo")
+    if kind == "ready":
+        return Ready(service)
+    if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
+        return Overrun(service, message["messages"])
+    if kind == "verdict" and judge:
+        problem = _problem(message)
+        if problem:
+            return Malformed(service, problem)
+        return Verdict(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
+    return _of_the_clock(kind, message) if service == CLOCK else None
+
+
+def _of_the_clock(kind: object, message: dict[str, Any]) -> Event | None:
+    """How far the clock is, or why it goes no further."""
+    seconds, reason = message.get("s"), message.get("reason")
+    if kind == "time" and _is_number(seconds):
+        return Time(float(seconds or 0.0), message.get("last") is True)
+    if kind in _STOPS and isinstance(reason, str) and _is_text(reason or "none"):
+        return Stopped(str(kind), reason)
+    return None
+
+
+def _problem(message: dict[str, Any]) -> str:
+    if message.get("outcome") not in _OUTCOMES:
+        return f"its outcome is {json.dumps(message.get('outcome'))[:40]}, expected passed or failed"
+    if not _is_text(message.get("reason")):
+        return "it has no reason, or none that can be written"
+    checks = message.get("checks")
+    if not isinstance(checks, list):
+        return "its checks are no list"
+    return next((p for p in map(_check_problem, checks) if p), "")
+
+
+def _check_problem(check: object) -> str:
+    if not isinstance(check, dict) or not _is_text(check.get("name")):
+        return "a check has no name"
+    name = check["name"]
+    surplus = set(check) - _CHECK_KEYS
+    missing = _CHECK_KEYS - set(check)
+    if missing:
+        return f"check '{name}' has no key '{min(missing)}'"
+    if surplus:
+        return f"check '{name}' has an unknown key '{min(surplus)}'"
+    if not _is_number(check.get("value"), none=True):
+        return f"check '{name}' has a value that is no finite number"
+    if not isinstance(check["unit"], str) or not _is_text(check["unit"] or "1"):
+        return f"check '{name}' has a unit that is no text"
+    limit = check["limit"]
+    if not isinstance(limit, dict) or not all(k in ("min", "max") and _is_number(v) for k, v in limit.items()):
+        return f"check '{name}' has a limit that is not of min and max"
+    if not isinstance(check.get("ok"), bool):
+        return f"check '{name}' does not say whether it is ok"
+    return ""
+
+
+def _is_number(value: object, none: bool = False) -> bool:
+    if value is None:
+        return none
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _is_text(value: object) -> bool:
+    """A text that UTF-8 can write, of a length that a report can show."""
+    if not isinstance(value, str) or not 0 < len(value) <= _MAX_TEXT:
+        return False
+    return not any("\ud800" <= character <= "\udfff" for character in value)

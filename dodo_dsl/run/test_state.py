@@ -1,0 +1,149 @@
+"""What is heard of one test while it runs, and what that decides."""
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from dodo_dsl.outcome import Outcome, Result
+from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.run.decision import Facts, Finding, decide, how_it_ended, lost_messages, outcome_of
+from dodo_dsl.run.protocol import (
+    Backend,
+    Event,
+    Exited,
+    Lost,
+    Malformed,
+    Noted,
+    Overrun,
+    Ready,
+    Stopped,
+    Time,
+    Unstartable,
+    Verdict,
+)
+
+
+class Ended(Exception):
+    """The test is over; what decided it has been heard."""
+
+
+@dataclass
+class Hearing:
+    """Takes the events of one test. Times in s; ``began`` and ``finished`` on the monotonic clock."""
+
+    plan: Plan
+    facts: Facts = field(init=False)
+    layer_of: dict[str, str] = field(default_factory=dict)
+    exits: dict[str, int] = field(default_factory=dict)
+    ready: set[str] = field(default_factory=set)
+    lost: dict[str, int] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    began: float | None = None
+    finished: float | None = None
+    setup_s: float | None = None
+    time: Time | None = None
+
+    def __post_init__(self) -> None:
+        self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
+
+    def all_judged(self) -> bool:
+        return all(judge in self.exits for judge in self.facts.judges)
+
+    def find(self, result: Result, reason: str, service: str = "") -> None:
+        self.facts.findings.append(Finding(result, reason, service))
+
+    def end(self, result: Result, reason: str, service: str = "") -> None:
+        """A finding upon which the test is over: raises Ended."""
+        self.find(result, reason, service)
+        raise Ended
+
+    def time_out(self) -> None:
+        """The test's time is over, and an evaluator has not ended: raises Ended."""
+        late = next(judge for judge in self.facts.judges if judge not in self.exits)
+        self.end(
+            "error",
+            f"evaluator '{late}' gave no verdict within the timeout of {self.plan.timeout_s:g} s",
+            late,
+        )
+
+    def take(self, event: Event) -> None:
+        """Remembers an event; raises Ended when the test is over with it."""
+        match event:
+            case Ready(service):
+                self.ready.add(service)
+            case Verdict(service) if self.began is None:
+                self.end("error", f"evaluator '{service}' gave a verdict before the test began", service)
+            case Verdict(service):
+                self.facts.verdicts.setdefault(service, []).append(event)
+            case Malformed(service, problem):
+                self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
+            case Overrun(service, messages):
+                self.lost[service] = messages
+            case Noted(text):
+                self.notes.append(text)
+            case Unstartable(service, why):
+                self.end("error", f"service '{service}' could not be started: {why}", service)
+            case Lost(why):
+                self.end("error", why)
+            case Time():
+                self.time = event
+            case Stopped(kind, reason):
+                self._take_stop(kind, reason)
+            case Exited(service, code, out_of_memory):
+                self.exits[service] = code
+                self._take_exit(service, code, out_of_memory)
+
+    def _take_stop(self, kind: str, reason: str) -> None:
+        if kind == "timedout":
+            self.time_out()
+        is_silent = kind == "unanswered"
+        self.end("failed" if is_silent else "error", reason, self._who_answers() if is_silent else CLOCK)
+
+    def _take_exit(self, service: str, code: int, out_of_memory: bool) -> None:
+        layer, when = self.layer_of.get(service, "application"), self._when()
+        ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}"
+        if layer == "application":
+            if not self._all_given():
+                self.end("failed", f"application service '{service}' {ended}, before the test was decided", service)
+        elif code != 0:
+            self.end("error", f"service '{service}' of layer {layer} {ended}", service)
+        elif service not in self.ready and self.began is None:
+            self.end("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
+        elif service in self.facts.judges and not self.facts.verdicts.get(service):
+            self.end("error", f"evaluator '{service}' ended without a verdict {when}", service)
+
+    def _all_given(self) -> bool:
+        return all(self.facts.verdicts.get(judge) for judge in self.facts.judges)
+
+    def _when(self) -> str:
+        if self.began is None:
+            return "during set-up"
+        return f"after {time.monotonic() - self.began:.1f} s"
+
+    def _who_answers(self) -> str:
+        """The application's service whose last lines may tell why there is no answer."""
+        return next((s.name for s in self.plan.application.services), "")
+
+    def outcome(self, backend: Backend) -> Outcome:
+        """What all of it comes to; the last lines are those of the service that decided."""
+        plan, finding = self.plan, decide(self.facts)
+        verdicts = [v for judge in self.facts.judges for v in self.facts.verdicts.get(judge, [])]
+        losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
+        return replace(
+            outcome_of(plan, finding, backend.name, backend.cid),
+            setup_s=self.setup_s,
+            execution_s=self.finished - self.began if self.finished and self.began else None,
+            sim_s=self.time.seconds if self.time else None,
+            services=tuple(self._service_rows()),
+            checks=tuple(check for verdict in verdicts for check in verdict.checks),
+            last_lines=tuple(backend.tail(finding.service)) if finding.result != "passed" else (),
+            notes=(*self.notes, *losses),
+        )
+
+    def _service_rows(self) -> list[dict[str, Any]]:
+        uses = {s.name: s.uses for s in self.plan.services}
+        return [
+            {"name": name, "layer": layer, "uses": uses.get(name), "exit_code": self.exits.get(name)}
+            for name, layer in sorted(self.layer_of.items(), key=lambda item: (LAYERS.index(item[1]), item[0]))
+        ]

@@ -1,0 +1,146 @@
+"""What editors complete and explain: the services and their parameters, put into the schema of specs.
+
+Only `$defs.use.allOf` and the `$defs` named `with-...` are made here. DoDo drops the former when it validates, as its
+rules say the same in better words. ``scripts/make-schema`` writes the file again.
+"""
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import package_data
+from dodo_dsl.source import plain, read
+from dodo_dsl.spec import quantity
+from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
+
+Schema = dict[str, Any]
+
+PREFIX = "with-"
+_NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?"
+_REFERENCE = r"\$\{matrix\."
+_MATRIX: Schema = {"type": "string", "pattern": _REFERENCE}
+_TEXT: Schema = {"type": "string"}
+
+
+def path() -> Path:
+    """The schema's file."""
+    return package_data.schemas() / "dodo.schema.json"
+
+
+def generate(text: str, manifests: Mapping[str, Manifest]) -> str:
+    """The text of the schema with what editors know of these services; the same for the same manifests."""
+    schema = json.loads(text)
+    offered = [m for _, m in sorted(manifests.items()) if _is_offered(m)]
+    definitions = {k: v for k, v in schema["$defs"].items() if not k.startswith(PREFIX)}
+    definitions["use"]["allOf"] = [_uses(offered), *map(_when, offered)]
+    schema["$defs"] = {**definitions, **{PREFIX + m.name: _with(m) for m in offered}}
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def _is_offered(manifest: Manifest) -> bool:
+    """Whether authors write the service: it is not one that DoDo adds by itself."""
+    node, _ = read(manifest.folder / "service.yml")
+    return node is not None and not plain(node).get("automatic", False)
+
+
+def _uses(manifests: Iterable[Manifest]) -> Schema:
+    """The shipped services by name; a deployment's own have any other."""
+    known = [{"const": m.name, "description": f"{m.description} Layer: {' or '.join(m.layers)}."} for m in manifests]
+    own = {"type": "string", "description": "A service of your own, from a folder under 'services' of dodo.yml."}
+    return {"properties": {"uses": {"anyOf": [*known, own]}}}
+
+
+def _when(manifest: Manifest) -> Schema:
+    condition = {"required": ["uses"], "properties": {"uses": {"const": manifest.name}}}
+    return {"if": condition, "then": {"properties": {"with": {"$ref": f"#/$defs/{PREFIX}{manifest.name}"}}}}
+
+
+def _with(manifest: Manifest) -> Schema:
+    parameters = manifest.parameters.values()
+    needed = [p.name for p in parameters if p.required and not p.shared and not p.rig]
+    return {
+        "type": "object",
+        "title": f"{manifest.name}: parameters",
+        "description": manifest.description,
+        "additionalProperties": False,
+        **({"required": needed} if needed else {}),
+        "properties": {p.name: _parameter(p) for p in parameters},
+    }
+
+
+def _parameter(parameter: Parameter) -> Schema:
+    schema: Schema = {"description": _description(parameter), **_value(parameter)}
+    if parameter.default not in (None, []):
+        schema["default"] = _written(parameter, parameter.default)
+    elif parameter.example is not None:
+        schema["examples"] = [_written(parameter, parameter.example)]
+    elif parameter.unit:
+        schema["examples"] = [_written(parameter, 1)]
+    return schema
+
+
+def _description(parameter: Parameter) -> str:
+    facts = [parameter.help]
+    low, high = parameter.minimum, parameter.maximum
+    unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
+    if low is not None and high is not None:
+        facts.append(f"From {low} to {high}{unit}.")
+    elif low is not None or high is not None:
+        facts.append(f"At {'most' if low is None else 'least'} {high if low is None else low}{unit}.")
+    if parameter.required and not parameter.rig and not parameter.shared:
+        facts.append("Required.")
+    if parameter.rig:
+        facts.append(f"When not written, the rig's {parameter.rig}.")
+    return " ".join(facts)
+
+
+def _written(parameter: Parameter, value: Any) -> Any:
+    """A value as an author writes it."""
+    bare = parameter.unit in ("", quantity.SHARE)
+    return value if bare or isinstance(value, str | list) else f"{value} {parameter.unit}"
+
+
+def _value(parameter: Parameter) -> Schema:
+    """What may be written: the value itself, or a choice of the matrix in its place."""
+    if parameter.choices:
+        return {"anyOf": [{"enum": list(parameter.choices)}, _MATRIX]}
+    if parameter.type in ("number", "integer"):
+        return _number(parameter)
+    if parameter.type == "boolean":
+        return {"anyOf": [{"type": "boolean"}, _MATRIX]}
+    if parameter.type == "list":
+        return {"type": ["array", "string"], "items": _TEXT}
+    if parameter.type == "string":
+        return {"type": ["string", "number", "boolean"]}
+    return dict(_TEXT)
+
+
+def _number(parameter: Parameter) -> Schema:
+    if parameter.unit not in ("", quantity.SHARE):
+        units = "|".join(re.escape(u) for u in quantity.UNITS if _converts(u, parameter.unit))
+        pattern = rf"^\s*{_NUMBER}\s*({units})\s*$|{_REFERENCE}"
+        return {"type": "string", "pattern": pattern, "patternErrorMessage": f"expected a quantity in {parameter.unit}"}
+    bounds = {"minimum": parameter.minimum, "maximum": parameter.maximum}
+    number: Schema = {"type": parameter.type, **{k: v for k, v in bounds.items() if v is not None}}
+    percent = [{"type": "string", "pattern": rf"^\s*{_NUMBER}\s*%\s*$"}] if parameter.unit else []
+    return {"anyOf": [number, *percent, _MATRIX]}
+
+
+def _converts(written: str, unit: str) -> bool:
+    try:
+        quantity.convert(f"1 {written}", unit)
+    except quantity.QuantityError:
+        return False
+    return True
+
+
+def write(file: Path | None = None) -> None:
+    """Makes the schema's file again, of the shipped services."""
+    target = file or path()
+    target.write_text(generate(target.read_text(encoding="utf-8"), load_manifests()[0]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write()

@@ -1,0 +1,86 @@
+"""Shared memory in lockstep: a picture is told of when the clock says so, and when its readers wait for it."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from dodo_dsl.opendlv.memory.posix_segment import PosixSegment
+from dodo_dsl.opendlv.memory.shared_memory import LOCK_PATIENCE, SharedMemory
+from dodo_dsl.opendlv.memory.sysv_segment import Segment
+
+_LOOK = 0.0002
+_LONGEST_LOOK = 0.002
+
+
+class AnnouncedMemory(SharedMemory):
+    """Shared memory whose next picture waits aside until it is announced, so that nobody reads it in place of the last.
+
+    ``sampled`` is when that picture was sampled, in microseconds since the epoch.
+    """
+
+    def __init__(self, segment: Segment | PosixSegment, name: str, owner: bool) -> None:
+        super().__init__(segment, name, owner)
+        self._shown = self.buffer
+        self.buffer = memoryview(bytearray(self.size))
+        self.is_new = False
+        self.sampled = 0
+
+    @contextmanager
+    def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
+        """Nobody else sees the next picture."""
+        yield
+
+    def stamp(self, time_us: int) -> None:
+        self.sampled = time_us
+
+    def notify_all(self) -> None:
+        """There is a new picture; its readers will be told by ``announce``."""
+        self.is_new = True
+
+    def announce(self) -> None:
+        """Show the picture and tell the readers."""
+        self.is_new = False
+        with super().lock():
+            self._shown[:] = self.buffer
+            super().stamp(self.sampled)
+            super().notify_all()
+
+    def close(self) -> None:
+        self._shown = memoryview(b"")
+        super().close()
+
+
+class Screen:
+    """All the memories of a service; ``readers`` are expected to wait for pictures of all of them together."""
+
+    def __init__(self, readers: int) -> None:
+        self._readers = readers
+        self.memories: list[AnnouncedMemory] = []
+
+    @property
+    def new(self) -> list[AnnouncedMemory]:
+        """Those that hold a picture of which nobody was told."""
+        return [memory for memory in self.memories if memory.is_new]
+
+    @property
+    def sampled(self) -> int:
+        """When the newest picture was sampled."""
+        return max((memory.sampled for memory in self.memories), default=0)
+
+    def await_readers(self, stopped: Callable[[], bool]) -> bool:
+        """Until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``.
+
+        The kernel wakes nobody when a process begins to wait, so this looks, less and less often.
+        """
+        look = _LOOK
+        while sum(memory.readers_waiting() for memory in self.memories) < self._readers:
+            if stopped():
+                return False
+            time.sleep(look)
+            look = min(look * 1.2, _LONGEST_LOOK)
+        return True
+
+    def announce(self) -> None:
+        """Tell of all that is new."""
+        for memory in self.new:
+            memory.announce()

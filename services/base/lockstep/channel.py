@@ -1,0 +1,63 @@
+"""A socket beside the bus, over which the clock of a lockstep test and one service talk without waking others."""
+
+import logging
+import socket
+import time
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, decode_frame, encode_frame
+from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES, PORT, RECEIVE_BUFFER_BYTES, Address
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+
+_log = logging.getLogger(__name__)
+
+
+class Channel:
+    """Sends messages in OpenDLV's frames to one address, or to all on the bus, and takes what comes back."""
+
+    def __init__(self, cid: int, messages: MessageSet) -> None:
+        self._group: Address = (f"225.0.0.{cid}", PORT)
+        self._messages = messages
+        self._has_failed = False
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        self._socket.bind(("", 0))
+        self._socket.setblocking(False)
+
+    def send(self, message: Message, to: Address | None) -> None:
+        """To an address, or with None to all on the bus; what cannot be sent now is lost, and will be repeated.
+
+        An error that will not pass by itself is logged once.
+        """
+        now = time.time_ns() // 1000
+        frame = encode_frame(Envelope(self._messages.id(message), self._messages.encode(message), now, 0, now, 0))
+        try:
+            self._socket.sendto(frame, to or self._group)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            if not self._has_failed:
+                self._has_failed = True
+                _log.warning("a message to %s:%d cannot be sent: %s", *(to or self._group), error)
+
+    def receive(self) -> tuple[Envelope, Address] | None:
+        """What has come, and from whom; None when there is nothing. What is no frame is left out."""
+        while True:
+            try:
+                data, address = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
+                return decode_frame(data), address
+            except FrameError:
+                continue
+            except OSError:  # nothing there, or word that somebody has gone
+                return None
+
+    def fileno(self) -> int:
+        """The file descriptor to poll for reading."""
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        """Let go of the socket."""
+        self._socket.close()

@@ -1,0 +1,91 @@
+"""Whether a camera is alive and lit: ``python -m services.camera.health_check --source=...`` prints one JSON object.
+
+It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason`` says why) or cannot be looked at (``error``).
+"""
+
+import contextlib
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from services.base import Flags
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.base.signals import interruptible
+from services.camera.files import FileCamera
+from services.camera.grabber import SILENCE, Grabber
+from services.camera.picture import CameraError, Picture
+from services.camera.service import open_camera
+
+BRIGHTNESS = 0.04, 0.97
+"""Mean brightness of a lit picture, as a share of white."""
+BLACK, WHITE = 16.0, 235.0
+"""Of the Y plane (BT.601)."""
+SETTLED = 1.0
+"""s after the first picture from which on exposure and white balance have settled, and pictures are judged."""
+CONTRAST = 0.02
+"""Least standard deviation of brightness: a covered lens or a blown picture has less."""
+
+
+def main(argv: Sequence[str], stdout: TextIO) -> int:
+    """Takes a picture and judges it."""
+    try:
+        flags = parse(load_manifest(Path(__file__).parent), [*argv, "--cid=1"])
+        with interruptible():
+            said = judged(looked(flags))
+    except CameraError as error:
+        said = {"ok": False, "reason": " ".join(str(error).split())}
+    except (ValueError, OSError) as error:
+        said = {"ok": False, "error": " ".join(str(error).split())}
+    stdout.write(json.dumps(said) + "\n")
+    return 0 if said["ok"] else 1
+
+
+def judged(picture: Picture) -> dict[str, Any]:
+    """``ok``, ``reason``, and brightness and contrast as shares of white."""
+    luma = (picture.i420[: picture.i420.shape[0] * 2 // 3] - BLACK) / (WHITE - BLACK)
+    brightness, contrast = round(float(luma.mean()), 4), round(float(luma.std()), 4)
+    low, high = BRIGHTNESS
+    reason = ""
+    if not low <= brightness <= high:
+        reason = (
+            f"the camera's picture has a brightness of {brightness:.1%}, expected {low:.0%} to {high:.0%}: is it lit?"
+        )
+    elif contrast < CONTRAST:
+        reason = f"the camera's picture has a contrast of {contrast:.1%}, expected {CONTRAST:.0%}: is the lens covered?"
+    return {"ok": not reason, "reason": reason, "brightness": brightness, "contrast": contrast}
+
+
+def looked(flags: Flags) -> Picture:
+    """A picture of the camera that the flags name; raises ValueError and OSError, and CameraError when it is not alive.
+
+    A camera that lives has settled by then, and has shown another picture before.
+    """
+    camera = open_camera(flags)
+    if isinstance(camera, FileCamera):
+        with contextlib.closing(camera):
+            return camera.read()
+    with contextlib.closing(Grabber(camera, flags["source"])) as grabber:
+        first = _next(grabber, flags["source"])
+        end = time.monotonic() + SETTLED
+        while time.monotonic() < end:
+            first = _next(grabber, flags["source"])
+        while (other := _next(grabber, flags["source"])) and np.array_equal(other.i420, first.i420):
+            if time.monotonic() - end > SILENCE:
+                raise CameraError(f"the camera {flags['source']} has shown one and the same picture for {SILENCE:g} s")
+        return other
+
+
+def _next(grabber: Grabber, name: str) -> Picture:
+    if not grabber.wait(SILENCE) or (picture := grabber.take()) is None:
+        raise CameraError(f"the camera {name} has given no picture for {SILENCE:g} s")
+    return picture
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:], sys.stdout))

@@ -1,0 +1,127 @@
+"""The rig by hand: ``python -m services.gantry.manual --serial=PORT ACTION``, which prints one JSON object.
+
+Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is told to stop
+on every way out, unless a fault has stopped it: that is left to be seen, and ``calibrate`` acknowledges it. Exit codes:
+0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.
+"""
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, TextIO
+
+from services.base import Flags
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.base.signals import interruptible
+from services.gantry import health_check, start
+from services.gantry.emulator import EmulatedRig
+from services.gantry.link import Link, RigError
+from services.gantry.motion import Limits, box
+from services.gantry.port import SerialPort, checked
+from services.gantry.protocol import Position, Status
+from services.gantry.service import EMULATED, describe, place
+
+ACTIONS = {"status": 0, "home": 0, "goto": 3, "calibrate": 0, "check": 0}
+"""How many numbers each takes."""
+FLAGS = ("serial", "patience", "range-x", "range-y", "range-yaw")
+DONE, BROKEN, USAGE = 0, 1, 2
+
+
+class UsageError(ValueError):
+    """A command line that means nothing, or a place out of the rig's ranges; one sentence."""
+
+
+def main(argv: Sequence[str], stdout: TextIO) -> int:
+    """Does one action; what became of it is printed."""
+    try:
+        flags, action, numbers = _parsed(argv)
+        limits = _limits(flags)
+        goal = _goal(action, numbers, limits)
+        said, code = _done(flags, action, goal, limits)
+    except RigError as error:
+        said, code = {"error": str(error)}, BROKEN
+    except UsageError as error:
+        said, code = {"error": str(error)}, USAGE
+    except (ValueError, OSError) as error:
+        said, code = {"error": " ".join(str(error).split())}, BROKEN
+    stdout.write(json.dumps(said) + "\n")
+    stdout.flush()
+    return code
+
+
+def _parsed(argv: Sequence[str]) -> tuple[Flags, str, list[float]]:
+    about = load_manifest(Path(__file__).parent)["parameters"]
+    manifest = {"name": "gantry", "parameters": {name: about[name] for name in FLAGS}}
+    words = [word for word in argv if not word.startswith("--")]
+    try:
+        flags = parse(manifest, [*(word for word in argv if word.startswith("--")), "--cid=1"])
+        action, numbers = words[0] if words else "", [float(word) for word in words[1:]]
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    if action not in ACTIONS:
+        raise UsageError(f"'{action}' is no action, expected one of {', '.join(ACTIONS)}")
+    if len(numbers) != ACTIONS[action] or not all(map(math.isfinite, numbers)):
+        raise UsageError(f"{action} takes {ACTIONS[action] or 'no'} numbers: X and Y in m, YAW in degrees")
+    return flags, action, numbers
+
+
+def _limits(flags: Flags) -> Limits:
+    low, high = box(flags["range-x"], flags["range-y"], math.radians(flags["range-yaw"]))
+    return Limits(low=low, high=high)
+
+
+def _goal(action: str, numbers: Sequence[float], limits: Limits) -> Position | None:
+    """Where an action leads; raises UsageError for a place out of the rig's ranges, before anything moves."""
+    if action == "home":
+        return health_check.home(limits)
+    if action != "goto":
+        return None
+    goal = Position(numbers[0], numbers[1], math.radians(numbers[2]))
+    if not limits.holds(goal):
+        low, high = limits.low, limits.high
+        ranges = f"x {low.x:g} to {high.x:g} m, y {low.y:g} to {high.y:g} m"
+        turn = f"yaw {math.degrees(low.yaw):.1f} to {math.degrees(high.yaw):.1f} degrees"
+        raise UsageError(f"the place is out of the rig's ranges ({ranges}, {turn}): {place(goal)}")
+    return goal
+
+
+def _done(flags: Flags, action: str, goal: Position | None, limits: Limits) -> tuple[dict[str, Any], int]:
+    patience = flags["patience"]
+    with ExitStack() as resources, interruptible():
+        emulated = resources.enter_context(EmulatedRig()) if flags["serial"] == EMULATED else None
+        target = checked(emulated.port if emulated else flags["serial"])
+        link = Link(target, lambda: SerialPort(target))
+        resources.callback(link.close)
+        if action == "check":
+            tried = health_check.tried(link, limits, patience)
+            return {**tried, **(_where(link) if tried["ok"] else {})}, DONE if tried["ok"] else BROKEN
+        status = start.find(link)
+        if action == "calibrate" or (emulated and goal):
+            start.calibrate(link, patience)
+        elif goal and status == Status.NOT_CALIBRATED:
+            raise RigError(start.trouble(link, status))
+        if goal:
+            start.settle(link, status)
+            start.go(link, goal, patience)
+        return _where(link), DONE
+
+
+def _where(link: Link) -> dict[str, Any]:
+    """Status and position, yaw in degrees; no position before the rig is calibrated."""
+    at, status = health_check.asked(link)
+    return {
+        "status": int(status),
+        "word": status.name.lower().replace("_", " "),
+        "says": describe(status),
+        "x": at.x if at else None,
+        "y": at.y if at else None,
+        "yaw": math.degrees(at.yaw) if at else None,
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:], sys.stdout))

@@ -1,0 +1,21 @@
+"""Copies of one model."""
+
+from dataclasses import dataclass
+
+from services.virtual_camera.camera import Array
+from services.virtual_camera.draw.shape import Shape
+
+
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """Copies of one shape: ``positions`` (n, 3) in m, ``turns`` (n,) in rad counter-clockwise about z.
+
+    ``name`` is the model's in the map; what has none is scenery, of which nobody asks for boxes.
+    """
+
+    shape: Shape
+    colour: Array
+    """Blue, green, red from 0 to 255."""
+    positions: Array
+    turns: Array
+    name: str = ""

@@ -1,0 +1,67 @@
+"""Pictures of a scene from anywhere, drawn with OpenCV and numpy."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from services.virtual_camera.camera import Pinhole, Pose, View
+from services.virtual_camera.draw.bodies import Bodies, Drawn
+from services.virtual_camera.draw.bsp import Tree
+from services.virtual_camera.draw.faces import Face
+from services.virtual_camera.draw.raster import Image, fill_fixed
+from services.virtual_camera.draw.scene import Scene
+from services.virtual_camera.draw.shading import Piece
+from services.virtual_camera.draw.surfaces import cover_face, draw_backdrop, draw_face
+
+Labels = npt.NDArray[np.int32]
+
+
+class Renderer:
+    """Draws a scene; the same pose gives the same bytes, whatever was drawn before."""
+
+    def __init__(self, scene: Scene, width: int, height: int, fovy: float) -> None:
+        """The picture's size in pixels, the vertical field of view in rad; ValueError where they make no sense."""
+        self.camera = Pinhole(width, height, fovy)
+        self.scene = scene
+        self._tree = Tree(list(scene.faces))
+        self.bodies = Bodies(scene.crowds, self._tree, scene.light, scene.faces)
+
+    def render(self, pose: Pose, out: Image | None = None) -> Image:
+        """What a camera sees: (height, width, 4) in the order B, G, R, A.
+
+        ``pose`` is the camera in the world, looking along its x axis with z up. ``out`` takes the
+        picture when given, which saves making a new one.
+        """
+        image = np.empty((self.camera.height, self.camera.width, 4), np.uint8) if out is None else out
+        view = self.camera.view(pose)
+        draw_backdrop(image, view, self.scene.sky, self.scene.ground)
+        for item in self._back_to_front(view):
+            if isinstance(item, Face):
+                draw_face(image, view, item)
+            else:
+                for points, colour in item[1]:
+                    fill_fixed(image, points, colour)
+        return image
+
+    def labels(self, pose: Pose) -> tuple[Labels, dict[int, list[Piece]]]:
+        """For each pixel (height, width) the number of the body that it shows, or -1; and all that is drawn of each."""
+        view = self.camera.view(pose)
+        image = np.full((self.camera.height, self.camera.width), -1, np.int32)
+        bodies: dict[int, list[Piece]] = {}
+        for item in self._back_to_front(view):
+            if isinstance(item, Face):
+                cover_face(image, view, item, -1)
+            else:
+                bodies.setdefault(item[0], []).extend(item[1])
+                for points, _ in item[1]:
+                    fill_fixed(image, points, (item[0],))
+        return image, bodies
+
+    def _back_to_front(self, view: View) -> Iterator[Face | Drawn]:
+        regions = self.bodies.pieces(view)
+        for item in self._tree.back_to_front(view.position):
+            if isinstance(item, Face):
+                yield item
+            else:
+                yield from regions.get(item, ())

@@ -1,0 +1,102 @@
+"""A map loaded for drawing: shapes and where they stand, flat faces, colours of sky and ground."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from services.virtual_camera.camera import Array
+from services.virtual_camera.draw.crowd import Crowd
+from services.virtual_camera.draw.faces import Covering, Face, TextureMap, box_faces
+from services.virtual_camera.draw.light import Light
+from services.virtual_camera.draw.lines import line_faces, pick
+from services.virtual_camera.draw.raster import Colour
+from services.virtual_camera.draw.shape import make_shape
+from services.virtual_camera.map.clutter import clutter
+from services.virtual_camera.map.map_file import BlockEntry, MapFile, ModelEntry, OverlayEntry, Vector3, read_map
+from services.virtual_camera.map.meshes import load_obj
+from services.virtual_camera.map.textures import Texture, default_ground, load_picture
+
+SKY: Colour = (206.0, 190.0, 176.0, 255.0)
+GROUND: Colour = (112.0, 114.0, 116.0, 255.0)
+_GROUND_REACH = 40.0
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a scene has beyond its map: the light, lines of these obstacles on the ground, and boxes around it."""
+
+    light: Light = field(default_factory=Light.usual)
+    lines: tuple[str, ...] = ()
+    line_width: float = 0.02
+    clutter: int = 0
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All that can be seen, in the world frame; ``sky`` and ``ground`` are what is behind the faces."""
+
+    crowds: tuple[Crowd, ...]
+    faces: tuple[Face, ...]
+    sky: Colour = SKY
+    ground: Colour = GROUND
+    light: Light = field(default_factory=Light.usual)
+    overlays: tuple[OverlayEntry, ...] = ()
+
+
+def _bgr(colour: Vector3) -> Array:
+    return np.array(colour[::-1]) * 255.0
+
+
+def _crowd(entry: ModelEntry) -> Crowd:
+    paint = entry.paint
+    colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
+    positions = np.array([instance.position for instance in entry.instances])
+    turns = np.array([math.pi - instance.angle for instance in entry.instances])
+    return Crowd(make_shape(*load_obj(entry.file)), colour, positions, turns, entry.name)
+
+
+def _cover(entry: BlockEntry) -> Colour | Covering:
+    if not isinstance(entry.paint, Path):
+        return (*_bgr(entry.paint).tolist(), 255.0)
+    tile = entry.tile
+    repeats = math.ceil(max(entry.dimension) / min(tile)) if tile else 1
+    return Covering(Texture(load_picture(entry.paint), repeats), tile)
+
+
+def _default_floor() -> Face:
+    """What a map without blocks stands on: a large patterned square at z = 0."""
+    r = _GROUND_REACH
+    points = np.array([[-r, -r, 0.0], [r, -r, 0.0], [r, r, 0.0], [-r, r, 0.0]])
+    lie = TextureMap(Texture(default_ground()), np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    return Face(points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
+
+
+def _block_faces(entry: BlockEntry) -> list[Face]:
+    cover = _cover(entry)
+    return [face for i in entry.instances for face in box_faces(entry.dimension, i, cover)]
+
+
+def _faces(entries: MapFile, wishes: Wishes) -> Iterator[Face]:
+    blocks = [face for block in entries.blocks for face in _block_faces(block)]
+    lines = pick(entries.path, wishes.lines)
+    for face in [*(blocks or [_default_floor()]), *line_faces(lines, wishes.line_width)]:
+        yield face.shaded(wishes.light.on(face.normal))
+
+
+def load_scene(path: Path, wishes: Wishes | None = None) -> Scene:
+    """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
+    entries, wishes = read_map(path), wishes or Wishes()
+    crowds = tuple(map(_crowd, entries.models))
+    around = clutter(wishes.clutter, wishes.seed, crowds)
+    shade = wishes.light.on(np.array([0.0, 0.0, 1.0]))
+    return Scene(
+        crowds=crowds + around,
+        faces=tuple(_faces(entries, wishes)),
+        ground=(*(min(part * shade, 255.0) for part in GROUND[:3]), 255.0),
+        light=wishes.light,
+        overlays=entries.overlays,
+    )

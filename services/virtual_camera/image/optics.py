@@ -1,0 +1,66 @@
+"""From what passes before a camera to the picture that it gives: shutter, lens, overlays and sensor, in this order."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.draw.raster import Image
+from services.virtual_camera.draw.render import Renderer
+from services.virtual_camera.image.lens import Distortion, Lens
+from services.virtual_camera.image.overlays import Overlay
+from services.virtual_camera.image.sensor import Development, Sensor
+from services.virtual_camera.motion import Motion
+
+
+class Optics:
+    """Everything behind the scene that makes pictures of ``camera``; what is left out is ideal."""
+
+    def __init__(
+        self,
+        camera: Pinhole,
+        distortion: Distortion | None = None,
+        sensor: Sensor | None = None,
+        overlays: Sequence[Overlay] = (),
+        shutter: float = 0.0,
+    ) -> None:
+        """``shutter`` is open for so many seconds; ValueError for a distortion that cannot be drawn."""
+        self.camera = camera
+        self.lens = Lens(camera, distortion) if distortion else None
+        self.wide = self.lens.wide if self.lens else camera
+        """What a renderer has to draw."""
+        self._overlays, self._shutter = overlays, shutter
+        self._development = Development(sensor or Sensor())
+        shape = (self.wide.height, self.wide.width, 4)
+        self._ideal = np.empty(shape, np.uint8)
+        self._sum = np.zeros(shape, np.uint16) if shutter > 0.0 else None
+
+    def expose(self, renderer: Renderer, motion: Motion, mounted: Pose, sample_time: int, out: Image) -> None:
+        """The picture (height, width, 4) at ``sample_time`` us of a camera ``mounted`` on a body in ``motion``.
+
+        The shutter is open half its time before that and half after it.
+        """
+        ideal = self._ideal if self.lens else out
+        steps = motion.steps(self.wide, self._shutter)
+        if self._sum is None or steps == 1:
+            renderer.render(motion.pose.carrying(mounted), ideal)
+        else:
+            self._blend(renderer, motion, mounted, steps, self._sum, ideal)
+        if self.lens:
+            self.lens.apply(ideal, out)
+        for overlay in self._overlays:
+            overlay.lay(out)
+        self._development.develop(out, sample_time)
+
+    def _blend(
+        self, renderer: Renderer, motion: Motion, mounted: Pose, steps: int, total: npt.NDArray[np.uint16], ideal: Image
+    ) -> None:
+        """The mean of ``steps`` pictures while the shutter is open."""
+        total.fill(0)
+        for step in range(steps):
+            pose = motion.after(((step + 0.5) / steps - 0.5) * self._shutter)
+            renderer.render(pose.carrying(mounted), ideal)
+            cv2.add(total, ideal, dst=total, dtype=cv2.CV_16U)
+        cv2.convertScaleAbs(total, dst=ideal, alpha=1 / steps)

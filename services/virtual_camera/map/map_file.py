@@ -1,0 +1,176 @@
+"""What an OpenDLV ``map.json`` says, checked; models and textures are not loaded yet."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from services.virtual_camera.map.json_node import MapError, Node
+
+MAX_INSTANCES = 100_000
+MAX_BLOCKS = 500
+
+Vector3 = tuple[float, float, float]
+Paint = Vector3 | Path
+"""A colour as r, g, b from 0 to 1, or the file of a texture."""
+
+
+@dataclass(frozen=True)
+class Instance:
+    """Where a thing stands: its position in m, its OpenDLV angle in rad (0 is half a turn, then clockwise)."""
+
+    position: Vector3
+    angle: float
+
+
+@dataclass(frozen=True)
+class ModelEntry:
+    """An OBJ file, its paint, and where copies of it stand."""
+
+    name: str
+    file: Path
+    paint: Paint
+    instances: tuple[Instance, ...]
+
+
+@dataclass(frozen=True)
+class BlockEntry:
+    """A box, ``dimension`` in m and centred on each instance; ``tile`` is the size of its texture in m."""
+
+    name: str
+    dimension: Vector3
+    paint: Paint
+    tile: tuple[float, float] | None
+    instances: tuple[Instance, ...]
+
+
+@dataclass(frozen=True)
+class OverlayEntry:
+    """A picture laid over the camera's: its size and places (upper left corners) as fractions of that picture."""
+
+    name: str
+    file: Path
+    size: tuple[float, float]
+    places: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class ObstacleEntry:
+    """Lines on the ground, each x1, y1, x2, y2 in m."""
+
+    name: str
+    lines: tuple[tuple[float, float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class MapFile:
+    """What there is to draw; things that stand nowhere are left out."""
+
+    path: Path
+    models: tuple[ModelEntry, ...]
+    blocks: tuple[BlockEntry, ...]
+    overlays: tuple[OverlayEntry, ...] = ()
+
+
+def _triple(node: Node, names: str) -> Vector3:
+    a, b, c = node.numbers(names)
+    return a, b, c
+
+
+def _colour(node: Node) -> Vector3:
+    colour = _triple(node, "r g b")
+    if not all(0.0 <= part <= 1.0 for part in colour):
+        node.fail("the numbers [r, g, b] between 0 and 1")
+    return colour
+
+
+def _paint(node: Node) -> Paint:
+    texture, colour = node.member("textureFile"), node.member("color")
+    if texture is not None:
+        return texture.resource()
+    return _colour(colour) if colour is not None else node.lacks("'color' or 'textureFile'")
+
+
+def _instances(node: Node) -> tuple[Instance, ...]:
+    rows = [item.numbers("x y z angle") for item in node.items("instances")]
+    return tuple(Instance((x, y, z), angle) for x, y, z, angle in rows)
+
+
+def _model(node: Node) -> ModelEntry | None:
+    instances = _instances(node)
+    if not instances:
+        return None
+    file = node.required("file").resource()
+    return ModelEntry(node.required("name").text(), file, _paint(node), instances)
+
+
+def _positive(node: Node, names: str) -> tuple[float, ...]:
+    numbers = node.numbers(names)
+    if min(numbers) <= 0.0:
+        node.fail(f"the numbers [{', '.join(names.split())}], all greater than 0")
+    return numbers
+
+
+def _block(node: Node) -> BlockEntry | None:
+    instances = _instances(node)
+    if not instances:
+        return None
+    width, depth, height = _positive(node.required("dimension"), "x y z")
+    size = node.member("textureSize")
+    tile = None
+    if size is not None:
+        along, up = _positive(size, "width height")
+        tile = (along, up)
+    dimension = (width, depth, height)
+    return BlockEntry(node.required("name").text(), dimension, _paint(node), tile, instances)
+
+
+def _overlay(node: Node) -> OverlayEntry | None:
+    rows = [item.numbers(_names(item, "x y")) for item in node.items("instances")]
+    if not rows:
+        return None
+    wide, high = _positive(node.required("dimension"), "width height")
+    if max(wide, high) > 1.0:
+        node.required("dimension").fail("the numbers [width, height], fractions of the picture up to 1")
+    file = node.required("textureFile").resource()
+    places = tuple((row[0], row[1]) for row in rows)
+    return OverlayEntry(node.required("name").text(), file, (wide, high), places)
+
+
+def _names(item: Node, names: str) -> str:
+    """OpenDLV reads the first two numbers of an overlay's place; maps often write four as elsewhere."""
+    return "x y z angle" if isinstance(item.value, list) and len(item.value) == 4 else names
+
+
+def _obstacle(node: Node) -> ObstacleEntry | None:
+    rows = [item.numbers("x1 y1 x2 y2") for item in node.items("lines")]
+    name = node.member("name")
+    if not rows or name is None:
+        return None
+    return ObstacleEntry(name.text(), tuple((a, b, c, d) for a, b, c, d in rows))
+
+
+def _limit(path: Path, what: str, count: int, limit: int) -> None:
+    if count > limit:
+        raise MapError(f"{path}: {count} instances of {what} are more than the {limit} that a map may have")
+
+
+def find_map(path: Path) -> Path:
+    """The ``map.json`` of a map given as its folder or as the file itself."""
+    return path / "map.json" if path.is_dir() else path
+
+
+def read_map(path: Path) -> MapFile:
+    """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
+    file = find_map(path)
+    root = Node.load(file)
+    models = tuple(m for m in map(_model, root.items("model")) if m)
+    blocks = tuple(b for b in map(_block, root.items("block")) if b)
+    _limit(file, "models", sum(len(m.instances) for m in models), MAX_INSTANCES)
+    _limit(file, "blocks", sum(len(b.instances) for b in blocks), MAX_BLOCKS)
+    overlays = tuple(o for o in map(_overlay, root.items("overlay")) if o)
+    return MapFile(file, models, blocks, overlays)
+
+
+def read_obstacles(path: Path) -> tuple[ObstacleEntry, ...]:
+    """The map's obstacles that have lines; MapError names the file and the JSON path."""
+    root = Node.load(find_map(path))
+    return tuple(o for o in map(_obstacle, root.items("obstacles")) if o)
