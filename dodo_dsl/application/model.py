@@ -1,4 +1,4 @@
-"""The application as it was written, and what its services say that they hear and say."""
+"""The application as its team wrote it, and which messages its services declare to produce and to consume."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,19 +28,41 @@ class Declared:
 
 
 @dataclass(frozen=True)
-class ApplicationSource:
-    """Compose files, merged; all mappings by service, and only of services that start.
+class EnvFile:
+    """A path of ``env_file`` with its place; ``required`` is False where compose starts without the file."""
 
-    ``services`` and ``rest`` (every other top-level key) have paths relative to ``folder``. ``spans`` has the place of
-    each service's name, ``declared`` None for a service without x-dodo. ``dropped`` says why a service does not start,
-    ``containers`` which service has a ``container_name``, ``variables`` what the files' ``.env`` sets.
+    path: str
+    span: Span
+    required: bool
+
+
+@dataclass(frozen=True)
+class ComposeService:
+    """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
+
+    ``declared`` is None without x-dodo. ``cid_variables`` are the CID variables that its ``env_files`` set.
+    """
+
+    name: str
+    node: source.Mapping
+    span: Span
+    declared: Declared | None
+    env_files: tuple[EnvFile, ...] = ()
+    cid_variables: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ApplicationSource:
+    """Compose files, merged, read once: rules and the planner see nothing else of the application.
+
+    ``services`` are those that start, by name; ``rest`` has every other top-level key. Paths are relative to
+    ``folder``. ``dropped`` says why a service does not start, ``containers`` which service has a ``container_name``,
+    ``variables`` what the files' ``.env`` sets.
     """
 
     path: Path
-    services: Mapping[str, source.Mapping]
+    services: Mapping[str, ComposeService]
     rest: Mapping[str, Node]
-    spans: Mapping[str, Span]
-    declared: Mapping[str, Declared | None]
     dropped: Mapping[str, str] = field(default_factory=dict)
     containers: Mapping[str, str] = field(default_factory=dict)
     variables: Mapping[str, str] = field(default_factory=dict)
@@ -48,6 +70,11 @@ class ApplicationSource:
     @property
     def folder(self) -> Path:
         return self.path.parent
+
+    @property
+    def declared(self) -> Mapping[str, Declared | None]:
+        """What each service declares, by its name."""
+        return {name: service.declared for name, service in self.services.items()}
 
 
 def plain(node: Node) -> Any:
@@ -82,7 +109,7 @@ def environment(raw: Any) -> dict[str, str | None]:
 
 
 def declared(service: source.Mapping) -> Declared | None:
-    """What a service says of itself; None without ``x-dodo``."""
+    """What a service declares; None without ``x-dodo``."""
     entry = service.entries.get("x-dodo")
     if entry is None or not isinstance(entry.value, source.Mapping):
         return None

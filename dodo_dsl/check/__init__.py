@@ -4,7 +4,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from dodo_dsl.check.context import Context, Declared, Rule
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.context import Context, Rule
+from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.rules import (
     clocks,
     layers,
@@ -37,25 +39,23 @@ RULES: tuple[Rule, ...] = (
 
 
 def check(
-    specs: Iterable[Spec],
+    tests: Iterable[ResolvedTest],
     manifests: Mapping[str, Manifest],
     deployment: Deployment,
-    declared: Mapping[str, Declared | None] | None = None,
-) -> list[Diagnostic]:
-    """All problems of all instances; ``specs`` are the ones that a name may collide with.
-
-    ``declared`` is what the services of the application say of themselves, None without an application.
-    """
-    everything = tuple(specs)
+    application: ApplicationSource | None = None,
+) -> dict[Path, list[Diagnostic]]:
+    """All problems of all instances, by spec; ``tests`` are also the ones whose names may collide."""
+    everything = tuple(tests)
     by_name: dict[str, dict[Path, Spec]] = {}
-    for spec in everything:
-        by_name.setdefault(spec.name or "", {}).setdefault(spec.path, spec)
+    for test in everything:
+        by_name.setdefault(test.spec.name or "", {}).setdefault(test.spec.path, test.spec)
     named = {name: list(specs.values()) for name, specs in by_name.items()}
     instances: dict[Path, list[tuple[Spec, list[Diagnostic]]]] = {}
-    for spec in everything:
-        context = Context(spec, manifests, named, deployment, declared)
-        instances.setdefault(spec.path, []).append((spec, [d for rule in RULES for d in rule(context)]))
-    return [diagnostic for group in instances.values() for diagnostic in _with_instances(group)]
+    for test in everything:
+        context = Context(test, manifests, named, deployment, application)
+        found = [diagnostic for rule in RULES for diagnostic in rule(context)]
+        instances.setdefault(test.spec.path, []).append((test.spec, found))
+    return {path: list(_with_instances(group)) for path, group in instances.items()}
 
 
 def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[Diagnostic]:

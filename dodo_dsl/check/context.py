@@ -6,55 +6,50 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.wiring import Wiring
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv.odvd import STANDARD, parser
+from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.rig import Rig
-
-
-class Declared(Protocol):
-    """What an application's service declares under ``x-dodo``: names of messages, each with its place."""
-
-    @property
-    def inputs(self) -> tuple[tuple[str, Span], ...]: ...
-    @property
-    def outputs(self) -> tuple[tuple[str, Span], ...]: ...
-    @property
-    def answers(self) -> tuple[tuple[str, Span], ...]: ...
-    @property
-    def done(self) -> tuple[str, Span] | None: ...
-    @property
-    def readers(self) -> int: ...
 
 
 @dataclass(frozen=True)
 class Context:
-    """One instance with all manifests, one instance of each file by name, and what the application declares."""
+    """One instance with everything around it; ``by_name`` has one instance of each file by the test's name."""
 
-    spec: Spec
+    test: ResolvedTest
     manifests: Mapping[str, Manifest]
     by_name: Mapping[str, list[Spec]]
     deployment: Deployment
-    declared: Mapping[str, Declared | None] | None = None
+    application: ApplicationSource | None = None
+
+    @property
+    def spec(self) -> Spec:
+        return self.test.spec
 
     @property
     def rig(self) -> Rig | None:
         """The rig of a hil test, when the deployment has it."""
-        return self.deployment.rig(self.spec.rig) if self.spec.rig else None
+        return self.test.rig
+
+    @property
+    def services(self) -> tuple[ResolvedService, ...]:
+        """The services whose manifest is known; ``unknown-service`` reports the others."""
+        return self.test.services
+
+    @property
+    def wiring(self) -> Wiring:
+        return self.test.wiring
 
     @property
     def messages(self) -> frozenset[str]:
         """The full names of all messages: OpenDLV's, DoDo's and the deployment's."""
         return known_messages(self.deployment.messages)
-
-    def known_uses(self) -> Iterator[tuple[Use, Manifest]]:
-        """The services whose manifest is known; the others are a rule's business of their own."""
-        for use in self.spec.uses:
-            manifest = self.manifests.get(use.uses.text)
-            if manifest:
-                yield use, manifest
 
 
 @functools.cache

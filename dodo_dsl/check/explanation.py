@@ -1,21 +1,21 @@
-"""An instance explained: its services with where each value comes from, its wiring, and what it asks for."""
+"""An instance explained: where the values of its services come from, its wiring, and what it requires."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from dodo_dsl.check.context import Context
-from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring, wire
+from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.diagnostics import shown_path
-from dodo_dsl.spec import arguments, quantity
+from dodo_dsl.spec import quantity
+from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import EMULATED_FILE
-from dodo_dsl.spec.values import ValueProblem
 
 
 @dataclass(frozen=True)
-class Argument:
-    """A parameter with what its flag carries; ``origin`` is a place, "default", or who else it is taken from."""
+class ArgumentExplained:
+    """A parameter with the value of its flag; ``origin`` is a place, "default", or the service or rig that gives it."""
 
     name: str
     value: str
@@ -28,12 +28,12 @@ class ServiceExplained:
     layer: str
     name: str
     uses: str
-    arguments: tuple[Argument, ...]
+    arguments: tuple[ArgumentExplained, ...]
 
 
 @dataclass(frozen=True)
 class Line:
-    """A message or memory with the names of who says and who hears it; services of the application have a mark."""
+    """A message or memory with its producers and consumers; services of the application are marked."""
 
     kind: str
     port: str
@@ -43,7 +43,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Asked:
-    """What the application has to give, or only may where ``required`` is false."""
+    """What the application has to produce, or only may where ``required`` is false."""
 
     kind: str
     port: str
@@ -54,7 +54,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Explanation:
-    """``undeclared`` names services of the application that do not say what they send."""
+    """The fields of ``dodo explain --json``; ``undeclared`` names services of the application without x-dodo."""
 
     name: str
     slug: str
@@ -69,9 +69,9 @@ class Explanation:
     undeclared: tuple[str, ...]
 
 
-def explain(context: Context) -> Explanation:
+def explain(test: ResolvedTest) -> Explanation:
     """One instance, as far as it can be read."""
-    spec, wiring = context.spec, wire(context)
+    spec, wiring = test.spec, test.wiring
     return Explanation(
         spec.title,
         spec.slug,
@@ -79,7 +79,7 @@ def explain(context: Context) -> Explanation:
         spec.level or "?",
         spec.kind or "?",
         spec.rig or "",
-        tuple(_service(context, use) for use in spec.uses),
+        tuple(_service(test, use) for use in spec.uses),
         tuple(_lines(wiring)),
         tuple(_asked(wiring)),
         wiring.has_application,
@@ -87,35 +87,32 @@ def explain(context: Context) -> Explanation:
     )
 
 
-def _service(context: Context, use: Use) -> ServiceExplained:
-    manifest = context.manifests.get(use.uses.text)
-    parameters = manifest.parameters.values() if manifest else ()
-    found = tuple(a for p in parameters if (a := _argument(context, use, p)) is not None)
-    return ServiceExplained(use.layer, use.name, use.uses.text, found)
+def _service(test: ResolvedTest, use: Use) -> ServiceExplained:
+    service = next((s for s in test.services if s.use is use), None)
+    given = service.arguments.values() if service else ()
+    shown = tuple(_argument(test.spec, use, argument) for argument in given if argument.value or argument.problem)
+    return ServiceExplained(use.layer, use.name, use.uses.text, shown)
 
 
-def _argument(context: Context, use: Use, parameter: Parameter) -> Argument | None:
-    try:
-        given = arguments.value(context.spec, use, parameter, context.rig)
-    except ValueProblem:
-        return Argument(parameter.name, "?", "", "does not fit")
-    if given is None:
-        return None
+def _argument(spec: Spec, use: Use, argument: Argument) -> ArgumentExplained:
+    parameter = argument.parameter
+    if argument.value is None:
+        return ArgumentExplained(parameter.name, "?", "", "does not fit")
     unit = "" if parameter.unit == quantity.SHARE else parameter.unit
-    return Argument(parameter.name, given.text, unit, _origin(context, use, parameter))
+    return ArgumentExplained(parameter.name, argument.value.text, unit, _origin(spec, use, argument))
 
 
-def _origin(context: Context, use: Use, parameter: Parameter) -> str:
-    entry = arguments.written(context.spec, use, parameter, context.rig)
+def _origin(spec: Spec, use: Use, argument: Argument) -> str:
+    entry = argument.entry
     if entry is None:
         return "default"
     place = f"{shown_path(entry.key.file)}:{entry.key.line}"
-    if parameter.name in use.parameters:
+    if argument.parameter.name in use.parameters:
         return place
     if entry.key.file == EMULATED_FILE:
         return EMULATED_FILE
-    giver = _giver(context.spec, use, parameter)
-    return f"as {giver}, {place}" if giver else f"rig {context.spec.rig}, {place}"
+    giver = _giver(spec, use, argument.parameter)
+    return f"as {giver}, {place}" if giver else f"rig {spec.rig}, {place}"
 
 
 def _giver(spec: Spec, use: Use, parameter: Parameter) -> str:
@@ -129,17 +126,17 @@ def _shown(end: End) -> str:
 
 
 def _lines(wiring: Wiring) -> Iterator[Line]:
-    hearers = (*wiring.heard, *wiring.application_hears)
+    hearers = (*wiring.consumed, *wiring.application_consumes)
     says: dict[Port, list[End]] = {}
-    for end in (*wiring.said, *wiring.application_says):
+    for end in (*wiring.produced, *wiring.application_produces):
         says.setdefault(end.port, []).append(end)
     for port, ends in says.items():
-        by = {_shown(h): None for h in hearers if h.port.hears(port) and (port.name != ANYTHING or _only(wiring, h))}
+        by = {_shown(h): None for h in hearers if h.port.consumes(port) and (port.name != ANYTHING or _only(wiring, h))}
         name = "any message of it" if port.name == ANYTHING else str(port)
         yield Line(port.kind, name, tuple(map(_shown, ends)), tuple(by))
     unsaid: dict[str, list[End]] = {}
     for end in hearers:
-        if not any(end.port.hears(port) for port in says):
+        if not any(end.port.consumes(port) for port in says):
             unsaid.setdefault(f"{end.port.kind} {end.port}", []).append(end)
     for ends in unsaid.values():
         yield Line(ends[0].port.kind, str(ends[0].port), (), tuple(map(_shown, ends)))
@@ -152,11 +149,11 @@ def _only(wiring: Wiring, end: End) -> bool:
 
 def _asked(wiring: Wiring) -> Iterator[Asked]:
     by_port: dict[str, list[End]] = {}
-    for end in wiring.asked():
-        if end.port.may_be_asked:
+    for end in wiring.required():
+        if end.port.can_be_required:
             by_port.setdefault(f"{end.port.kind} {end.port}", []).append(end)
     for ends in by_port.values():
         port = ends[0].port
-        declared = {e.service: None for e in wiring.application_says if port.hears(e.port)}
+        declared = {e.service: None for e in wiring.application_produces if port.consumes(e.port)}
         needed = tuple(e.service for e in ends)
         yield Asked(port.kind, str(port), needed, any(not e.port.optional for e in ends), tuple(declared))

@@ -1,31 +1,30 @@
-"""What the wiring of a test says about lockstep: how fast it steps, and what answers a frame."""
+"""Lockstep derived from a test's wiring: the rate of its steps, and the messages that answer a frame."""
 
 from collections.abc import Iterable, Mapping
 from decimal import Decimal
 
-from dodo_dsl.check.context import Context
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
-from dodo_dsl.spec import arguments
+from dodo_dsl.spec.arguments import ResolvedService
 
 DEFAULT_HZ = 10.0
 DETECTIONS = "opendlv.logic.perception.Detection"
-"""Messages of which any number belongs to a frame, also none: they answer nothing."""
+"""Messages of which any number belongs to a frame, also none, so that they cannot complete an answer."""
 
 _CLOSE = Decimal("1e-6")
 
 
 def cameras_of(wiring: Wiring) -> set[str]:
     """The services that make pictures."""
-    return {end.service for end in wiring.said if end.port.kind == "memory"}
+    return {end.service for end in wiring.produced if end.port.kind == "memory"}
 
 
-def rates(context: Context) -> dict[str, float]:
+def rates(services: Iterable[ResolvedService]) -> dict[str, float]:
     """The rates in Hz of the services that have one, by name in the test."""
     found = {}
-    for use, manifest in context.known_uses():
-        text = arguments.texts(context.spec, use, manifest, context.rig).get("freq")
-        if text is not None and manifest.parameters["freq"].unit == "Hz":
-            found[use.name] = float(text)
+    for service in services:
+        text = service.texts.get("freq")
+        if text is not None and service.manifest.parameters["freq"].unit == "Hz":
+            found[service.use.name] = float(text)
     return found
 
 
@@ -43,38 +42,39 @@ def rates_fit(rate: float, step: float) -> bool:
 
 def answers(wiring: Wiring) -> list[str]:
     """The messages that answer a frame, each once: what the application declares, else what drives the vehicle, else
-    what is judged, else its own word that a frame is done. Empty where nothing of this is known."""
+    what is judged. Empty where none of these is known."""
     declared = _names(wiring.answers)
-    driving = _names(end for end in _asked(wiring) if end.layer == "action" and _is_due(end, wiring))
-    judging = [end for end in _asked(wiring) if end.layer == "evaluation" and not end.port.name.startswith(DETECTIONS)]
-    return declared or driving or _names(end for end in judging if _is_due(end, wiring))
+    expected = [end for end in _from_application(wiring) if _is_expected(end, wiring)]
+    driving = _names(end for end in expected if end.layer == "action")
+    judged = (e for e in expected if e.layer == "evaluation" and not e.port.name.startswith(DETECTIONS))
+    return declared or driving or _names(judged)
 
 
-def heard(wiring: Wiring) -> list[str]:
-    """Other messages of the application that services of the test listen to."""
+def other_inputs(wiring: Wiring) -> list[str]:
+    """Other messages of the application that services of the test consume."""
     chosen = answers(wiring)
-    return [name for name in _names(_asked(wiring)) if name not in chosen]
+    return [name for name in _names(_from_application(wiring)) if name not in chosen]
 
 
-def _asked(wiring: Wiring) -> list[End]:
-    """What services hear from the application, as far as they do not hear it from one another."""
+def _from_application(wiring: Wiring) -> list[End]:
+    """What services consume that the application may produce and no other service does."""
     return [
         end
-        for end in wiring.heard
+        for end in wiring.consumed
         if end.port.kind == "message"
         and end.port.name != ANYTHING
-        and end.port.may_be_asked
-        and not any(end.port.hears(other.port) for other in wiring.said if other.port.name != ANYTHING)
+        and end.port.can_be_required
+        and not any(end.port.consumes(other.port) for other in wiring.produced if other.port.name != ANYTHING)
     ]
 
 
-def _is_due(end: End, wiring: Wiring) -> bool:
-    """Whether the application has to say it: what is optional only when it declares that it does."""
-    return not end.port.optional or any(end.port.hears(other.port) for other in wiring.application_says)
+def _is_expected(end: End, wiring: Wiring) -> bool:
+    """Whether the application has to produce it: an optional message only when it declares that it does."""
+    return not end.port.optional or any(end.port.consumes(other.port) for other in wiring.application_produces)
 
 
 def _names(ends: Iterable[End]) -> list[str]:
-    """The messages by name, each once; where any sender counts, no other is named."""
+    """The messages by name, each once; a name alone stands for all its sender stamps."""
     ports = {end.port for end in ends}
     anybody = {port.name for port in ports if port.stamp is None}
     return sorted({str(port) for port in ports if port.stamp is None or port.name not in anybody})

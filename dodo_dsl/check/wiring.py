@@ -1,20 +1,20 @@
-"""The wiring of a test: which service says what, who hears it, and what is left to the application."""
+"""The wiring of a test: which service produces and consumes what, and what is required of the application."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from dodo_dsl.check.context import Context, Declared
+from dodo_dsl.application.model import Declared
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.spec import arguments
+from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Ports
 
 Kind = Literal["message", "memory"]
 
 ANYTHING = "*"
 NOT_OF_THE_APPLICATION = ("opendlv.sim.", "dodo.")
-"""Packages of messages that only a simulation sends: no application has them to give."""
+"""Packages of messages that only a simulation sends, so that none is required of an application."""
 
 _PARAMETER = re.compile(r"\{(?P<name>[^{}]+)\}")
 _STAMP = re.compile(r"[0-9]{1,10}")
@@ -22,7 +22,10 @@ _STAMP = re.compile(r"[0-9]{1,10}")
 
 @dataclass(frozen=True)
 class Port:
-    """What is said or heard. ``stamp`` is a message's sender stamp, None hears any; ``optional`` may stay silent."""
+    """A message or memory that a service produces or consumes, which it may not where it is ``optional``.
+
+    ``stamp`` is a message's sender stamp; None consumes any.
+    """
 
     kind: Kind
     name: str
@@ -32,16 +35,16 @@ class Port:
     def __str__(self) -> str:
         return self.name if self.stamp is None else f"{self.name}/{self.stamp}"
 
-    def hears(self, other: "Port") -> bool:
-        """Whether what ``other`` says is heard here."""
+    def consumes(self, other: "Port") -> bool:
+        """Whether what is produced at ``other`` is consumed here."""
         if other.name == ANYTHING:
             return True
         same = (self.kind, self.name) == (other.kind, other.name)
         return same and (self.stamp is None or other.stamp is None or self.stamp == other.stamp)
 
     @property
-    def may_be_asked(self) -> bool:
-        """Whether an application could give it."""
+    def can_be_required(self) -> bool:
+        """Whether an application could produce it."""
         return self.kind == "memory" or not self.name.startswith(NOT_OF_THE_APPLICATION)
 
 
@@ -57,45 +60,48 @@ class End:
 
 @dataclass(frozen=True)
 class Wiring:
-    """Everything said and heard in a test. ``undeclared`` names application services that say nothing of theirs."""
+    """Everything produced and consumed in a test.
 
-    said: tuple[End, ...]
-    heard: tuple[End, ...]
-    application_says: tuple[End, ...] = ()
-    application_hears: tuple[End, ...] = ()
+    ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are what they declare to
+    complete a frame in lockstep.
+    """
+
+    produced: tuple[End, ...]
+    consumed: tuple[End, ...]
+    application_produces: tuple[End, ...] = ()
+    application_consumes: tuple[End, ...] = ()
     undeclared: tuple[str, ...] = ()
     has_application: bool = False
     answers: tuple[End, ...] = ()
     done: str = ""
 
     def producers(self, port: Port) -> list[End]:
-        """Services of the test that say what a port hears."""
-        return [end for end in self.said if port.hears(end.port)]
+        """The test's services that produce what a port consumes."""
+        return [end for end in self.produced if port.consumes(end.port)]
 
-    def application_may_say(self, port: Port) -> bool:
-        """Whether the application says it, or could as it does not say what it says."""
-        if not port.may_be_asked:
+    def application_may_produce(self, port: Port) -> bool:
+        """Whether the application declares it, or could produce it as it does not declare everything."""
+        if not port.can_be_required:
             return False
         open_ended = not self.has_application or bool(self.undeclared) or port.kind == "memory"
-        return open_ended or any(port.hears(end.port) for end in self.application_says)
+        return open_ended or any(port.consumes(end.port) for end in self.application_produces)
 
-    def asked(self) -> list[End]:
-        """What the test's services hear and nobody in the test says."""
-        return [end for end in self.heard if not self.producers(end.port)]
+    def required(self) -> list[End]:
+        """What the test's services consume and none of them produces."""
+        return [end for end in self.consumed if not self.producers(end.port)]
 
 
-def wire(context: Context) -> Wiring:
-    """The wiring of one instance, as far as its parameters can be read."""
-    said: list[End] = []
-    heard: list[End] = []
-    spec = context.spec
-    for use, manifest in context.known_uses():
-        values = arguments.texts(spec, use, manifest, context.rig)
+def wire(services: Iterable[ResolvedService], declared: Mapping[str, Declared | None] | None) -> Wiring:
+    """The wiring of one instance, as far as its arguments fit; ``declared`` is None without an application."""
+    produced: list[End] = []
+    consumed: list[End] = []
+    for service in services:
+        use, manifest, values = service.use, service.manifest, service.texts
         kinds: tuple[tuple[Kind, Ports], ...] = (("message", manifest.messages), ("memory", manifest.memory))
         for kind, ports in kinds:
-            said += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, values, 0)]
-            heard += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.inputs, values, None)]
-    return _with_application(Wiring(tuple(said), tuple(heard)), context.declared)
+            produced += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, values, 0)]
+            consumed += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.inputs, values, None)]
+    return _with_application(Wiring(tuple(produced), tuple(consumed)), declared)
 
 
 def _ports(kind: Kind, written: Sequence[str], values: Mapping[str, str], stamp: int | None) -> Iterator[Port]:
@@ -120,19 +126,19 @@ def message(text: str, stamp: int | None, optional: bool = False) -> Port:
 def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | None) -> Wiring:
     if declared is None:
         return wiring
-    says: list[End] = []
-    hears: list[End] = []
+    produced: list[End] = []
+    consumed: list[End] = []
     answers: list[End] = []
     for service, own in declared.items():
-        for ends, names in ((says, own.outputs), (hears, own.inputs), (answers, own.answers)) if own else ():
-            stamp = 0 if ends is says else None
+        for ends, names in ((produced, own.outputs), (consumed, own.inputs), (answers, own.answers)) if own else ():
+            stamp = 0 if ends is produced else None
             ends += [End(service, "application", message(name, stamp), span) for name, span in names]
     ending = [own.done[0] for own in declared.values() if own and own.done]
     return replace(
         wiring,
         done=ending[0] if ending else "",
-        application_says=tuple(says),
-        application_hears=tuple(hears),
+        application_produces=tuple(produced),
+        application_consumes=tuple(consumed),
         answers=tuple(answers),
         undeclared=tuple(s for s, own in declared.items() if own is None),
         has_application=True,

@@ -64,10 +64,10 @@ def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = list(checked.diagnostics), {}
     if checked.ok and checked.application is not None and checked.specs:
-        compiled, problems = plan(checked, options.output)
-        diagnostics = ordered([*diagnostics, *problems])
+        made = plan(checked, options.output)
+        diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
-            stale = differences(compiled, options.output)
+            stale = differences(made.compiled, made.pipeline, options.output)
     _show(diagnostics, options.format, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
@@ -100,18 +100,18 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         _show(list(checked.diagnostics), options.format, stdout)
         return Exit.USAGE
     try:
-        compiled, problems = plan(checked, options.output)
+        made = plan(checked, options.output)
     except NoApplication:
         stderr.write("dodo compile: no application; name its compose file with --application or in dodo.yml\n")
         return Exit.USAGE
-    diagnostics = ordered([*checked.diagnostics, *problems])
+    diagnostics = ordered([*checked.diagnostics, *made.problems])
     _show(diagnostics, options.format, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
-    gone = [folder.name for folder in stale_folders(compiled, options.output)]
-    write(compiled, options.output)
+    gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
+    write(made.compiled, made.pipeline, options.output)
     if options.format == "text":
-        stdout.write(f"{_count(len(compiled.suite.plans))} compiled into {options.output}\n")
+        stdout.write(f"{_count(len(made.compiled.suite.plans))} compiled into {options.output}\n")
         if gone:
             what = f"{_count(len(gone))} of before that {'is' if len(gone) == 1 else 'are'} not among them"
             stdout.write(f"removed {what}: {_names(gone)}\n")

@@ -2,16 +2,14 @@
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TextIO
 
 from dodo_dsl.check import catalogue
-from dodo_dsl.check.context import Context
 from dodo_dsl.check.explanation import Asked, Explanation, Line, explain
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import did_you_mean, format_text, printable
 
 EXAMPLES = """examples:
@@ -44,7 +42,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         near = did_you_mean(options.word, rules) if "-" in options.word else ""
         stderr.write(f"dodo explain: {error}" + (f"; or the rule: {near}" if near else "") + "\n")
         return Exit.USAGE
-    found = [explain(context) for context in _contexts(checked)]
+    found = [explain(test) for test in checked.tests]
     stdout.write(json.dumps([asdict(e) for e in found], indent=2) + "\n" if options.json else _text(found))
     stderr.write(selection.left_out(checked) + format_text(checked.diagnostics))
     return Exit.OK if checked.ok else Exit.USAGE
@@ -57,12 +55,6 @@ def _rules(as_json: bool, stdout: TextIO) -> int:
     else:
         stdout.write(_table([[page.name, page.summary] for page in pages], ""))
     return Exit.OK
-
-
-def _contexts(checked: Checked) -> Iterator[Context]:
-    declared = checked.application.declared if checked.application else None
-    for spec in checked.specs:
-        yield Context(spec, checked.manifests, {}, checked.deployment, declared)
 
 
 def _text(found: Sequence[Explanation]) -> str:

@@ -7,7 +7,7 @@ from typing import TextIO
 
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.compiler import Checked, load, without_unfed
+from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, printable, shown_path
 
 EXAMPLES = """examples:
@@ -38,7 +38,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     else:
         columns = ("name", "layers", "description") if of_services else ("name", "level", "kind", "description")
         _table(rows, columns, stdout)
-    checked = without_unfed(everything)
+    checked = without_unsatisfied(everything)
     stderr.write(selection.left_out(checked))
     if checked.ok:
         return Exit.OK

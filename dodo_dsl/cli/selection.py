@@ -3,12 +3,14 @@
 import argparse
 import fnmatch
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from dodo_dsl.compiler import Checked, load, without_unfed
+from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
+from dodo_dsl.spec.settings import Settings
 
 
 class NoSuchTest(Exception):
@@ -38,20 +40,25 @@ def _is_path(word: str) -> bool:
     return "/" in word or word.endswith(SUFFIX) or Path(word).is_dir()
 
 
-def select(words: Sequence[str], levels: Sequence[str], application: Sequence[Path]) -> Checked:
-    """The checked specs that the words mean (all without any), kept to the levels; raises NoSuchTest.
+def select(
+    words: Sequence[str],
+    levels: Sequence[str],
+    application: Sequence[Path],
+    settings: Settings = Settings(),  # noqa: B008  (it is frozen)
+) -> Checked:
+    """The checked tests that the words mean (all without any), kept to the levels; raises NoSuchTest.
 
     Shipped tests that the application cannot feed are left out, unless a word is the name or the path of one.
     """
     paths = [Path(word) for word in words if _is_path(word)]
     names = [word for word in words if not _is_path(word)]
-    checked = load(paths, existing_files(application))
+    checked = load(paths, existing_files(application), settings=settings)
     if checked.empty:
         raise NoSuchTest(f"there is no test at '{checked.empty[0]}'; specs end in .dodo.yml")
     given = {spec.path for spec in checked.specs} if paths else set()
     if names:
         if paths:
-            checked = load([*paths, *checked.deployment.registry], application)
+            checked = load([*paths, *checked.deployment.registry], application, settings=settings)
         others = [spec for spec in checked.specs if spec.path not in given]
         chosen = {spec.slug for word in names for spec in _named(word, others)}
         checked = _narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
@@ -61,7 +68,7 @@ def select(words: Sequence[str], levels: Sequence[str], application: Sequence[Pa
         if not kept:
             raise NoSuchTest(f"none of the tests is of level {' or '.join(levels)}")
         checked = _narrowed(checked, kept)
-    return without_unfed(checked, given)
+    return without_unsatisfied(checked, given)
 
 
 def left_out(checked: Checked) -> str:
@@ -92,14 +99,11 @@ def _matches(spec: Spec, pattern: str) -> bool:
 
 
 def _narrowed(checked: Checked, specs: Sequence[Spec]) -> Checked:
-    """The same with fewer specs; problems of other specs no longer count, those of other files do."""
-    dropped = {str(s.path) for s in checked.specs} - {str(s.path) for s in specs}
-    diagnostics = tuple(d for d in checked.diagnostics if d.span.file not in dropped)
-    return Checked(
-        checked.deployment,
-        checked.manifests,
-        tuple(specs),
-        diagnostics,
-        checked.application,
-        checked.empty,
+    """The same with fewer tests; problems of other specs no longer count, those of other files do."""
+    slugs, files = {s.slug for s in specs}, {str(s.path) for s in specs}
+    dropped = {str(s.path) for s in checked.specs} - files
+    return replace(
+        checked,
+        tests=tuple(test for test in checked.tests if str(test.spec.path) in files and test.spec.slug in slugs),
+        diagnostics=tuple(d for d in checked.diagnostics if d.span.file not in dropped),
     )

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from dodo_dsl.emit.render import File, render_pipeline, render_plan
+from dodo_dsl.emit.render import File, render_plan
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.test_files import Copy
 
@@ -42,9 +42,9 @@ def pipeline_folder(out: Path) -> str:
     return out.name if out.is_absolute() else out.as_posix()
 
 
-def write(compiled: Compiled, out: Path) -> None:
+def write(compiled: Compiled, pipeline: File, out: Path) -> None:
     """Writes everything below ``out`` and removes tests of earlier compilations that are no longer there."""
-    _update(out, [render_pipeline(compiled.suite, pipeline_folder(out))])
+    _update(out, [pipeline])
     for plan in compiled.suite.plans:
         folder, files, copies = out / plan.slug, render_plan(plan), compiled.copies[plan.slug]
         if folder.exists():
@@ -110,10 +110,9 @@ def _ours(path: Path) -> bool:
         return False
 
 
-def differences(compiled: Compiled, out: Path) -> dict[str, str]:
+def differences(compiled: Compiled, pipeline: File, out: Path) -> dict[str, str]:
     """What writing would change below ``out``, a unified diff by test, the pipeline's first; empty when up to date."""
-    child = render_pipeline(compiled.suite, pipeline_folder(out))
-    found = {child.path: _text_difference(child, out)}
+    found = {pipeline.path: _text_difference(pipeline, out)}
     for plan in compiled.suite.plans:
         texts = (_text_difference(file, out) for file in render_plan(plan))
         copies = _copy_differences(out / plan.slug / FILES, compiled.copies[plan.slug], out)

@@ -13,7 +13,8 @@ from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.emit.containers import containers
 from dodo_dsl.emit.pipeline import CHILD, pipeline
-from dodo_dsl.plan.model import LAYERS, Plan, Suite, to_json
+from dodo_dsl.plan.model import LAYERS, Plan, Suite
+from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.source import resolve
 
 _SERVICE_DEPTH = 2

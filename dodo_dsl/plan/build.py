@@ -2,26 +2,26 @@
 
 import functools
 import itertools
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.plan import addresses
-from dodo_dsl.plan.clock_service import clock, lockstep
+from dodo_dsl.plan import addresses, clock_service, recorder_service
+from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
-from dodo_dsl.plan.recorder_service import MANIFEST, RECORDER, recorder
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.test_files import Copy, FilesError, copies
-from dodo_dsl.spec import arguments
+from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.rig import EMULATED_FILE, Rig
-from dodo_dsl.spec.values import Value, convert, default_value
+from dodo_dsl.spec.settings import Settings
+from dodo_dsl.spec.values import Value
 
 
 @dataclass(frozen=True)
@@ -33,44 +33,46 @@ class Compiled:
 
 
 def build(
-    specs: Sequence[Spec],
+    tests: Sequence[ResolvedTest],
     manifests: Mapping[str, Manifest],
     deployment: Deployment,
     application: ApplicationSource,
     out: Path,
+    settings: Settings,
 ) -> tuple[Compiled, list[Diagnostic]]:
-    """The Plans of specs that ``check`` found no errors in; ``out`` is the folder that they will be written below."""
-    ordered = sorted(specs, key=lambda s: s.slug)
+    """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below."""
+    ordered = sorted(tests, key=lambda test: test.spec.slug)
     try:
         cids = _cids(ordered, deployment)
     except addresses.OutOfAddresses as error:
-        span = Span(str(deployment.file)) if deployment.file else ordered[-1].span("name")
+        span = Span(str(deployment.file)) if deployment.file else ordered[-1].spec.span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
     tree = functools.cache(copies)  # tests share maps and recordings
 
     @functools.cache
-    def planned(cid: int, isolated: str, judges: tuple[str, ...], hardware: bool, privileged: bool) -> Application:
+    def rewritten(
+        cid: int, isolated: str, evaluators: tuple[str, ...], hardware: bool, privileged: bool
+    ) -> Application:
         kept = {"hil": hardware, "privileged_allowed": privileged}
-        return plan_application(application, cid, isolated, out / "test", judges, **kept)
+        return plan_application(application, cid, isolated, out / "test", evaluators, **kept)
 
     builders = [
-        _Builder(spec, manifests, deployment, out, cid, index, tree, planned)
-        for index, (spec, cid) in enumerate(zip(ordered, cids, strict=True))
+        _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten)
+        for index, (test, cid) in enumerate(zip(ordered, cids, strict=True))
     ]
-    plans = tuple(builder.plan(application) for builder in builders)
+    plans = tuple(builder.plan() for builder in builders)
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
     return Compiled(Suite(plans, deployment.gates), files), problems
 
 
-def _cids(specs: Sequence[Spec], deployment: Deployment) -> list[int]:
+def _cids(tests: Sequence[ResolvedTest], deployment: Deployment) -> list[int]:
     """A CID for each instance: its rig's, or one of the deployment's range."""
-    rigs = [deployment.rig(spec.rig) if spec.rig else None for spec in specs]
-    free = [i for i, rig in enumerate(rigs) if rig is None or rig.cid is None]
-    given = addresses.cids([isolation(specs[i], rigs[i]) for i in free], deployment.cids)
-    by_index = dict(zip(free, given, strict=True))
-    return [by_index[i] if rig is None or rig.cid is None else rig.cid for i, rig in enumerate(rigs)]
+    reserved = [test.rig.cid if test.rig else None for test in tests]
+    free = [test for test, cid in zip(tests, reserved, strict=True) if cid is None]
+    given = iter(addresses.cids([isolation(test.spec, test.rig) for test in free], deployment.cids))
+    return [next(given) if cid is None else cid for cid in reserved]
 
 
 def isolation(spec: Spec, rig: Rig | None) -> str:
@@ -81,36 +83,38 @@ def isolation(spec: Spec, rig: Rig | None) -> str:
 class _Builder:
     def __init__(
         self,
-        spec: Spec,
+        test: ResolvedTest,
         manifests: Mapping[str, Manifest],
         deployment: Deployment,
-        out: Path,
+        application: ApplicationSource,
+        settings: Settings,
         cid: int,
         index: int,
         tree: Callable[[Path, Path], list[Copy]],
-        application: Callable[[int, str, tuple[str, ...], bool, bool], Application],
+        rewritten: Callable[[int, str, tuple[str, ...], bool, bool], Application],
     ) -> None:
-        self.spec = spec
+        self.test = test
+        self.spec = test.spec
+        self.rig = test.rig
         self.manifests = manifests
         self.deployment = deployment
-        self.out = out
+        self.application = application
+        self.settings = settings
         self.cid = cid
         self.index = index
-        self.rig = deployment.rig(spec.rig) if spec.rig else None
         self.tree = tree
-        self.application = application
+        self.rewritten = rewritten
         self.files: set[Copy] = set()
         self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
 
-    def plan(self, application: ApplicationSource) -> Plan:
-        """The instance's Plan with this application."""
+    def plan(self) -> Plan:
+        """The instance's Plan."""
         spec, rig = self.spec, self.rig
-        uses = (self._service(use) for use in spec.uses)
-        services = (*self._automatic(application), *uses)
-        self._names_apart(services, application.spans)
-        judges = tuple(s.name for s in services if s.judge)
+        services = (*self._automatic(), *(self._service(service) for service in self.test.services))
+        self._distinct_names(services)
+        evaluators = tuple(s.name for s in services if s.judge)
         for key in ("name", "level", "kind", "timeout", "clock", "rig", "matrix", "seed", "isolation", "record"):
             if key in spec.spans:
                 self._place(key, spec.span(key))
@@ -134,8 +138,8 @@ class _Builder:
             tag=rig.tag if rig else "sil",
             sandbox_image=self._image("sandbox"),
             services=services,
-            application=self.application(self.cid, isolated, judges, hardware, privileged),
-            lockstep=lockstep(spec, application.declared),
+            application=self.rewritten(self.cid, isolated, evaluators, hardware, privileged),
+            lockstep=lockstep(spec, self.application.declared, self.settings.wall_timeout_s),
             rig=rig.name if rig else "",
             messages=messages,
             source_map=self.places,
@@ -164,33 +168,33 @@ class _Builder:
         bare = "/" not in image and ":" not in image
         return f"{self.deployment.image_prefix}/{image}:{self.deployment.image_tag}" if bare else image
 
-    def _automatic(self, application: ApplicationSource) -> Iterator[Service]:
+    def _automatic(self) -> Iterator[Service]:
         """The services that DoDo adds: the recorder, and in lockstep the clock."""
-        spec, manifests = self.spec, self.manifests
-        image = self._image(manifests[MANIFEST].image)
-        yield recorder(spec, manifests, self.rig, image, self.cid)
-        if spec.clock == "lockstep":
-            context = Context(spec, manifests, {}, self.deployment, application.declared)
-            yield clock(context, self._image(manifests["clock"].image), (RECORDER,), self.cid)
+        own = self.manifests[recorder_service.MANIFEST]
+        yield recorder_service.recorder(self.test, own, self._image(own.image), self.cid)
+        if self.spec.clock == "lockstep":
+            own = self.manifests[clock_service.MANIFEST]
+            watch = (recorder_service.RECORDER,)
+            yield clock_service.clock(self.test, own, self._image(own.image), watch, self.cid)
 
-    def _names_apart(self, services: Sequence[Service], application: Container[str]) -> None:
+    def _distinct_names(self, services: Sequence[Service]) -> None:
         for service in services:
-            if service.name in application:
+            if service.name in self.application.services:
                 use = next(u for u in self.spec.uses if u.name == service.name)
                 message = f"the application has a service '{service.name}' too"
                 self.problems.append(Diagnostic(use.span, "service-taken", message, "rename the one in the test"))
 
-    def _service(self, use: Use) -> Service:
-        manifest = self.manifests[use.uses.text]
+    def _service(self, service: ResolvedService) -> Service:
+        use, manifest = service.use, service.manifest
         key = f"{use.layer}.{use.name}"
         self._place(key, use.span)
         flags = [
             flag
-            for parameter in manifest.parameters.values()
-            if (flag := self._flag(use, parameter, f"{key}.{parameter.name}")) is not None
+            for argument in service.arguments.values()
+            if (flag := self._flag(argument, f"{key}.{argument.parameter.name}")) is not None
         ]
         flags.append(Flag("cid", str(self.cid)))
-        service = Service(
+        planned = Service(
             use.layer,
             use.name,
             manifest.name,
@@ -198,28 +202,20 @@ class _Builder:
             manifest.process,
             tuple(flags),
             judge=use.layer == "evaluation",
-            devices=self._devices(use, manifest),
+            devices=_devices(service),
             setup_s=_setup_s(flags, manifest),
         )
-        return hardware(service, self.manifests, self._image(self.manifests[DRAWN].image))
+        return hardware(planned, self.manifests, self._image(self.manifests[DRAWN].image))
 
-    def _devices(self, use: Use, manifest: Manifest) -> tuple[str, ...]:
-        """The device files among what the manifest names; a rig's camera may be none (rpicam, a recording)."""
-        values = arguments.texts(self.spec, use, manifest, self.rig)
-        named = (values.get(device.strip("{}"), device) for device in manifest.devices)
-        return tuple(device for device in named if is_device(device))
-
-    def _flag(self, use: Use, parameter: Parameter, key: str) -> Flag | None:
-        entry = arguments.written(self.spec, use, parameter, self.rig)
-        root = self.spec.location.root
-        value = convert(parameter, entry.value, root) if entry else default_value(parameter)
+    def _flag(self, argument: Argument, key: str) -> Flag | None:
+        entry, value = argument.entry, argument.value
         if entry:
             self._place(key, entry.key)
         if value is None:
             return None
         if value.path is not None and entry:
-            return self._file_flag(parameter, value, entry.key)
-        return Flag(parameter.name, value.text, value.kind)
+            return self._file_flag(argument.parameter, value, entry.key)
+        return Flag(argument.parameter.name, value.text, value.kind)
 
     def _file_flag(self, parameter: Parameter, value: Value, span: Span) -> Flag:
         path = value.path or Path()
@@ -229,6 +225,12 @@ class _Builder:
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         return Flag(parameter.name, path.relative_to(root).as_posix(), "path")
+
+
+def _devices(service: ResolvedService) -> tuple[str, ...]:
+    """The device files among those that the manifest names; a rig's camera may have none (rpicam, a recording)."""
+    named = (service.texts.get(device.strip("{}"), device) for device in service.manifest.devices)
+    return tuple(device for device in named if is_device(device))
 
 
 def _setup_s(flags: Sequence[Flag], manifest: Manifest) -> float:

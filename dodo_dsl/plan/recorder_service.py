@@ -1,13 +1,12 @@
 """The recorder that every test has: all messages, and camera frames where the test asks for them."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
+from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.plan.model import Flag, Service
-from dodo_dsl.spec import arguments
+from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import Rig
 
 RECORDER = "dodo-recorder"
 MANIFEST = "rec-recorder"
@@ -16,27 +15,26 @@ RECORDING, SNAPSHOT = "test.rec", "snapshot.png"
 _PARAMETER = re.compile(r"\{([a-z0-9.-]+)\}")
 
 
-def recorder(spec: Spec, manifests: Mapping[str, Manifest], rig: Rig | None, image: str, cid: int) -> Service:
-    """The recorder's service; ``record: {frames: ...}`` adds the pictures of each service that makes some.
+def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> Service:
+    """The recorder's service; ``record: {frames: ...}`` adds the frames of each camera.
 
     A test on a rig has a snapshot of its first camera in any case.
     """
-    manifest = manifests[MANIFEST]
+    spec = test.spec
     flags = [Flag("rec", RECORDING, "report")]
     wanted = [Flag("frames", f"{spec.frames_hz:g}")] if spec.frames_hz else []
     wanted += [Flag("snapshot", SNAPSHOT, "report")] if spec.level == "hil" else []
-    memories = ",".join(_memories(spec, manifests, rig)) if wanted else ""
+    memories = ",".join(_memories(test.services)) if wanted else ""
     if memories:
         flags += [*wanted, Flag("memories", memories, "memories")]
     return Service("environment", RECORDER, MANIFEST, image, manifest.process, (*flags, Flag("cid", str(cid))))
 
 
-def _memories(spec: Spec, manifests: Mapping[str, Manifest], rig: Rig | None) -> Iterator[str]:
+def _memories(services: Iterable[ResolvedService]) -> Iterator[str]:
     """One memory of each camera, I420 where it has that, as no colour is converted then; with its size if known."""
-    for use in spec.uses:
-        manifest = manifests[use.uses.text]
-        values = arguments.texts(spec, use, manifest, rig)
-        names = [_PARAMETER.sub(lambda m: values.get(m[1], ""), port) for port in _formats(manifest)]  # noqa: B023
+    for service in services:
+        values = service.texts
+        names = [_PARAMETER.sub(lambda m: values.get(m[1], ""), port) for port in _formats(service.manifest)]  # noqa: B023
         size = f":{values['width']}x{values['height']}" if {"width", "height"} <= values.keys() else ""
         yield from (f"{name.lstrip('/')}{size}" for name in filter(None, names[:1]))
 

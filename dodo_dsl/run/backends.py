@@ -99,7 +99,9 @@ class Processes:
             return
         async with (
             self._turn(plan),
-            host_isolation.host_lane(plan, () if rigs.is_real(plan) else self._cids, say, keep) as leased,
+            host_isolation.host_lane(
+                plan, () if rigs.is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
+            ) as leased,
             rigs.attended(plan, leased.cid, leased.descriptors, say) as descriptors,
         ):
             lane = replace(leased, descriptors=(*descriptors, *self._descriptors))
@@ -148,15 +150,9 @@ class Containers:
                 yield backend
             else:
                 async with (
-                    host_isolation.host_lane(replace_flags(plan), (plan.cid,), say) as lane,
+                    host_isolation.host_lane(plan, (plan.cid,), say, alone=True) as lane,
                     rigs.attended(plan, lane.cid, lane.descriptors, say),
                 ):
                     yield backend
         finally:
             lease.leave() if backend.left_behind else lease.release()
-
-
-def replace_flags(plan: Plan) -> Plan:
-    """The plan as one whose application takes no flags: compiled files on the host are fixed, so they run alone."""
-    services = tuple(replace(s, takes_cid=False, takes_memory=False) for s in plan.application.services)
-    return replace(plan, application=replace(plan.application, services=services))

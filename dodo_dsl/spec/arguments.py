@@ -1,10 +1,47 @@
-"""Where the value of a service's parameter comes from, and what it is."""
+"""The arguments of a test's services: where the value of each parameter comes from, and what it is."""
 
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Entry
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A parameter's value as its flag carries it, converted once.
+
+    ``entry`` is where it is written, None for the manifest's default. ``value`` is None when nothing is given, or when
+    what is written does not fit, which ``problem`` then says.
+    """
+
+    parameter: Parameter
+    entry: Entry | None = None
+    value: Value | None = None
+    problem: Diagnostic | None = None
+
+    @property
+    def text(self) -> str | None:
+        return self.value.text if self.value else None
+
+
+@dataclass(frozen=True)
+class ResolvedService:
+    """A service of a test with its manifest and the arguments of all its parameters, by name."""
+
+    use: Use
+    manifest: Manifest
+    arguments: Mapping[str, Argument]
+
+    @functools.cached_property
+    def texts(self) -> Mapping[str, str]:
+        """The values as strings; parameters without a fitting value are missing."""
+        return {name: a.value.text for name, a in self.arguments.items() if a.value is not None}
 
 
 def written(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Entry | None:
@@ -19,20 +56,27 @@ def written(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Entr
     return rig.entry(parameter.rig) if rig and parameter.rig else None
 
 
-def value(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Value | None:
-    """The value as the flag carries it, the default included; raises ValueProblem for one that does not fit."""
+def argument(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Argument:
+    """The argument of one parameter, the default included."""
     entry = written(spec, use, parameter, rig)
-    return convert(parameter, entry.value, spec.location.root) if entry else default_value(parameter)
+    if entry is None:
+        return Argument(parameter, None, default_value(parameter))
+    try:
+        return Argument(parameter, entry, convert(parameter, entry.value, spec.location.root))
+    except ValueProblem as problem:
+        return Argument(parameter, entry, None, problem.diagnostic)
 
 
-def texts(spec: Spec, use: Use, manifest: Manifest, rig: Rig | None) -> dict[str, str]:
-    """The values of a service's parameters as texts; those that do not fit or are not given are missing."""
-    found = {}
-    for parameter in manifest.parameters.values():
-        try:
-            given = value(spec, use, parameter, rig)
-        except ValueProblem:
-            continue
-        if given is not None:
-            found[parameter.name] = given.text
-    return found
+def resolved(
+    spec: Spec, use: Use, manifest: Manifest, rig: Rig | None, like: Mapping[str, Argument] | None = None
+) -> ResolvedService:
+    """A service with all its arguments; those of ``like`` that come from the very same entry are taken over.
+
+    The instances of a matrix share the entries that do not depend on it, and so their arguments.
+    """
+    arguments = {}
+    for name, parameter in manifest.parameters.items():
+        known = like.get(name) if like else None
+        same = known is not None and known.parameter is parameter and known.entry is written(spec, use, parameter, rig)
+        arguments[name] = known if known is not None and same else argument(spec, use, parameter, rig)
+    return ResolvedService(use, manifest, arguments)

@@ -37,31 +37,8 @@ class ValueProblem(Exception):
 
 
 def convert(parameter: Parameter, node: Node, root: Path) -> Value:
-    """The flag's value; raises ValueProblem at the place of what does not fit.
-
-    The instances of a matrix share the nodes that do not depend on it, so what a node came to is kept with it.
-    """
-    key = (id(parameter), id(node), root)
-    known = _KNOWN.get(key)
-    if known is None:
-        if len(_KNOWN) >= _MOST_KNOWN:
-            _KNOWN.clear()
-        known = _KNOWN[key] = (parameter, node, _convert(parameter, node, root))
-    outcome = known[2]
-    if isinstance(outcome, ValueProblem):
-        raise outcome
-    return outcome
-
-
-def _convert(parameter: Parameter, node: Node, root: Path) -> "Value | ValueProblem":
-    try:
-        return _CONVERTERS[parameter.type](parameter, node, root)
-    except ValueProblem as problem:
-        return problem
-
-
-_MOST_KNOWN = 100_000
-_KNOWN: dict[tuple[int, int, Path], tuple[Parameter, Node, Value | ValueProblem]] = {}
+    """The flag's value; raises ValueProblem at the place of what does not fit. Paths stay below ``root``."""
+    return _CONVERTERS[parameter.type](parameter, node, root)
 
 
 def default_value(parameter: Parameter) -> Value | None:
@@ -132,7 +109,7 @@ def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:
 
 
 def _text(parameter: Parameter, node: Node, _: Path) -> Value:
-    scalar = _scalar(parameter, node, "a text")
+    scalar = _scalar(parameter, node, "a string")
     _check_text(parameter, scalar)
     if parameter.choices and scalar.text not in parameter.choices:
         message = f"{_name(parameter)} is '{scalar.text}', expected one of {', '.join(parameter.choices)}"
@@ -192,7 +169,7 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
         raise ValueProblem(scalar.span, "path-escape", message)
     target = path_of(folder, scalar.text)
     if target is None:
-        message = f"{_name(parameter)}: '{scalar.text[:60]}' is no path: too long, or its links go in a circle"
+        message = f"{_name(parameter)}: '{scalar.text[:60]}' is too long for a path, or a symlink loop"
         raise ValueProblem(scalar.span, "missing-file", message)
     if not target.is_relative_to(root.resolve()):
         message = f"{_name(parameter)}: '{scalar.text}' leaves the registry"

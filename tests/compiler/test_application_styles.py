@@ -9,7 +9,8 @@ import pytest
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text
 from dodo_dsl.emit.render import render_plan
-from dodo_dsl.plan.model import Plan, Service, from_json, to_json
+from dodo_dsl.plan.model import Plan, Service
+from dodo_dsl.plan.plan_json import from_json, to_json
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from tests.compiler.test_output import compose
 

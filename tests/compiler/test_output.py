@@ -13,7 +13,7 @@ import pytest
 from dodo_dsl import compiler
 from dodo_dsl.cli.main import main
 from dodo_dsl.emit.render import render
-from dodo_dsl.plan.model import from_json, to_json
+from dodo_dsl.plan.plan_json import from_json, to_json
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).parent / "golden"

@@ -9,7 +9,8 @@ from typing import Any
 
 from dodo_dsl import __version__
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.model import Flag, Plan, to_json
+from dodo_dsl.plan.model import Flag, Plan
+from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.run.backends import Containers, Job
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule

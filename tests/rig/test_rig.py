@@ -22,7 +22,7 @@ from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from dodo_dsl.plan.model import from_json
+from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs import rigs
 from services.gantry.port import SerialPort

@@ -10,7 +10,8 @@ from pathlib import Path
 import jsonschema
 
 from dodo_dsl import package_data
-from dodo_dsl.plan.model import Plan, to_json
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.plan_json import to_json
 from tests.run.helpers import Bench
 
 ROOT = Path(__file__).parents[2]

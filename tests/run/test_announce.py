@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.plan.model import from_json
+from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.announce import signs_of_life
 from dodo_dsl.run.docker.backend import DockerBackend
 from dodo_dsl.run.protocol import BackendError

@@ -1,4 +1,4 @@
-"""``wrong-layer``: a service stands in a layer that its manifest names."""
+"""``wrong-layer``: a service is in a layer that its manifest lists."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,8 @@ from dodo_dsl.diagnostics import Diagnostic
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    for use, manifest in context.known_uses():
+    for service in context.services:
+        use, manifest = service.use, service.manifest
         if use.layer not in manifest.layers:
-            message = f"service '{manifest.name}' cannot stand in layer {use.layer}"
+            message = f"service '{manifest.name}' does not fit layer {use.layer}"
             yield Diagnostic(use.uses.span, "wrong-layer", message, f"move it to {' or '.join(manifest.layers)}")

@@ -8,45 +8,37 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.spec import arguments
-from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.model import Use
-from dodo_dsl.spec.values import ValueProblem, convert
+from dodo_dsl.spec.arguments import ResolvedService
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    for use, manifest in context.known_uses():
-        if use.layer not in manifest.layers:
-            continue  # it may be another service that is meant
-        yield from _written(context, use, manifest)
-        yield from _taken(context, use, manifest)
-        yield from _missing(context, use, manifest)
+    for service in context.services:
+        if service.use.layer not in service.manifest.layers:
+            continue  # another service may be meant
+        yield from _written(service)
+        yield from _from_elsewhere(service)
+        yield from _missing(context, service)
 
 
-def _written(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnostic]:
-    for name, entry in use.parameters.items():
-        parameter = manifest.parameters.get(name)
-        if parameter is None:
-            message = f"service '{manifest.name}' has no parameter '{name}'"
-            yield Diagnostic(entry.key, "unknown-parameter", message, did_you_mean(name, manifest.parameters))
-            continue
-        try:
-            convert(parameter, entry.value, context.spec.location.root)
-        except ValueProblem as problem:
-            yield problem.diagnostic
+def _written(service: ResolvedService) -> Iterator[Diagnostic]:
+    for name, entry in service.use.parameters.items():
+        argument = service.arguments.get(name)
+        if argument is None:
+            message = f"service '{service.manifest.name}' has no parameter '{name}'"
+            yield Diagnostic(entry.key, "unknown-parameter", message, did_you_mean(name, service.manifest.parameters))
+        elif argument.problem:
+            yield argument.problem
 
 
-def _taken(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnostic]:
+def _from_elsewhere(service: ResolvedService) -> Iterator[Diagnostic]:
     """Values of the rig or of another service that do not fit here."""
-    for parameter in manifest.parameters.values():
-        if (parameter.rig or parameter.shared) and parameter.name not in use.parameters:
-            try:
-                arguments.value(context.spec, use, parameter, context.rig)
-            except ValueProblem as problem:
-                yield problem.diagnostic
+    for name, argument in service.arguments.items():
+        if argument.problem and name not in service.use.parameters:
+            yield argument.problem
 
 
-def _missing(context: Context, use: Use, manifest: Manifest) -> Iterator[Diagnostic]:
+def _missing(context: Context, service: ResolvedService) -> Iterator[Diagnostic]:
+    use, manifest = service.use, service.manifest
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters:
             continue

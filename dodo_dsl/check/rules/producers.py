@@ -1,40 +1,36 @@
-"""Each message or memory that a service consumes has a producer in the test, or is asked of the application.
+"""Each message or memory that a service consumes has a producer in the test, or is required of the application.
 
 ``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
-message and sender stamp or of one memory, ``application-input`` (the application hears what nobody says).
+message and sender stamp or of one memory, ``application-input`` (the application consumes what nobody produces).
 """
 
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import Context
-from dodo_dsl.check.wiring import ANYTHING, End, Wiring, wire
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.manifest import Manifest
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    known = list(context.known_uses())
-    if (
-        not context.spec.is_whole
-        or len(known) < len(context.spec.uses)
-        or any(use.layer not in m.layers for use, m in known)
-    ):
-        return  # what stands in a wrong place, or is unknown, is to be mended first
-    wiring = wire(context)
-    misspelt = any(e.port.name not in context.messages for e in wiring.application_says if e.port.kind == "message")
-    for end in wiring.heard:
-        if misspelt and end.port.may_be_asked:
-            continue  # the misspelt one may be it
-        if not end.port.optional and not wiring.producers(end.port) and not wiring.application_may_say(end.port):
-            yield _unfed(context, wiring, end)
+    fits = all(service.use.layer in service.manifest.layers for service in context.services)
+    if not context.spec.is_whole or not context.test.is_complete or not fits:
+        return  # services that are unknown or in a wrong layer are to be mended first
+    wiring = context.wiring
+    misspelt = any(e.port.name not in context.messages for e in wiring.application_produces if e.port.kind == "message")
+    for end in wiring.consumed:
+        if misspelt and end.port.can_be_required:
+            continue  # the misspelt one may be meant
+        if not end.port.optional and not wiring.producers(end.port) and not wiring.application_may_produce(end.port):
+            yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
-    yield from _unheard_of(wiring)
+    yield from _unsatisfied_application(wiring)
 
 
-def _unfed(context: Context, wiring: Wiring, end: End) -> Diagnostic:
+def _unsatisfied(context: Context, wiring: Wiring, end: End) -> Diagnostic:
     rule = "no-sample" if end.layer == "evaluation" else "no-producer"
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
-    if end.port.may_be_asked:
+    if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test and no service of the application sends"
         hint = "list it under x-dodo.out of the application's service that sends it"
     else:
@@ -47,7 +43,7 @@ def _unfed(context: Context, wiring: Wiring, end: End) -> Diagnostic:
 
 def _who_could(context: Context, wiring: Wiring, end: End) -> str:
     """The way out: another sender stamp that is sent, or services that send such messages."""
-    stamps = sorted(str(e.port) for e in wiring.said if e.port.name == end.port.name)
+    stamps = sorted(str(e.port) for e in wiring.produced if e.port.name == end.port.name)
     if stamps:
         return f"the test has {' and '.join(stamps)}"
     names = sorted(m.name for m in context.manifests.values() if _sends(m, end.port.name))
@@ -60,7 +56,7 @@ def _sends(manifest: Manifest, name: str) -> bool:
 
 def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
     first: dict[tuple[str, str, int | None], End] = {}
-    for end in (*wiring.said, *wiring.application_says):
+    for end in (*wiring.produced, *wiring.application_produces):
         if end.port.name == ANYTHING:
             continue
         key = (end.port.kind, end.port.name, end.port.stamp)
@@ -73,9 +69,9 @@ def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
             yield Diagnostic(end.span, "two-producers", message, hint)
 
 
-def _unheard_of(wiring: Wiring) -> Iterator[Diagnostic]:
-    for end in wiring.application_hears:
-        own = any(end.port.hears(other.port) for other in wiring.application_says)
+def _unsatisfied_application(wiring: Wiring) -> Iterator[Diagnostic]:
+    for end in wiring.application_consumes:
+        own = any(end.port.consumes(other.port) for other in wiring.application_produces)
         if not own and not wiring.producers(end.port) and not wiring.undeclared:
-            message = f"the application's '{end.service}' hears {end.port}, which nobody sends in this test"
+            message = f"the application's '{end.service}' consumes {end.port}, which nobody sends in this test"
             yield Diagnostic(end.span, "application-input", message, severity="warning")

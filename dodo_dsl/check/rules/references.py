@@ -12,32 +12,25 @@ from pathlib import Path
 from dodo_dsl.check.context import Context
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
-from dodo_dsl.spec import arguments
-from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import Use
-from dodo_dsl.spec.values import ValueProblem, convert
+from dodo_dsl.spec.arguments import Argument, ResolvedService
 
 _MAP = "map.json"
 _MAX_BYTES = 20 << 20
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    for use, manifest in context.known_uses():
-        for name, entry in use.parameters.items():
-            parameter = manifest.parameters.get(name)
-            if parameter and parameter.among:
-                yield from _among(context, use, manifest, parameter, entry)
-            if parameter and parameter.within_timeout:
-                yield from _within(context, use, parameter, entry)
+    for service in context.services:
+        for name, entry in service.use.parameters.items():
+            argument = service.arguments.get(name)
+            if argument and argument.value and argument.parameter.among:
+                yield from _among(service, argument, entry)
+            if argument and argument.value and argument.parameter.within_timeout:
+                yield from _within(context, service, argument.value.text, entry)
 
 
-def _among(context: Context, use: Use, manifest: Manifest, parameter: Parameter, entry: Entry) -> Iterator[Diagnostic]:
-    try:
-        convert(parameter, entry.value, context.spec.location.root)
-    except ValueProblem:
-        return
-    source, _, key = parameter.among.partition(".")
-    file = _file(context, use, manifest.parameters[source])
+def _among(service: ResolvedService, argument: Argument, entry: Entry) -> Iterator[Diagnostic]:
+    source, _, key = argument.parameter.among.partition(".")
+    file = _file(service.arguments[source])
     if file is None:
         return
     names = _names(file, key)
@@ -47,18 +40,15 @@ def _among(context: Context, use: Use, manifest: Manifest, parameter: Parameter,
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
     for item in items[:MAX_PROBLEMS]:
         if isinstance(item, Scalar) and item.text not in names and "${matrix" not in item.text:
-            message = f"there is no '{item.text}' among the {key} of {file.parent.name}/{file.name}"
+            message = f"'{item.text}' is not among the {key} of {file.parent.name}/{file.name}"
             yield Diagnostic(item.span, "unknown-name", message, did_you_mean(item.text, names))
 
 
-def _file(context: Context, use: Use, parameter: Parameter) -> Path | None:
-    try:
-        given = arguments.value(context.spec, use, parameter, context.rig)
-    except ValueProblem:
+def _file(argument: Argument) -> Path | None:
+    path = argument.value.path if argument.value else None
+    if path is None:
         return None
-    if given is None or given.path is None:
-        return None
-    return given.path / _MAP if given.path.is_dir() else given.path
+    return path / _MAP if path.is_dir() else path
 
 
 @functools.lru_cache(maxsize=256)
@@ -66,7 +56,7 @@ def _names(file: Path, key: str) -> tuple[str, ...] | str:
     """The names of the entries of a list in a JSON file, or what is wrong with the file."""
     try:
         if file.exists() and not file.is_file():
-            return "this is no plain file"
+            return "not a regular file"
         if file.stat().st_size > _MAX_BYTES:
             return f"larger than {_MAX_BYTES >> 20} MiB"
         document = json.loads(file.read_text(encoding="utf-8"))
@@ -80,14 +70,10 @@ def _names(file: Path, key: str) -> tuple[str, ...] | str:
         return f"not JSON: {str(error)[:120]}"
 
 
-def _within(context: Context, use: Use, parameter: Parameter, entry: Entry) -> Iterator[Diagnostic]:
+def _within(context: Context, service: ResolvedService, seconds: str, entry: Entry) -> Iterator[Diagnostic]:
     timeout = context.spec.timeout_s
-    try:
-        given = arguments.value(context.spec, use, parameter, context.rig)
-    except ValueProblem:
-        return
-    if timeout is not None and given is not None and float(given.text) >= timeout:
-        written = entry.value.text if isinstance(entry.value, Scalar) else given.text
-        message = f"'{use.name}' waits up to {written}, but the test's timeout of {timeout:g} s ends it first"
+    if timeout is not None and float(seconds) >= timeout:
+        written = entry.value.text if isinstance(entry.value, Scalar) else seconds
+        message = f"'{service.use.name}' waits up to {written}, but the test's timeout of {timeout:g} s ends it first"
         hint = "make the timeout longer, so that the evaluator can judge"
         yield Diagnostic(entry.value.span, "short-timeout", message, hint, "warning")

@@ -23,7 +23,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     rig = context.rig
     if rig is None:
         hint = did_you_mean(spec.rig, [EMULATED, *context.deployment.rigs])
-        yield Diagnostic(spec.span("rig"), "unknown-rig", f"there is no rig '{spec.rig}'", hint)
+        yield Diagnostic(spec.span("rig"), "unknown-rig", f"unknown rig '{spec.rig}'", hint)
     elif not rig.is_emulated and spec.isolation == "network":
         message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have a network of its own"
         hint = "remove 'isolation'" if "isolation" in spec.spans else "run it without --isolation"

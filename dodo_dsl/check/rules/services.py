@@ -14,11 +14,12 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for use in context.spec.uses:
         if use.uses.text not in context.manifests:
             hint = did_you_mean(use.uses.text, context.manifests)
-            yield Diagnostic(use.uses.span, "unknown-service", f"there is no service '{use.uses.text}'", hint)
+            yield Diagnostic(use.uses.span, "unknown-service", f"unknown service '{use.uses.text}'", hint)
         if use.name == "sandbox" or use.name.startswith("dodo-"):
-            message = f"the name '{use.name}' is kept for DoDo's own services"
-            yield Diagnostic(use.span, "service-reserved", message, "choose another; 'sandbox' and 'dodo-...' are kept")
+            message = f"the name '{use.name}' is reserved for DoDo's own services"
+            hint = "choose another; 'sandbox' and 'dodo-...' are reserved"
+            yield Diagnostic(use.span, "service-reserved", message, hint)
         if use.name in first_layer:
-            message = f"the name '{use.name}' stands in layer {first_layer[use.name]} already"
-            yield Diagnostic(use.span, "service-taken", message, "services of a test have names of their own")
+            message = f"the name '{use.name}' is already used in layer {first_layer[use.name]}"
+            yield Diagnostic(use.span, "service-taken", message, "the names of a test's services are unique")
         first_layer.setdefault(use.name, use.layer)

@@ -1,4 +1,4 @@
-"""What a service is told: its CID, by flag or by variable, and its image."""
+"""A service's CID, by flag or by variable, and its image."""
 
 from typing import Any
 
@@ -8,8 +8,8 @@ from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.plan.rewrite.service_copy import Copy
 
 
-def tell_image(copy: Copy) -> None:
-    """The image of the file, unless a pipeline hands another one."""
+def assign_image(copy: Copy) -> None:
+    """The image of the file, unless a pipeline gives another one."""
     service, variable = copy.service, image_variable(copy.name)
     if service.get("image") is None and "build" not in service:
         return
@@ -17,24 +17,24 @@ def tell_image(copy: Copy) -> None:
     copy.note(f"image from {variable}, where it is set")
 
 
-def tell_cid(copy: Copy, in_files: tuple[str, ...]) -> None:
+def assign_cid(copy: Copy, in_files: tuple[str, ...]) -> None:
     """The CID everywhere it was written, and over what ``env_file`` would set."""
-    service, cid, told = copy.service, copy.setting.cid, []
+    service, cid, assigned = copy.service, copy.setting.cid, []
     for key in ("entrypoint", "command"):
         before = service.get(key)
         if before is not None:
             service[key] = after = _command(before, cid)
-            told.extend([f"--cid={cid}"] if opendlv_flags.takes_cid(_words(after), {}) else [])
+            assigned.extend([f"--cid={cid}"] if opendlv_flags.takes_cid(_words(after), {}) else [])
     check = service.get("healthcheck")
     if isinstance(check, dict) and check.get("test") is not None:
         service["healthcheck"] = {**check, "test": _command(check["test"], cid)}
-    told.extend(_tell_environment(service, cid, in_files))
-    if told:
-        copy.note(", ".join(dict.fromkeys(told)))
+    assigned.extend(_assign_environment(service, cid, in_files))
+    if assigned:
+        copy.note(", ".join(dict.fromkeys(assigned)))
 
 
 def _command(command: Any, cid: int) -> Any:
-    """A command with its CID, a text staying a text: compose splits it after it knows the variables."""
+    """A command with its CID, a string staying a string: compose splits it once it knows the variables."""
     if isinstance(command, str):
         return opendlv_flags.with_cid_text(command, cid)
     before = [text(word) for word in command]
@@ -45,8 +45,8 @@ def _words(command: Any) -> list[str]:
     return [command] if isinstance(command, str) else command
 
 
-def _tell_environment(service: dict[str, Any], cid: int, in_files: tuple[str, ...]) -> list[str]:
-    """Changes ``environment``, which keeps its form, and returns what was told."""
+def _assign_environment(service: dict[str, Any], cid: int, in_files: tuple[str, ...]) -> list[str]:
+    """Changes ``environment``, which keeps its form, and returns the assignments."""
     raw = service.get("environment") or {}
     if isinstance(raw, list):
         pairs: dict[str, Any] = {str(item).partition("=")[0]: str(item) for item in raw}

@@ -1,11 +1,11 @@
-"""What a service has of the machine: hardware, privilege, and what compose would do outside of the test."""
+"""Removes what a service would take of the machine: hardware, privileges, names, ports, restarts."""
 
 from dodo_dsl.application import host_access
 from dodo_dsl.plan.rewrite.service_copy import Copy
 
 _REMOVED = {
     "container_name": "the project names it",
-    "restart": "an end is an end",
+    "restart": "containers are not restarted",
     "ports": "nothing is published",
     "cgroup_parent": "",
     "cgroup": "",
@@ -17,8 +17,8 @@ _REMOVED = {
 _DEPLOY = ("replicas", "mode", "restart_policy", "placement", "update_config", "rollback_config")
 
 
-def let_go(copy: Copy) -> None:
-    """Names, ports and policies that belong to a machine, not to a test; each service runs once."""
+def remove_machine_settings(copy: Copy) -> None:
+    """Names, ports and policies of a machine; each service of a test runs once."""
     for key, why in _REMOVED.items():
         copy.remove(key, why)
     scale, deploy = copy.service.pop("scale", None), copy.service.get("deploy")
@@ -34,16 +34,16 @@ def let_go(copy: Copy) -> None:
         copy.note(f"once, not {scale} times")
 
 
-def take_hardware(copy: Copy) -> None:
-    """Devices where there are none; privilege unless the rig allows it."""
+def remove_hardware(copy: Copy) -> None:
+    """Devices where there is no rig; privileges unless the rig allows them."""
     service, setting = copy.service, copy.setting
     allowed = setting.hil and setting.privileged_allowed
     if not allowed:
         if host_access.is_true(service.get("privileged", False)):
             copy.remove("privileged")
         service.pop("privileged", None)
-        _take_capabilities(copy)
-        _take_unconfined(copy)
+        _remove_capabilities(copy)
+        _remove_unconfined(copy)
         build = service.get("build")
         if isinstance(build, dict) and "privileged" in build:
             service["build"] = {key: value for key, value in build.items() if key != "privileged"}
@@ -62,7 +62,7 @@ def take_hardware(copy: Copy) -> None:
     copy.keep_items("volumes", kept)
 
 
-def _take_capabilities(copy: Copy) -> None:
+def _remove_capabilities(copy: Copy) -> None:
     words = copy.service.get("cap_add") or []
     taken = [w for w in words if host_access.capability(w) in host_access.MACHINE_CAPABILITIES]
     copy.keep_items("cap_add", [w for w in words if w not in taken])
@@ -70,7 +70,7 @@ def _take_capabilities(copy: Copy) -> None:
         copy.note(f"capabilities removed: {', '.join(map(str, taken))}")
 
 
-def _take_unconfined(copy: Copy) -> None:
+def _remove_unconfined(copy: Copy) -> None:
     words = copy.service.get("security_opt") or []
     kept = [w for w in words if "unconfined" not in str(w)]
     copy.keep_items("security_opt", kept)

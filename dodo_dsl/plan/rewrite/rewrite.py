@@ -5,21 +5,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import source
 from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
-from dodo_dsl.application.model import KEYS, ApplicationSource, environment, plain, text
-from dodo_dsl.application.service_environment import env_files, told_in_files
+from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, environment, plain, text
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.plan.rewrite import cid_and_image, removals, service_namespaces, volumes
 from dodo_dsl.plan.rewrite.service_copy import Copy, Setting
+from dodo_dsl.source import Node
 
 _STEPS: tuple[Callable[[Copy], None], ...] = (
-    cid_and_image.tell_image,
-    removals.let_go,
-    removals.take_hardware,
-    service_namespaces.give_spaces,
+    cid_and_image.assign_image,
+    removals.remove_machine_settings,
+    removals.remove_hardware,
+    service_namespaces.own_namespaces,
     volumes.own_mounts,
-    service_namespaces.give_order,
+    service_namespaces.own_dependencies,
 )
 _NOT_CARRIED = ("COMPOSE_", "DODO_")
 
@@ -49,49 +48,47 @@ def plan_application(
         return compose_paths.rebased(path, base)
 
     services = {
-        name: _copied(
-            name, compose_paths.mapped_service(node, change), told_in_files(node, application.folder), setting, changes
-        )
-        for name, node in application.services.items()
+        name: _copied(service, compose_paths.mapped_service(service.node, change), setting, changes)
+        for name, service in application.services.items()
     }
     rest = {key: plain(node) for key, node in compose_paths.mapped_rest(application.rest, change).items()}
     if "volumes" in rest:
         rest["volumes"] = volumes.own_volumes(rest["volumes"], changes)
-    planned = tuple(_planned(name, node, application.folder, cid) for name, node in application.services.items())
+    planned = tuple(_planned(service, cid) for service in application.services.values())
     carried = _carried(application, cid, base, path_variables)
     return Application(base, planned, {"services": services, **rest}, tuple(changes), carried)
 
 
-def _copied(
-    name: str, node: source.Mapping, in_files: tuple[str, ...], setting: Setting, changes: list[str]
-) -> dict[str, Any]:
-    copy = Copy(name, {key: value for key, value in plain(node).items() if key not in KEYS}, setting, changes)
-    cid_and_image.tell_cid(copy, in_files)
+def _copied(service: ComposeService, node: Node, setting: Setting, changes: list[str]) -> dict[str, Any]:
+    kept = {key: value for key, value in plain(node).items() if key not in KEYS}
+    copy = Copy(service.name, kept, setting, changes)
+    cid_and_image.assign_cid(copy, service.cid_variables)
     for step in _STEPS:
         step(copy)
     return copy.service
 
 
-def _planned(name: str, node: source.Mapping, folder: Path, cid: int) -> ApplicationService:
+def _planned(service: ComposeService, cid: int) -> ApplicationService:
     """The service as the process backend starts it."""
-    service = plain(node)
-    raw = service.get("command")
-    command = opendlv_flags.split(raw) if isinstance(raw, str) else tuple(text(word) for word in raw or ())
-    told_variables = {
-        k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in environment(service.get("environment")).items()
+    raw = plain(service.node)
+    written = raw.get("command")
+    command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
+    variables = {
+        k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in environment(raw.get("environment")).items()
     }
-    in_files = told_in_files(node, folder)
-    told_variables.update({v: str(cid) for v in opendlv_flags.CID_VARIABLES if v in told_variables or v in in_files})
-    process = service.get("x-dodo-process")
+    for name in opendlv_flags.CID_VARIABLES:
+        if name in variables or name in service.cid_variables:
+            variables[name] = str(cid)
+    process = raw.get("x-dodo-process")
     words = (*(process or ()), *command)
     return ApplicationService(
-        name=name,
+        name=service.name,
         process=tuple(str(w) for w in process) if process else None,
         command=opendlv_flags.with_cid(command, cid),
-        environment=told_variables,
-        takes_cid=opendlv_flags.takes_cid((*words, *(v for v in told_variables.values() if v)), told_variables),
+        environment=variables,
+        takes_cid=opendlv_flags.takes_cid((*words, *(v for v in variables.values() if v)), variables),
         takes_memory=opendlv_flags.takes_memory(words),
-        env_files=tuple(word.text for word, _ in env_files(node)),
+        env_files=tuple(file.path for file in service.env_files),
     )
 
 

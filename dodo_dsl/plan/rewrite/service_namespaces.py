@@ -7,7 +7,7 @@ from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.plan.rewrite.service_copy import Copy
 
 
-def give_spaces(copy: Copy) -> None:
+def own_namespaces(copy: Copy) -> None:
     """The namespaces of a test; references between the application's services hold on."""
     for key in host_access.NAMESPACES:
         _own_reference(copy, key)
@@ -77,7 +77,7 @@ def _without_network(sysctls: Any) -> Any:
     return [item for item in sysctls if not str(item).startswith("net.")]
 
 
-def give_order(copy: Copy) -> None:
+def own_dependencies(copy: Copy) -> None:
     """``depends_on`` of services that start, and of DoDo's that must be ready before."""
     service, setting = copy.service, copy.setting
     raw = service.get("depends_on") or {}

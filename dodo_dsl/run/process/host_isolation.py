@@ -49,15 +49,14 @@ def runs_alone(plan: Plan) -> bool:
 
 @contextlib.asynccontextmanager
 async def host_lane(
-    plan: Plan, cids: Sequence[int], say: Callable[[str], None], keep: bool = False
+    plan: Plan, cids: Sequence[int], say: Callable[[str], None], keep: bool = False, *, alone: bool
 ) -> AsyncIterator[Lane]:
     """A lane on the host's network: a leased CID that nobody else talks on, and a prefix of shared memory.
 
-    An application that takes no CID or no memory name runs alone on the machine. With ``keep`` the leases pass on to
-    the sandbox, which holds them until it is taken down. Raises BackendError when no lane
-    comes free, or when its only CID carries foreign traffic.
+    With ``alone`` it is the only one on the machine, as an application needs that takes no CID or no memory name.
+    With ``keep`` the leases pass on to the sandbox, which holds them until it is taken down. Raises BackendError when
+    no slot comes free, or when its only CID carries foreign traffic.
     """
-    alone = runs_alone(plan)
     name = f"dodo-{secrets.token_hex(4)}-"
     about = {"test": plan.slug, "lane": name}
     held: list[leases.Lease] = []

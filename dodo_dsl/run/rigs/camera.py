@@ -7,8 +7,8 @@ from pathlib import Path
 from dodo_dsl.plan.emulated_rig import CAMERA, DRAWN, hardware
 from dodo_dsl.plan.model import Flag, Service
 from dodo_dsl.run.rigs.rigs import RigProblem
-from dodo_dsl.spec import arguments
-from dodo_dsl.spec.manifest import Manifest
+from dodo_dsl.spec.arguments import Argument, resolved
+from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.values import ValueProblem, convert, default_value
@@ -37,11 +37,7 @@ def look(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> Look
         raise RigProblem("the emulated rig's camera sees the map of a test: name one with --test", usage=True)
     if use is None and rig.entry("camera.source") is None:
         raise RigProblem(f"rig '{rig.name}' has no camera in dodo.yml", usage=True)
-    try:
-        flags = _flags(rig, manifests[CAMERA], spec, use)
-    except ValueProblem as problem:
-        span = problem.diagnostic.span
-        raise RigProblem(f"{span.file}:{span.line}:{span.column}: {problem}", usage=True) from None
+    flags = _flags(rig, manifests[CAMERA], spec, use)
     real = Service("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
     service = hardware(real, manifests, "")
     words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags)
@@ -49,22 +45,32 @@ def look(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> Look
 
 
 def _flags(rig: Rig, manifest: Manifest, spec: Spec | None, use: Use | None) -> tuple[Flag, ...]:
-    flags = []
-    for parameter in manifest.parameters.values():
-        if spec and use:
-            value = arguments.value(spec, use, parameter, rig)
-        else:
-            entry = rig.entry(parameter.rig) if parameter.rig else None
-            value = convert(parameter, entry.value, Path.cwd()) if entry else default_value(parameter)
-        if value is not None:
-            flags.append(Flag(parameter.name, str(value.path or value.text)))
-    return tuple(flags)
+    if spec and use:
+        given = list(resolved(spec, use, manifest, rig).arguments.values())
+    else:
+        given = [_of_rig(rig, parameter) for parameter in manifest.parameters.values()]
+    for argument in given:
+        if argument.problem:
+            span = argument.problem.span
+            raise RigProblem(f"{span.file}:{span.line}:{span.column}: {argument.problem.message}", usage=True)
+    values = ((argument.parameter.name, argument.value) for argument in given if argument.value)
+    return tuple(Flag(name, str(value.path or value.text)) for name, value in values)
+
+
+def _of_rig(rig: Rig, parameter: Parameter) -> Argument:
+    entry = rig.entry(parameter.rig) if parameter.rig else None
+    if entry is None:
+        return Argument(parameter, None, default_value(parameter))
+    try:
+        return Argument(parameter, entry, convert(parameter, entry.value, Path.cwd()))
+    except ValueProblem as problem:
+        return Argument(parameter, entry, None, problem.diagnostic)
 
 
 def judged_classes(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec) -> list[str]:
     """The classes that count in a test; empty when it names none."""
     texts = (
-        arguments.texts(spec, use, manifests[use.uses.text], rig).get("classes", "")
+        resolved(spec, use, manifests[use.uses.text], rig).texts.get("classes", "")
         for use in spec.uses
         if use.layer == "evaluation" and use.uses.text in manifests
     )

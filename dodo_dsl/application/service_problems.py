@@ -1,7 +1,7 @@
 """What keeps a compose file from being an application: names, words, references, and what cannot be isolated.
 
 ``application-isolation``: something of the machine that tests would share. ``application-hardware``: hardware that is
-not there without a rig, so it is left out. ``application-cid``: no service can be told which bus to use.
+not there without a rig, so it is left out. ``application-cid``: no service takes a CID.
 """
 
 import functools
@@ -11,7 +11,7 @@ from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import host_access, opendlv_flags
-from dodo_dsl.application.model import KEYS, SANDBOX, plain
+from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, plain
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.source import Node, Scalar
 
@@ -30,6 +30,12 @@ class Written:
     dropped: Mapping[str, str]
     containers: dict[str, str]
     volumes: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, service: ComposeService, application: ApplicationSource, volumes: Mapping[str, Any]) -> "Written":
+        """The service among the others of its application; ``volumes`` are the application's named ones."""
+        others, containers = frozenset(application.services), dict(application.containers)
+        return cls(service.name, service.node, service.span, others, application.dropped, containers, volumes)
 
     @functools.cached_property
     def plain(self) -> dict[str, Any]:
@@ -66,7 +72,7 @@ def unknown_keys(service: Node) -> Iterator[Diagnostic]:
 def _name(written: Written) -> Iterator[Diagnostic]:
     name = written.name
     if name == SANDBOX or name.startswith("dodo-"):
-        yield _bad(written.key, f"the name '{name}' is kept for DoDo's own services")
+        yield _bad(written.key, f"the name '{name}' is reserved for DoDo's own services")
     if not any(written.plain.get(key) for key in ("image", "build", "x-dodo-process")):
         yield _bad(written.key, f"'{name}' has neither 'image' nor 'build', so nothing can be started")
 
@@ -90,7 +96,9 @@ def _references(written: Written) -> Iterator[Diagnostic]:
             yield _bad(written.place(key), message)
         else:
             hint = did_you_mean(name, written.others)
-            yield _bad(written.place(key), f"{key} of '{written.name}' names '{name}', which is no service", hint)
+            yield _bad(
+                written.place(key), f"{key} of '{written.name}' names '{name}', which is not a service of it", hint
+            )
 
 
 def _namespaces(written: Written) -> Iterator[Diagnostic]:

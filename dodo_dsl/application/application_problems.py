@@ -1,0 +1,122 @@
+"""What is wrong with an application as a whole: missing files, dependency cycles, and no service that takes a CID."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import source
+from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.host_access import references
+from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain, text
+from dodo_dsl.application.service_environment import image_variable
+from dodo_dsl.application.service_problems import Written, problems
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors
+
+INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
+
+
+def application_problems(application: ApplicationSource, first: Span) -> Iterator[Diagnostic]:
+    """Everything wrong with the services and their references; ``first`` is the place of the first service written."""
+    if not application.services:
+        message = "no service starts, for each one waits for a profile"
+        yield Diagnostic(first, "application-file", message, "give one service no 'profiles'")
+        return
+    volumes = plain(application.rest["volumes"]) if "volumes" in application.rest else {}
+    found: list[Diagnostic] = []
+    for service in application.services.values():
+        found.extend(problems(Written.of(service, application, volumes or {})))
+        found.extend(_missing_files(service, application.folder))
+        found.extend(_missing_program(service, application.folder))
+    found.extend(_cycles(application))
+    found.extend(_same_variable(application))
+    yield from found
+    if not has_errors(found):
+        yield from _without_cid(application)
+
+
+def _missing_files(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
+    for file in service.env_files:
+        is_local = not file.path.startswith(("/", "~")) and "$" not in file.path
+        if file.required and is_local and not (folder / file.path).is_file():
+            hint = "write it, or {path: ..., required: false}"
+            yield Diagnostic(file.span, "application-file", f"there is no file '{file.path}' beside this one", hint)
+
+
+def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
+    """A script of ``x-dodo-process`` that is not there; other programs may be built later, or lie in the PATH."""
+    process = service.node.get("x-dodo-process")
+    words = process.items if isinstance(process, source.Sequence) else ()
+    if len(words) < 2 or plain(words[0]) not in INTERPRETERS:
+        return
+    script = words[1]
+    name = script.text if isinstance(script, source.Scalar) else ""
+    if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
+        message = f"there is no file '{name}' beside this one for {plain(words[0])} to run"
+        beside = [path.name for path in folder.iterdir() if path.suffix == Path(name).suffix]
+        hint = did_you_mean(Path(name).name, beside) or "without it the application starts in containers only"
+        yield Diagnostic(script.span, "application-file", message, hint, "warning")
+
+
+def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
+    """Services that wait for themselves, directly or through others."""
+    containers = dict(application.containers)
+    needs = {
+        name: {other for _, other in references(plain(s.node), containers) if other in application.services}
+        for name, s in application.services.items()
+    }
+    waiting = set(_never_ready(needs))
+    wanted_by: dict[str, set[str]] = {name: set() for name in needs}
+    for name in waiting:
+        for other in needs[name]:
+            wanted_by[other].add(name)
+    cycle = [name for name in _never_ready(wanted_by) if name in waiting]
+    if cycle:
+        message = f"services wait for one another: {', '.join(cycle[:6])}{', ...' if len(cycle) > 6 else ''}"
+        yield Diagnostic(
+            application.services[cycle[0]].span, "application-file", message, "one of them must start first"
+        )
+
+
+def _never_ready(needs: Mapping[str, set[str]]) -> Iterator[str]:
+    """Those that wait for themselves, or for such a one."""
+    left = {name: len(others) for name, others in needs.items()}
+    wanted_by: dict[str, list[str]] = {}
+    for name, others in needs.items():
+        for other in others:
+            wanted_by.setdefault(other, []).append(name)
+    ready = [name for name, count in left.items() if not count]
+    while ready:
+        for name in wanted_by.get(ready.pop(), ()):
+            left[name] -= 1
+            if not left[name]:
+                ready.append(name)
+    yield from (name for name, count in left.items() if count)
+
+
+def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
+    seen: dict[str, str] = {}
+    for name in application.services:
+        other = seen.setdefault(image_variable(name), name)
+        if other != name:
+            message = f"'{name}' and '{other}' would both take their image from {image_variable(name)}"
+            yield Diagnostic(application.services[name].span, "application-file", message, "rename one of them")
+
+
+def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
+    """A warning when no service takes a CID."""
+    if any(map(_takes_cid, application.services.values())):
+        return
+    first = next(iter(application.services.values())).span
+    message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so each test runs with the one built in"
+    yield Diagnostic(first, "application-cid", message, "add --cid=111 to its command", "warning")
+
+
+def _takes_cid(service: ComposeService) -> bool:
+    raw = plain(service.node)
+    variables = environment(raw.get("environment"))
+    words = [*_words(raw.get("entrypoint")), *_words(raw.get("command")), *(v for v in variables.values() if v)]
+    return opendlv_flags.takes_cid(words, {**variables, **dict.fromkeys(service.cid_variables)})
+
+
+def _words(command: Any) -> list[str]:
+    return [command] if isinstance(command, str) else [text(word) for word in command or ()]

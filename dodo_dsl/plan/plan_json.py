@@ -1,0 +1,118 @@
+"""A Plan as JSON, in ``test.json``."""
+
+import dataclasses
+import json
+import re
+from typing import Any, get_args
+
+import orjson
+
+from dodo_dsl.plan.model import (
+    LAYERS,
+    Application,
+    ApplicationService,
+    Flag,
+    FlagKind,
+    Lockstep,
+    Place,
+    Plan,
+    Service,
+    is_device,
+)
+from dodo_dsl.spec.settings import Settings
+
+FORMAT = 1
+_SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+
+
+class PlanError(ValueError):
+    """A ``test.json`` that this version cannot read."""
+
+
+def to_json(plan: Plan) -> str:
+    own = {field.name: getattr(plan, field.name) for field in dataclasses.fields(plan)}
+    document = {"dodo": "plan", "version": FORMAT, **own}
+    return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE).decode()
+
+
+def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008  (it is frozen)
+    """The Plan that ``to_json`` wrote, with the settings' seed and wall timeout; raises PlanError for anything else."""
+    try:
+        raw = json.loads(text)
+        if raw.pop("dodo") != "plan" or raw.pop("version") != FORMAT:
+            raise PlanError(f"not a plan of version {FORMAT}; compile the test again")
+        raw["services"] = tuple(_service(s) for s in raw["services"])
+        application = raw["application"]
+        application["services"] = tuple(_application_service(s) for s in application["services"])
+        application["changes"] = tuple(application["changes"])
+        raw["application"] = Application(**application)
+        if settings.seed is not None:
+            raw["seed"] = settings.seed
+        if settings.wall_timeout_s is not None and raw["lockstep"]:
+            raw["lockstep"]["wall_timeout_s"] = settings.wall_timeout_s
+        raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
+        raw["messages"] = tuple(raw["messages"])
+        raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
+        plan = Plan(**raw)
+        problem = _problem(plan)
+    except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
+        raise PlanError(f"not a compiled test ({error}); compile it again") from error
+    if problem:
+        raise PlanError(f"not a compiled test ({problem}); compile it again")
+    return plan
+
+
+def _problem(plan: Plan) -> str:
+    """What no compiled test holds: JSON has no types of its own."""
+    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.rig, plan.application.folder)
+    services: list[Service | ApplicationService] = [*plan.services, *plan.application.services]
+    rules = {
+        "slug": isinstance(plan.slug, str) and bool(_SLUG.fullmatch(plan.slug)),
+        "a string": all(isinstance(text, str) and "\0" not in text for text in texts),
+        "level": plan.level in ("sil", "dil", "hil"),
+        "isolation": plan.isolation in ("network", "host"),
+        "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
+        "cid": isinstance(plan.cid, int) and 1 <= plan.cid <= 254,
+        "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
+        "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
+        "messages": all(_is_inside(path) for path in plan.messages),
+        "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
+        "a service's layer": all(s.layer in LAYERS for s in plan.services),
+        "a flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
+        "a set-up": all(isinstance(s.setup_s, int | float) and 0 <= s.setup_s <= 86_400 for s in plan.services),
+        "a device": all(is_device(d) for s in plan.services for d in s.devices),
+        "a word": all(isinstance(w, str) for s in services for w in s.process or ())
+        and all(isinstance(w, str) for s in plan.application.services for w in s.command),
+        "an environment": all(isinstance(s.environment, dict) for s in plan.application.services),
+        "a variable": all(isinstance(v, str) for v in plan.application.variables.values()),
+        "a file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
+    }
+    return next((name for name, holds in rules.items() if not holds), "")
+
+
+def _is_lockstep(lockstep: Lockstep) -> bool:
+    numbers = isinstance(lockstep.readers, int) and isinstance(lockstep.wall_timeout_s, int | float)
+    return numbers and 1 <= lockstep.readers <= 1000 and 0 < lockstep.wall_timeout_s <= 10 * 86_400 + 60
+
+
+def _is_flag(flag: Flag) -> bool:
+    kinds = get_args(FlagKind)
+    plain = isinstance(flag.name, str) and isinstance(flag.value, str) and isinstance(flag.kind, str)
+    inside = flag.kind not in ("path", "report") or _is_inside(flag.value)
+    return plain and flag.kind in kinds and inside
+
+
+def _is_inside(path: object) -> bool:
+    return isinstance(path, str) and ".." not in path.split("/") and not path.startswith("/")
+
+
+def _service(raw: dict[str, Any]) -> Service:
+    words = {key: tuple(raw[key]) for key in ("process", "devices")}
+    return Service(**{**raw, **words, "flags": tuple(Flag(**f) for f in raw["flags"])})
+
+
+def _application_service(raw: dict[str, Any]) -> ApplicationService:
+    process = raw["process"]
+    words = {"process": None if process is None else tuple(process), "command": tuple(raw["command"])}
+    return ApplicationService(**{**raw, **words, "env_files": tuple(raw["env_files"])})

@@ -1,0 +1,25 @@
+"""The Plans that a run carries out: each test as often as it is repeated."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from dodo_dsl.plan.model import Plan
+
+
+@dataclass(frozen=True)
+class Run:
+    """One repetition of a test; ``test`` is the slug that all of its repetitions share, and the compiled folder's."""
+
+    plan: Plan
+    test: str
+
+
+def runs(plans: Sequence[Plan], repeat: int) -> list[Run]:
+    """Each Plan ``repeat`` times, round by round; from the second round on, name and slug carry its number."""
+    return [Run(_repetition(plan, number), plan.slug) for number in range(1, repeat + 1) for plan in plans]
+
+
+def _repetition(plan: Plan, number: int) -> Plan:
+    if number == 1:
+        return plan
+    return replace(plan, name=f"{plan.name}[run={number}]", slug=f"{plan.slug}--run-{number}")
