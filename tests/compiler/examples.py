@@ -70,5 +70,5 @@ def problems(folder: Path) -> list[Diagnostic]:
     checked = compiler.load([], start=folder)
     found = list(checked.diagnostics)
     if checked.ok:
-        found.extend(compiler.plan(checked, folder / "generated")[1])
+        found.extend(compiler.plan(checked, folder / "generated").problems)
     return found

@@ -12,7 +12,8 @@ import pytest
 
 from dodo_dsl import compiler
 from dodo_dsl.cli.main import main
-from dodo_dsl.emit.render import render
+from dodo_dsl.emit.pipeline import CHILD
+from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.plan_json import from_json, to_json
 
 ROOT = Path(__file__).parents[2]
@@ -43,9 +44,11 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     checked = compiler.load([])
-    compiled, problems = compiler.plan(checked, Path("generated"))
-    assert not problems
-    files = {file.path: file.text for file in render(compiled.suite, "generated")}
+    made = compiler.plan(checked, Path("generated"))
+    assert not made.problems
+    first = {plan.spec: plan.slug for plan in reversed(made.compiled.suite.plans)}  # one instance of a matrix
+    plans = [plan for plan in made.compiled.suite.plans if first[plan.spec] == plan.slug]
+    files = {file.path: file.text for plan in plans for file in render_plan(plan)} | {CHILD: made.pipeline.text}
     if update_goldens:
         shutil.rmtree(GOLDEN, ignore_errors=True)
         for path, text in files.items():
