@@ -21,8 +21,8 @@ def plan() -> Plan:
         patch.chdir(ROOT)
         checked = compiler.load([ROOT / "tests_registry/sil-closed-straight"])
         made = compiler.plan(checked, ROOT / "generated")
-    assert not problems
-    return compiled.suite.plans[0]
+    assert not made.problems
+    return made.compiled.suite.plans[0]
 
 
 @pytest.fixture(scope="session")

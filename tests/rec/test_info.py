@@ -96,6 +96,20 @@ def test_the_set_by_content_or_flag(record: Callable[..., Path]) -> None:
     assert forced["messages"][0]["name"] is None
 
 
+@pytest.mark.parametrize(
+    ("id_", "version", "name"),
+    [
+        (1032, "1.0", "opendlv.proxy.MagneticFieldReading"),
+        (1118, "0.9", "opendlv.logic.sensation.Orientation"),
+        (49, "1.0", "opendlv.proxy.PointCloudReading"),
+    ],
+)
+def test_messages_of_either_set(id_: int, version: str, name: str, record: Callable[..., Path]) -> None:
+    three = message("opendlv.proxy.AccelerationReading", BEGIN)._replace(data_type=id_)
+    lines = dodo_rec("info", record([three])).stdout.splitlines()
+    assert f"message set {version}" in lines and lines[-1].split()[:2] == [str(id_), name]
+
+
 def test_own_messages(record: Callable[..., Path], tmp_path: Path) -> None:
     (tmp_path / "own.odvd").write_text("message team.Cone [id = 1144] { float x [id = 1]; }")
     path = record([message(STEERING, BEGIN)._replace(data_type=1144)])

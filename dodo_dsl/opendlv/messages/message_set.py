@@ -2,7 +2,7 @@
 
 import builtins
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -42,17 +42,16 @@ class MessageSet:
         return _standard()
 
     @classmethod
-    def load(cls, *paths: Path) -> "MessageSet":
+    def load(cls, *paths: Path, standard: Sequence[Definition] = ()) -> "MessageSet":
         """The standard messages and those of the files, which replace standard ones of the same name or id.
 
-        Raises OdvdError, also where two of the files disagree or use DoDo's own ids.
+        Other messages than those that DoDo knows by itself may be the standard. Raises OdvdError, also where two of
+        the files disagree or use DoDo's own ids.
         """
-        if not paths:
+        if not paths and not standard:
             return _standard()
         own = _merged(definition for path in paths for definition in parser.load(path))
-        names, ids = {d.name for d in own}, {d.id for d in own}
-        kept = [d for d in parser.load(STANDARD) if d.name not in names and d.id not in ids]
-        return cls([*kept, *own])
+        return cls([*besides(own, standard or shipped()), *own])
 
     def names(self) -> tuple[str, ...]:
         """All full names, sorted."""
@@ -104,9 +103,21 @@ class MessageSet:
         return f"there is no message `{key}`" + (f": did you mean `{close[0]}`?" if close else "")
 
 
+def besides(first: Iterable[Definition], others: Iterable[Definition]) -> list[Definition]:
+    """Those of the others whose name and id no message of the first has."""
+    taken = {key for definition in first for key in (definition.name, definition.id)}
+    return [definition for definition in others if taken.isdisjoint((definition.name, definition.id))]
+
+
+@cache
+def shipped() -> tuple[Definition, ...]:
+    """The messages that DoDo knows by itself, read once."""
+    return parser.load(STANDARD)
+
+
 @cache
 def _standard() -> MessageSet:
-    return MessageSet(parser.load(STANDARD))
+    return MessageSet(shipped())
 
 
 def _merged(definitions: Iterable[Definition]) -> list[Definition]:

@@ -1,0 +1,148 @@
+"""The shipped sets: whole, without clashes, each with the other's messages where ids and names are free."""
+
+import struct
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages import versions
+from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet
+from dodo_dsl.opendlv.messages.versions import NEW, OLD
+from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9, parser
+from dodo_dsl.opendlv.recordings.recording import Recording
+
+SETS = {version: versions.load(version) for version in (OLD, NEW)}
+PROXY, SENSATION, PERCEPTION = "opendlv.proxy.", "opendlv.logic.sensation.", "opendlv.logic.perception."
+WHOLE = {
+    # 1.0 of March 2024
+    STANDARD: [
+        *(19, 1002, 1003, 1004, 1010, 1011, 1014, 1015, 1016, 1017, 1020, 1021, *range(1029, 1044), *range(1045, 1049)),
+        *(1050, 1051, 1054, 1055, 1056, 1060, 1061, *range(1079, 1097), *range(1100, 1105), 1110, 1111, 1116, 1117),
+        *(1119, *range(1130, 1137), 1171, 1172, 1173, 1180, 1181),
+    ],
+    # 0.9.1 to 0.9.10, without what 1.0 has in the same way
+    STANDARD_0_9: [
+        *(14, 19, 28, 49, 1001, 1017, *range(1021, 1025), 1051, 1055, 1101, 1118, *range(1128, 1137)),
+        *(*range(1140, 1144), 1180, 1181, 1191, 1192),
+    ],
+}
+
+
+def floats(*values: float) -> bytes:
+    """Fields 1, 2, 3 and so on of a payload that holds numbers only."""
+    return b"".join(bytes([number << 3 | 5]) + struct.pack("<f", value) for number, value in enumerate(values, 1))
+
+
+@pytest.mark.parametrize("path", WHOLE, ids=lambda path: path.name)
+def test_a_file_holds_every_message_of_its_set(path: Path) -> None:
+    standard = [d.id for d in parser.load(path) if d.name.startswith("opendlv.")]
+    assert sorted(standard) == sorted(WHOLE[path])
+
+
+@pytest.mark.parametrize("version", SETS)
+def test_names_and_ids_are_unique(version: str) -> None:
+    messages = SETS[version]
+    assert len(messages.names()) == len(messages.ids())
+    assert [messages.id(messages.name(id_)) for id_ in messages.ids()] == list(messages.ids())
+    assert {messages.name(id_).startswith("dodo.") for id_ in messages.ids() & set(OWN_IDS)} == {True}
+    assert not any(messages.name(id_).startswith("dodo.") for id_ in messages.ids() - set(OWN_IDS))
+
+
+@pytest.mark.parametrize(
+    ("id_", "old", "new"),
+    [
+        (14, PROXY + "ImageReadingShared", PROXY + "ImageReadingShared"),
+        (19, PROXY + "GeodeticWgs84Reading", PROXY + "GeodeticWgs84PositionReading"),
+        (49, PROXY + "PointCloudReading", PROXY + "PointCloudReading"),
+        (1001, "opendlv.sim.Frame", None),
+        (1003, None, "opendlv.sim.Frame"),
+        (1017, SENSATION + "Equilibrioception", "opendlv.meta.CalibrationExtrinsic"),
+        (1021, "opendlv.body.ComponentInfo", "opendlv.meta.FrameShape"),
+        (1032, PROXY + "MagneticFieldReading", PROXY + "MagneticFieldReading"),
+        (1043, PROXY + "StateOfChargeReading", PROXY + "StateOfChargeReading"),
+        (1051, PROXY + "GeodeticHeadingReading", PROXY + "GeodeticWgs84HeadingReading"),
+        (1101, "opendlv.system.SystemOperationState", "opendlv.system.SystemStatusMessage"),
+        (1118, SENSATION + "Orientation", None),
+        (1119, None, SENSATION + "Orientation"),
+        (1128, PERCEPTION + "ObjectFrameStart", PERCEPTION + "ObjectFrameStart"),
+        (1130, PERCEPTION + "Object", PERCEPTION + "DetectionType"),
+        (1140, PERCEPTION + "GroundSurface", PERCEPTION + "GroundSurface"),
+        (1180, "opendlv.logic.action.GeodeticPath", "opendlv.logic.action.GlobalPath"),
+    ],
+)
+def test_what_an_id_means_in_each_set(id_: int, old: str | None, new: str | None) -> None:
+    for version, name in ((OLD, old), (NEW, new)):
+        assert (id_ in SETS[version].ids()) == (name is not None)
+        assert name is None or SETS[version].name(id_) == name
+
+
+@pytest.mark.parametrize(
+    ("id_", "payload", "fields"),
+    [
+        (1017, floats(1, 2, 3, 4, 5, 6), {"vx": 1, "vy": 2, "vz": 3, "rollRate": 4, "pitchRate": 5, "yawRate": 6}),
+        (1021, b"\x0a\x01a\x15\0\0\x80\x3f\x1d\0\0\0\x40\x25\0\0\0\0", {"description": "a", "x": 1, "y": 2, "z": 0}),
+        (1055, b"\x0a\x04h264\x10\x20\x18\x10\x22\x01x", {"fourcc": "h264", "width": 32, "height": 16, "data": b"x"}),
+        (1118, floats(1, 0, -2), {"roll": 1, "pitch": 0, "yaw": -2}),
+        (1143, b"\x08\x05" + floats(0, 1.5)[5:], {"surfaceId": 5, "x1": 1.5}),
+        (1181, b"\x08\x02\x12\x01x", {"length": 2, "data": b"x"}),
+        (
+            49,
+            floats(-90, 90) + b"\x18\x10\x22\x02ab\x28\x00",
+            {"startAzimuth": -90, "endAzimuth": 90, "distances": b"ab"},
+        ),
+    ],
+)
+def test_what_only_0_9_has_is_decoded(id_: int, payload: bytes, fields: dict[str, object]) -> None:
+    found = {field.name: value for field, value in SETS[OLD].decode(id_, payload).ListFields()}
+    assert fields.items() <= found.items()
+
+
+def test_every_id_whose_payloads_tell_the_sets_apart_is_looked_at() -> None:
+    old, new = SETS[OLD], SETS[NEW]
+    apart = old.ids() ^ new.ids() | {id_ for id_ in old.ids() & new.ids() if wire(old, id_) != wire(new, id_)}
+    assert apart - {1055} == set(versions.TELLING) - {1128, 1129}, "these two have no clash, but only 0.9 has them"
+
+
+def wire(messages: MessageSet, id_: int) -> list[tuple[int, str]]:
+    return [(field.number, field.type) for field in messages.layout(id_).definition.fields]
+
+
+@pytest.mark.parametrize(
+    ("payloads", "version"),
+    [
+        ({1118: floats(1, 2, 3)}, OLD),
+        ({1119: floats(0, 0, 0, 1)}, NEW),
+        ({1017: floats(1, 2, 3, 4, 5, 6)}, OLD),
+        ({1017: floats(1, 2, 3, 0, 0, 0, 1) + b"\x40\x07"}, NEW),
+        ({1021: b"\x0a\x01a\x12\x01b"}, NEW),
+        ({1181: b"\x08\x02\x12\x01x"}, OLD),
+        ({1181: b"\x0a\x02xy\x10\x01\x1a\x01x"}, NEW),
+        ({1032: floats(1, 2, 3), 1140: b"\x08\x01"}, NEW),  # 1140 is free in 1.0, and may be a team's own
+    ],
+)
+def test_the_set_is_told_by_its_payloads(payloads: dict[int, bytes], version: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    path.write_bytes(b"".join(encode_frame(Envelope(id_, payload, 1, 1, 1, 0)) for id_, payload in payloads.items()))
+    with Recording(path) as recording:
+        assert versions.version_of(recording) == version
+
+
+def test_own_messages_replace_those_of_either_set(tmp_path: Path) -> None:
+    own = tmp_path / "own.odvd"
+    own.write_text("message team.Lap [id = 1140] { uint32 number; } message opendlv.sim.Frame [id = 1001] { float x; }")
+    for version in SETS:
+        messages = versions.load(version, own)
+        assert messages.name(1140) == "team.Lap"
+        assert messages.id("opendlv.sim.Frame") == 1001 and 1003 not in messages.ids()
+        assert PERCEPTION + "GroundSurface" not in messages.names()
+
+
+@pytest.mark.parametrize("name", ["cones-2020-05-15.rec", "sim-2023-04-27.rec", "track-1-2025-05-08.rec"])
+def test_recordings_of_others_hold_known_messages(name: str, shared_data: Callable[[str], Path]) -> None:
+    with Recording(shared_data(name)) as recording:
+        messages = versions.load(versions.version_of(recording))
+        found = Counter(recording.index["data_type"].tolist())
+    assert set(found) - messages.ids() <= {1144}, "1144 is the author's own"
