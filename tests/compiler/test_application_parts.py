@@ -93,7 +93,7 @@ def test_files_are_merged_as_compose_merges_them(style: str, tmp_path: Path) -> 
     files = sorted(p for p in (GOOD / style).iterdir() if p.suffix == ".yml")[::-1]
     found, problems = read_application(files)
     assert found is not None, problems
-    services = {name: plain(node) for name, node in found.services.items()}
+    services = {name: plain(service.node) for name, service in found.services.items()}
     document = {"services": services, **{key: plain(node) for key, node in found.rest.items()}}
     (GOOD / style / ".merged").write_text(yaml.safe_dump(document))
     try:
