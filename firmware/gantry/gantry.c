@@ -2,13 +2,13 @@
 
 #include <string.h>
 
-#include "doubt.h"
-#include "homing.h"
-#include "judge.h"
+#include "supervision/driver_monitor.h"
+#include "motion/homing.h"
+#include "supervision/supervision.h"
 #include "line.h"
-#include "motion.h"
+#include "motion/motion.h"
 #include "port.h"
-#include "rig.h"
+#include "drivers/rig.h"
 
 static struct line line;
 static uint32_t ticked;
@@ -126,9 +126,9 @@ void gantry_tick(void)
         return;
     ticked = now;
     rig_look();
-    judge_tick();
+    supervision_tick();
     supervise_line(now);
     motion_tick(now);
-    doubt_tick(now);
+    driver_monitor_tick(now);
     homing_tick(now);
 }

@@ -85,6 +85,6 @@ def test_each_safety_rule_has_a_test_that_notices_when_it_is_weak(bench_program:
 
 def test_a_mutant_whose_text_is_gone_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     script = runpy.run_path(str(ROOT / "scripts" / "mutate-firmware"), run_name="mutate")
-    gone = script["Mutant"]("gone", "motion.c", "no such text", "", "limits")
-    with pytest.raises(ValueError, match=r"stands 0 times in motion\.c"):
+    gone = script["Mutant"]("gone", "motion/motion.c", "no such text", "", "limits")
+    with pytest.raises(ValueError, match=r"stands 0 times in motion/motion\.c"):
         script["survives"](gone, [])

@@ -6,10 +6,10 @@
 #include <util/atomic.h>
 #include <util/delay.h>
 
-#include "../gantry.h"
-#include "../port.h"
-#include "../protocol.h"
-#include "uart.h"
+#include "gantry.h"
+#include "port.h"
+#include "protocol.h"
+#include "avr/uart.h"
 
 #define SELECT PB2       /* D10, low while a frame lasts */
 #define DATA_OUT PB3     /* D11 */

@@ -1,12 +1,12 @@
-#include "uart.h"
+#include "avr/uart.h"
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <string.h>
 #include <util/atomic.h>
 
-#include "../port.h"
-#include "../protocol.h"
+#include "port.h"
+#include "protocol.h"
 
 #define SIZE 128 /* of each buffer; a power of two */
 #define NEXT(i) (((i) + 1) & (SIZE - 1))

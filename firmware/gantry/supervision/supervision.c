@@ -1,10 +1,10 @@
-#include "judge.h"
+#include "supervision/supervision.h"
 
 #include <stdlib.h>
 
-#include "rig.h"
-#include "switches.h"
-#include "units.h"
+#include "drivers/rig.h"
+#include "drivers/switches.h"
+#include "drivers/units.h"
 
 #define MUTE_LOOKS 2 /* a driver that does not answer so often in turn is away, and with it those behind it */
 
@@ -30,7 +30,7 @@ static uint8_t axes_without(uint16_t flags)
     return found;
 }
 
-static bool judge_drivers(void)
+static bool check_drivers(void)
 {
     uint8_t broken = broken_axes(), shut = axes_without(FLAG_HOT_NOT);
     bool lost = axes_without(FLAGS_LOSS) != 0;
@@ -52,7 +52,7 @@ static bool judge_drivers(void)
 /* The drivers stop on the edge by themselves, the pair's other one does not. No right motion reaches a switch, so the
  * position was wrong, or the switch is stuck and guards neither end: only CALIBRATE moves the rig after it. The
  * direction is the driver's, as an axis that brakes before it turns still goes the old way. */
-static void judge_switch(enum motor motor)
+static void check_switch(enum motor motor)
 {
     enum axis axis = units_axis(motor);
     bool idle = !rig.calibrated && !rig_moves();
@@ -64,7 +64,7 @@ static void judge_switch(enum motor motor)
     rig_forget();
 }
 
-static void judge_square(void)
+static void check_square(void)
 {
     int32_t skew = rig.position[MOTOR_Y1] - rig.position[MOTOR_Y2];
     if (rig.calibrated && labs(skew) > axes[AXIS_Y].square) {
@@ -74,7 +74,7 @@ static void judge_square(void)
 }
 
 /* A driver that does not answer does not hear either, and goes on with what it was told last. */
-static void judge_bus(void)
+static void check_bus(void)
 {
     if (rig.held)
         return;
@@ -83,13 +83,13 @@ static void judge_bus(void)
         rig_hold();
 }
 
-void judge_tick(void)
+void supervision_tick(void)
 {
-    judge_bus();
+    check_bus();
     bool homing = rig.mode == MODE_HOMING;
     if (!homing && broken_axes() == 0)
         for (uint8_t m = 0; m < MOTORS; m++)
-            judge_switch(m);
-    if (judge_drivers() && !homing)
-        judge_square();
+            check_switch(m);
+    if (check_drivers() && !homing)
+        check_square();
 }

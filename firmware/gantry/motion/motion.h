@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "rig.h"
+#include "drivers/rig.h"
 
 /* Begin or go on with velocities (micro/s); 0 or an error. */
 uint8_t motion_run(const int32_t *velocity, uint32_t now);

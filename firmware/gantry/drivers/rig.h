@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "drivers.h"
+#include "drivers/drivers.h"
 #include "protocol.h"
 
 enum mode { MODE_REST, MODE_RUN, MODE_GOTO_SOON, MODE_GOTO, MODE_HOMING };

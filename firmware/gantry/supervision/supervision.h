@@ -1,8 +1,8 @@
 /* Supervision: what the drivers say, and what follows from it. */
-#ifndef JUDGE_H
-#define JUDGE_H
+#ifndef SUPERVISION_H
+#define SUPERVISION_H
 
 /* One look. */
-void judge_tick(void);
+void supervision_tick(void);
 
 #endif

@@ -1,7 +1,7 @@
-#include "drivers.h"
+#include "drivers/drivers.h"
 
 #include "port.h"
-#include "units.h"
+#include "drivers/units.h"
 
 static uint32_t config_of(uint8_t motor)
 {

@@ -1,4 +1,4 @@
-#include "units.h"
+#include "drivers/units.h"
 
 const struct axis_constants axes[AXES] = AXIS_ROWS;
 static const uint8_t motor_axes[MOTORS] = MOTOR_AXES;

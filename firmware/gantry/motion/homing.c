@@ -1,11 +1,11 @@
-#include "homing.h"
+#include "motion/homing.h"
 
 #include <stdlib.h>
 
 #include "port.h"
-#include "rig.h"
-#include "switches.h"
-#include "units.h"
+#include "drivers/rig.h"
+#include "drivers/switches.h"
+#include "drivers/units.h"
 
 /* SETTLE: brake. START: the drivers begin anew, at which rotors jump by up to two steps, and hold them. LEAVE: leave a
  * switch that is closed, at whichever end it is. APPROACH: go to the switch at home. RELEASE: go until it opens. */

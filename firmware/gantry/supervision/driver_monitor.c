@@ -1,10 +1,10 @@
-#include "doubt.h"
+#include "supervision/driver_monitor.h"
 
 #include <stdlib.h>
 
-#include "homing.h"
-#include "rig.h"
-#include "units.h"
+#include "motion/homing.h"
+#include "drivers/rig.h"
+#include "drivers/units.h"
 
 #define PATIENCE_MS 120 /* in which an order that got lost has been given twice again */
 #define WAY_MS 100
@@ -48,7 +48,7 @@ static void distrust(void)
 }
 
 /* The first time they are told to brake; if that does not help either, they lose their current. */
-static void judge_orders(uint32_t now)
+static void check_orders(uint32_t now)
 {
     bool contradicted = false;
     for (uint8_t m = 0; m < MOTORS; m++)
@@ -63,7 +63,7 @@ static void judge_orders(uint32_t now)
     }
 }
 
-void doubt_tick(uint32_t now)
+void driver_monitor_tick(uint32_t now)
 {
     bool brakes = rig.mode == MODE_REST || rig.mode == MODE_GOTO_SOON || homing_brakes();
     bool judged = (rig.mode == MODE_RUN || brakes) && !rig.held && !rig_mute();
@@ -73,7 +73,7 @@ void doubt_tick(uint32_t now)
         else if (strays(m, now) && rig.mode == MODE_RUN)
             distrust();
     if (judged)
-        judge_orders(now);
+        check_orders(now);
     else
         rig.obeyed = now;
 }

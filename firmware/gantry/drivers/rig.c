@@ -1,7 +1,7 @@
-#include "rig.h"
+#include "drivers/rig.h"
 
 #include "port.h"
-#include "units.h"
+#include "drivers/units.h"
 
 struct rig rig;
 

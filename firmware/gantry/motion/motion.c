@@ -1,8 +1,8 @@
-#include "motion.h"
+#include "motion/motion.h"
 
 #include <stdlib.h>
 
-#include "units.h"
+#include "drivers/units.h"
 
 #define LAG_MS 4 /* from a measurement to the driver's answer to it, at the most */
 #define AGAIN_MS 50 /* after which an order is given again, as it may have got lost */

@@ -1,7 +1,7 @@
-#include "switches.h"
+#include "drivers/switches.h"
 
-#include "rig.h"
-#include "units.h"
+#include "drivers/rig.h"
+#include "drivers/units.h"
 
 #define ALL ((1 << MOTORS) - 1)
 
