@@ -1,11 +1,9 @@
 """Strange bytes for the firmware: its core with sanitizers, and its binary through the emulated serial port."""
 
-import os
 import runpy
 import subprocess
 import sys
 
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -72,19 +70,3 @@ def test_the_binary_survives_strange_lines(firmware: None) -> None:
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "2,000 lines" in done.stdout
-
-
-@pytest.mark.slow
-def test_each_safety_rule_has_a_test_that_notices_when_it_is_weak(bench_program: object) -> None:
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
-    words = [sys.executable, str(ROOT / "scripts" / "mutate-firmware")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "SURVIVES" not in done.stdout
-
-
-def test_a_mutant_whose_text_is_gone_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    script = runpy.run_path(str(ROOT / "scripts" / "mutate-firmware"), run_name="mutate")
-    gone = script["Mutant"]("gone", "motion/motion.c", "no such text", "", "limits")
-    with pytest.raises(ValueError, match=r"stands 0 times in motion/motion\.c"):
-        script["survives"](gone, [])
