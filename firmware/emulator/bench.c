@@ -7,10 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control.h"
+#include "plant/plant_commands.h"
 #include "gantry.h"
 #include "port.h"
-#include "say.h"
+#include "telemetry.h"
 
 static struct plant plant;
 static uint32_t clock_at_begin;
@@ -51,7 +51,7 @@ uint32_t port_now(void)
 
 void port_answer(const char *line)
 {
-    say("\"answer\": \"%s\"", line);
+    telemetry_send("\"answer\": \"%s\"", line);
 }
 
 static void send(const char *hex)
@@ -83,7 +83,7 @@ static bool obey(char *line)
     else if (strcmp(line, "restart") == 0)
         gantry_begin();
     else
-        return control(&plant, line);
+        return plant_command(&plant, line);
     return true;
 }
 
@@ -96,6 +96,6 @@ int main(int argc, char **argv)
     plant_begin(&plant, place);
     gantry_begin();
     while (fgets(line, sizeof line, stdin) != NULL && strcmp(line, "quit\n") != 0)
-        say("\"done\": %s", obey(line) ? "true" : "false");
+        telemetry_send("\"done\": %s", obey(line) ? "true" : "false");
     return 0;
 }

@@ -1,6 +1,6 @@
 #include <math.h>
 
-#include "l6470_inner.h"
+#include "l6470/l6470_internal.h"
 
 #define TURN (4 * MICRO) /* microsteps of an electrical turn */
 

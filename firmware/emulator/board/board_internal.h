@@ -1,6 +1,6 @@
 /* What the parts of the board share. */
-#ifndef BOARD_INNER_H
-#define BOARD_INNER_H
+#ifndef BOARD_INTERNAL_H
+#define BOARD_INTERNAL_H
 
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_spi.h>
@@ -8,7 +8,7 @@
 #include <simavr/sim_avr.h>
 #include <simavr/sim_io.h>
 
-#include "board.h"
+#include "board/board.h"
 
 #define DATA_TO_IO 32 /* simavr's tables of registers begin behind the 32 of the core */
 

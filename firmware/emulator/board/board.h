@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-#include "plant.h"
+#include "plant/plant.h"
 
 #define BOARD_HZ 16000000.0
 

@@ -1,6 +1,4 @@
 /* The emulated rig: the gantry's firmware, unchanged, in front of models of its drivers and mechanics. */
-#include "emulator.h"
-
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -8,27 +6,29 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "board.h"
-#include "cable.h"
-
-struct emulator self = {.rate = 100, .place = {0.1, -0.1, 0.2}, .running = true};
+#include "board/board.h"
+#include "program/cable.h"
+#include "program/commands.h"
+#include "program/options.h"
+#include "program/pace.h"
+#include "program/state.h"
 
 static void end(int number)
 {
     (void)number;
-    self.ended = 1;
+    emulator.ended = 1;
 }
 
 static void begin(void)
 {
     struct stat input;
     struct sigaction action = {.sa_handler = end};
-    self.stdin_ends = fstat(STDIN_FILENO, &input) == 0 && S_ISFIFO(input.st_mode);
+    emulator.stdin_ends = fstat(STDIN_FILENO, &input) == 0 && S_ISFIFO(input.st_mode);
     fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
     sigaction(SIGTERM, &action, NULL);
     sigaction(SIGINT, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
-    self.base_wall = pace_wall();
+    emulator.base_wall = pace_clock();
 }
 
 int main(int argc, char **argv)
@@ -38,20 +38,20 @@ int main(int argc, char **argv)
         fputs("rig-emulator: expected options as --help shows them, and the firmware's ELF file\n", stderr);
         return 2;
     }
-    plant_begin(&self.plant, self.place);
-    if (!board_begin(&self.plant, elf, self.boot)) {
+    plant_begin(&emulator.plant, emulator.place);
+    if (!board_begin(&emulator.plant, elf, emulator.boot)) {
         fprintf(stderr, "rig-emulator: %s is no firmware that can be read: build it with make firmware\n", elf);
         return 2;
     }
     begin();
-    if (!orders_plug()) {
-        fprintf(stderr, "rig-emulator: no pseudo terminal, or no link at %s: %s\n", self.link, strerror(errno));
+    if (!commands_plug()) {
+        fprintf(stderr, "rig-emulator: no pseudo terminal, or no link at %s: %s\n", emulator.link, strerror(errno));
         return 2;
     }
-    pace_live();
+    pace_run();
     cable_unplug();
     if (!board_crashed())
         return 0;
-    fputs("rig-emulator: the controller's program self.ended, which it must not\n", stderr);
+    fputs("rig-emulator: the controller's program emulator.ended, which it must not\n", stderr);
     return 1;
 }

@@ -1,8 +1,8 @@
 /* Resets, power, and the line that keeps the drivers awake. */
 #include <string.h>
 
-#include "board_inner.h"
-#include "say.h"
+#include "board/board_internal.h"
+#include "telemetry.h"
 
 #define ALIVE_MASK 0x10 /* of port D */
 #define MCUSR_DATA 0x54
@@ -30,7 +30,7 @@ static void after_reset(avr_t *avr)
     board.starts = board.plant->time + START_UP;
     chain_select(&board.plant->chain, false);
     if (!board.by_order)
-        say("\"event\": \"reset\", \"t\": %.4f, \"reason\": \"watchdog\"", board.plant->time);
+        telemetry_send("\"event\": \"reset\", \"t\": %.4f, \"reason\": \"watchdog\"", board.plant->time);
 }
 
 void board_reset(enum board_reset reason)
@@ -44,7 +44,7 @@ void board_reset(enum board_reset reason)
     board.by_order = false;
     board.avr->data[MCUSR_DATA] = flags[reason];
     board.starts = board.plant->time + START_UP + board.boot;
-    say("\"event\": \"reset\", \"t\": %.4f, \"reason\": \"%s\"", board.plant->time, names[reason]);
+    telemetry_send("\"event\": \"reset\", \"t\": %.4f, \"reason\": \"%s\"", board.plant->time, names[reason]);
 }
 
 void board_power(bool on)

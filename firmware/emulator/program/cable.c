@@ -1,4 +1,4 @@
-#include "cable.h"
+#include "program/cable.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,8 +1,8 @@
-#include "l6470.h"
+#include "l6470/l6470.h"
 
 #include <math.h>
 
-#include "l6470_inner.h"
+#include "l6470/l6470_internal.h"
 
 void l6470_power(struct l6470 *chip, bool powered)
 {

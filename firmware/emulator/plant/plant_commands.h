@@ -1,10 +1,10 @@
 /* Orders to the rig's model, a line each: faults, and what one asks it. */
-#ifndef CONTROL_H
-#define CONTROL_H
+#ifndef PLANT_COMMANDS_H
+#define PLANT_COMMANDS_H
 
-#include "plant.h"
+#include "plant/plant.h"
 
-#define CONTROL_HELP \
+#define PLANT_HELP \
     "  pose                                the true pose\n" \
     "  extremes                            highest speed and ramp of the drivers, and their way, since the last time\n" \
     "  push MOTOR STEPS                    move a carriage by full steps; four lose the motor's hold\n" \
@@ -20,6 +20,6 @@
     "  motors on|off                       the motors' supply\n"
 
 /* Whether the order was one of these and done. */
-bool control(struct plant *plant, const char *line);
+bool plant_command(struct plant *plant, const char *line);
 
 #endif

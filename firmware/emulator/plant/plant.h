@@ -3,7 +3,7 @@
 #ifndef PLANT_H
 #define PLANT_H
 
-#include "chain.h"
+#include "l6470/chain.h"
 #include "protocol.h"
 
 #define PLANT_DT 1e-4 /* s of a step */

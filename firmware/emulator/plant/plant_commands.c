@@ -1,11 +1,12 @@
-#include "control.h"
+#include "plant/plant_commands.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "say.h"
+#include "plant/plant_report.h"
+#include "telemetry.h"
 
 static int which(const char *word, const char *const *words, int count)
 {
@@ -17,7 +18,7 @@ static int which(const char *word, const char *const *words, int count)
 
 static int motor_of(const char *word)
 {
-    return which(word, say_motors, MOTORS);
+    return which(word, telemetry_motors, MOTORS);
 }
 
 static bool on_motor(struct plant *plant, const char *order, int motor, const char *how)
@@ -58,14 +59,14 @@ static bool cut(struct plant *plant, const char *word)
     return wire >= 0;
 }
 
-bool control(struct plant *plant, const char *line)
+bool plant_command(struct plant *plant, const char *line)
 {
     char order[16] = "", first[16] = "", second[16] = "";
     int words = sscanf(line, "%15s %15s %15s", order, first, second);
     if (words == 1 && strcmp(order, "pose") == 0) {
-        say_pose(plant);
+        plant_report_pose(plant);
     } else if (words == 1 && strcmp(order, "extremes") == 0) {
-        say_extremes(plant);
+        plant_report_extremes(plant);
         memset(plant->extremes, 0, sizeof plant->extremes);
     } else if (words == 2 && strcmp(order, "cut") == 0) {
         return cut(plant, first);

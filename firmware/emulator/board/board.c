@@ -1,11 +1,11 @@
-#include "board.h"
+#include "board/board.h"
 
 #include <simavr/avr_watchdog.h>
 #include <simavr/sim_elf.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "board_inner.h"
+#include "board/board_internal.h"
 
 #define AVR_MACHINE 83 /* EM_AVR */
 

@@ -2,7 +2,7 @@
 #ifndef CHAIN_H
 #define CHAIN_H
 
-#include "l6470.h"
+#include "l6470/l6470.h"
 
 #define CHIPS 4
 

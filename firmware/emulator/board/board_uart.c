@@ -1,7 +1,7 @@
 /* The serial line, with the receiver of the real chip. */
 #include <string.h>
 
-#include "board_inner.h"
+#include "board/board_internal.h"
 
 #define DATA_OVERRUN 0x08 /* of UCSR0A */
 #define FIFO 3          /* bytes of the real receiver: two, and the one that comes in */

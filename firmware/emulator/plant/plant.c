@@ -1,9 +1,9 @@
-#include "plant.h"
+#include "plant/plant.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "say.h"
+#include "telemetry.h"
 
 #define MICRO 128.0
 #define RESONANCE (2 * M_PI * 60) /* rad/s, of a NEMA 17 with its load */
@@ -68,7 +68,7 @@ static void see_switch(struct plant *plant, enum motor motor)
     c->closed = closed;
     bool seen = c->stuck == SWITCH_WORKS ? c->closed != bounces(plant, c) : c->stuck == SWITCH_CLOSED;
     if (seen != plant->chain.chips[motor].switch_closed)
-        say_event(plant->time, seen ? "closed" : "open", motor, 0);
+        telemetry_event(plant->time, seen ? "closed" : "open", motor, 0);
     l6470_switch(&plant->chain.chips[motor], seen);
 }
 
@@ -82,7 +82,7 @@ static void hit_frame(struct plant *plant, enum motor motor)
     }
     if (!c->crashed) {
         plant->crashes++;
-        say_event(plant->time, "crash", motor, fabs(c->speed) * plant_unit(motor));
+        telemetry_event(plant->time, "crash", motor, fabs(c->speed) * plant_unit(motor));
     }
     c->crashed = true;
     c->at = at;
@@ -98,7 +98,7 @@ static void note_slip(struct plant *plant, enum motor motor)
     if (held && fabs(turns - (double)c->slips) < CAUGHT)
         return;
     if (held) {
-        say_event(plant->time, "slip", motor, (double)(slips - c->slips));
+        telemetry_event(plant->time, "slip", motor, (double)(slips - c->slips));
         l6470_loss(&plant->chain.chips[motor]);
     }
     c->slips = slips;

@@ -1,10 +1,12 @@
+#include "program/options.h"
+
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "control.h"
-#include "emulator.h"
-#include "say.h"
+#include "plant/plant_commands.h"
+#include "program/state.h"
+#include "telemetry.h"
 
 static const char *const help =
     "usage: rig-emulator [OPTION...] gantry.elf\n\n"
@@ -19,7 +21,7 @@ static const char *const help =
     "  --fast             as fast as possible instead of in real time\n"
     "  --stepped          time passes only by the order `run S`\n"
     "  --help\n\n"
-    "orders, a line each, answered by {\"done\": true, \"sent\": bytes so far} or {\"error\": ...}:\n" CONTROL_HELP
+    "orders, a line each, answered by {\"done\": true, \"sent\": bytes so far} or {\"error\": ...}:\n" PLANT_HELP
     "  run S               with --stepped: let S seconds pass\n"
     "  await N             wait, while no time passes, until the client's next N bytes are there\n"
     "  unplug [power]      pull the USB cable, and with `power` the controller's power with it\n"
@@ -40,22 +42,22 @@ static bool place_of(const char *text)
 {
     double degrees;
     char rest;
-    if (sscanf(text, "%lf,%lf,%lf%c", &self.place[0], &self.place[1], &degrees, &rest) != 3)
+    if (sscanf(text, "%lf,%lf,%lf%c", &emulator.place[0], &emulator.place[1], &degrees, &rest) != 3)
         return false;
-    self.place[2] = degrees * 3.14159265358979323846 / 180;
+    emulator.place[2] = degrees * 3.14159265358979323846 / 180;
     return true;
 }
 
 static bool option(int which, const char *value)
 {
     switch (which) {
-    case 'l': self.link = value; return true;
-    case 'r': self.rate = strtod(value, NULL); return self.rate >= 0;
-    case 'p': return say_to(value) == 0;
+    case 'l': emulator.link = value; return true;
+    case 'r': emulator.rate = strtod(value, NULL); return emulator.rate >= 0;
+    case 'p': return telemetry_publish(value) == 0;
     case 's': return place_of(value);
-    case 'b': self.boot = strtod(value, NULL); return self.boot >= 0;
-    case 'f': self.pace = FAST; return true;
-    case 't': self.pace = STEPPED; return true;
+    case 'b': emulator.boot = strtod(value, NULL); return emulator.boot >= 0;
+    case 'f': emulator.pace = FAST; return true;
+    case 't': emulator.pace = STEPPED; return true;
     default: return false;
     }
 }

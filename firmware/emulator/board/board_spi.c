@@ -1,5 +1,5 @@
 /* The SPI: a byte takes eight clocks of the rate that is set, not simavr's 100 us. */
-#include "board_inner.h"
+#include "board/board_internal.h"
 
 #define SELECT_PIN 2 /* of port B */
 

@@ -1,8 +1,8 @@
 /* What the parts of the driver's model share. */
-#ifndef L6470_INNER_H
-#define L6470_INNER_H
+#ifndef L6470_INTERNAL_H
+#define L6470_INTERNAL_H
 
-#include "l6470.h"
+#include "l6470/l6470.h"
 
 #define MICRO 128.0
 #define SPEED_UNIT (MICRO / 67.108864)   /* microsteps/s of a unit of SPEED */

@@ -1,6 +1,6 @@
 #include <math.h>
 
-#include "l6470_inner.h"
+#include "l6470/l6470_internal.h"
 
 void l6470_stand(struct l6470 *chip)
 {

@@ -1,4 +1,4 @@
-#include "chain.h"
+#include "l6470/chain.h"
 
 #define PULLED_UP 0xFF /* what the controller reads when no driver speaks */
 

@@ -1,6 +1,6 @@
 #include <math.h>
 
-#include "l6470_inner.h"
+#include "l6470/l6470_internal.h"
 
 #define LOW_UNIT (MICRO * 0.238418579)   /* microsteps/s of a unit of MIN_SPEED */
 #define RELEASE_LEAST (MICRO * 5)
