@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "plant/plant_commands.h"
 #include "gantry.h"
+#include "plant/plant_commands.h"
 #include "port.h"
 #include "telemetry.h"
 
@@ -49,7 +49,7 @@ uint32_t port_now(void)
     return (uint32_t)(plant.time * 1000 + 1e-6) + clock_at_begin;
 }
 
-void port_answer(const char *line)
+void port_send_line(const char *line)
 {
     telemetry_send("\"answer\": \"%s\"", line);
 }
@@ -58,7 +58,7 @@ static void send(const char *hex)
 {
     unsigned value;
     for (; sscanf(hex, "%2x", &value) == 1; hex += 2)
-        gantry_take((uint8_t)value);
+        gantry_receive((uint8_t)value);
 }
 
 static void run(double seconds)
@@ -81,7 +81,7 @@ static bool obey(char *line)
     else if (strncmp(line, "wraps ", 6) == 0)
         clock_at_begin -= port_now() + (uint32_t)(strtod(line + 6, NULL) * 1000);
     else if (strcmp(line, "restart") == 0)
-        gantry_begin();
+        gantry_start();
     else
         return plant_command(&plant, line);
     return true;
@@ -94,7 +94,7 @@ int main(int argc, char **argv)
     for (int a = 0; a < AXES && a + 1 < argc; a++)
         place[a] = strtod(argv[a + 1], NULL);
     plant_begin(&plant, place);
-    gantry_begin();
+    gantry_start();
     while (fgets(line, sizeof line, stdin) != NULL && strcmp(line, "quit\n") != 0)
         telemetry_send("\"done\": %s", obey(line) ? "true" : "false");
     return 0;

@@ -2,13 +2,13 @@
 
 #include <string.h>
 
-#include "supervision/driver_monitor.h"
-#include "motion/homing.h"
-#include "supervision/supervision.h"
+#include "drivers/rig.h"
 #include "line.h"
+#include "motion/homing.h"
 #include "motion/motion.h"
 #include "port.h"
-#include "drivers/rig.h"
+#include "supervision/driver_monitor.h"
+#include "supervision/supervision.h"
 
 static struct line line;
 static uint32_t ticked;
@@ -17,7 +17,7 @@ static void answer_error(uint8_t error)
 {
     char text[] = "$ERROR:0";
     text[sizeof text - 2] = (char)('0' + error);
-    port_answer(text);
+    port_send_line(text);
 }
 
 static uint8_t status(void)
@@ -26,7 +26,7 @@ static uint8_t status(void)
         return rig.trouble;
     if (rig.mode == MODE_HOMING)
         return STATUS_HOMING;
-    if (rig.mode == MODE_GOTO_SOON || rig.mode == MODE_GOTO || rig_moves())
+    if (rig.mode == MODE_GOTO_PENDING || rig.mode == MODE_GOTO || rig_moving())
         return STATUS_MOVING;
     return rig.calibrated ? STATUS_IDLE : STATUS_NOT_CALIBRATED;
 }
@@ -35,7 +35,7 @@ static void answer_status(void)
 {
     char text[] = "$0";
     text[1] = (char)('0' + status());
-    port_answer(text);
+    port_send_line(text);
 }
 
 static uint8_t answer_position(void)
@@ -43,12 +43,12 @@ static uint8_t answer_position(void)
     char text[3 * 12 + 2], *at = text;
     if (!rig.calibrated)
         return ERROR_UNCALIBRATED;
-    rig_look();
+    rig_poll();
     for (uint8_t a = 0; a < AXES; a++) {
         *at++ = a == 0 ? '$' : ',';
         at = line_number(at, rig_position(a));
     }
-    port_answer(text);
+    port_send_line(text);
     return 0;
 }
 
@@ -56,7 +56,7 @@ static uint8_t calibrate(void)
 {
     if (rig.mode == MODE_HOMING)
         return ERROR_HOMING;
-    homing_begin();
+    homing_start();
     return 0;
 }
 
@@ -66,7 +66,7 @@ static void stop(void)
     rig_acknowledge();
 }
 
-static uint8_t obey(const struct request *request)
+static uint8_t execute(const struct request *request)
 {
     if (request->command == COMMAND_STOP || request->command == COMMAND_CALIBRATE)
         rig.resumed = false;
@@ -88,35 +88,35 @@ static uint8_t obey(const struct request *request)
     }
 }
 
-void gantry_take(uint8_t byte)
+void gantry_receive(uint8_t byte)
 {
     struct request request;
-    enum line_state state = line_take(&line, byte);
+    enum line_state state = line_receive(&line, byte);
     if (state == LINE_OPEN || (state == LINE_DONE && line.text[0] == '\0'))
         return;
     uint8_t error = state == LINE_DAMAGED ? ERROR_DAMAGED : line_parse(line.text, &request);
     if (error == 0)
-        error = obey(&request);
+        error = execute(&request);
     if (error == 0)
-        rig.lived = port_now();
+        rig.line_received = port_now();
     else
         answer_error(error);
 }
 
-/* Nobody watches GOTO or CALIBRATE any more. */
-static void supervise_line(uint32_t now)
+/* GOTO and CALIBRATE end when the host falls silent. */
+static void supervise_host(uint32_t now)
 {
-    bool alone = rig.mode == MODE_GOTO_SOON || rig.mode == MODE_GOTO || rig.mode == MODE_HOMING;
-    if (alone && now - rig.lived >= WATCHDOG_MS)
-        rig_trouble(STATUS_WATCHDOG, 0);
+    bool unattended = rig.mode == MODE_GOTO_PENDING || rig.mode == MODE_GOTO || rig.mode == MODE_HOMING;
+    if (unattended && now - rig.line_received >= WATCHDOG_MS)
+        rig_fail(STATUS_WATCHDOG, 0);
 }
 
-void gantry_begin(void)
+void gantry_start(void)
 {
     memset(&line, 0, sizeof line);
     memset(&rig, 0, sizeof rig);
     ticked = port_now();
-    homing_wake();
+    homing_restore();
 }
 
 void gantry_tick(void)
@@ -125,9 +125,9 @@ void gantry_tick(void)
     if (now - ticked < TICK_MS)
         return;
     ticked = now;
-    rig_look();
+    rig_poll();
     supervision_tick();
-    supervise_line(now);
+    supervise_host(now);
     motion_tick(now);
     driver_monitor_tick(now);
     homing_tick(now);

@@ -1,16 +1,16 @@
-/* The gantry's firmware without its hardware: bytes in, lines out, drivers told. */
+/* The firmware's core, independent of hardware: it executes the host's commands and supervises the drivers. */
 #ifndef GANTRY_H
 #define GANTRY_H
 
 #include <stdint.h>
 
-/* Once after each start. */
-void gantry_begin(void);
+/* Call once after each start. */
+void gantry_start(void);
 
-/* A byte from the host; 0 stands for bytes that were lost. */
-void gantry_take(uint8_t byte);
+/* Receive a byte from the host; 0 stands for lost bytes. */
+void gantry_receive(uint8_t byte);
 
-/* As often as there is time: every TICK_MS it looks after the drivers. */
+/* Call as often as possible; polls and controls the drivers every TICK_MS. */
 void gantry_tick(void);
 
 #endif

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define FARTHEST 100000000 /* 100 m: more is out of all bounds as well */
+#define FARTHEST 100000000 /* 100 m: beyond all bounds */
 #define MOST_DIGITS 9
 
 static const struct {
@@ -27,7 +27,7 @@ static enum line_state finish(struct line *line)
     return damaged ? LINE_DAMAGED : LINE_DONE;
 }
 
-enum line_state line_take(struct line *line, uint8_t byte)
+enum line_state line_receive(struct line *line, uint8_t byte)
 {
     if (byte == '\n')
         return finish(line);
@@ -43,7 +43,7 @@ static bool digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Digits before the point, in micro; NULL when there are none or too many. */
+/* Parse the digits before the point, in micro. Returns NULL when there are none or too many. */
 static const char *whole(const char *at, int32_t *micro)
 {
     const char *begin = at;
@@ -58,7 +58,7 @@ static const char *whole(const char *at, int32_t *micro)
     return at == begin ? NULL : at;
 }
 
-/* Digits behind the point; those behind the sixth are cut off. */
+/* Parse the digits behind the point; ignore those behind the sixth. */
 static const char *decimals(const char *at, int32_t *micro)
 {
     int32_t weight = 100000;

@@ -1,4 +1,4 @@
-/* Lines of text: put together of bytes, taken apart, and numbers in them. */
+/* The serial protocol's lines: assembling, parsing, and formatting numbers. */
 #ifndef LINE_H
 #define LINE_H
 
@@ -22,14 +22,14 @@ struct request {
     int32_t numbers[NUMBERS]; /* micro */
 };
 
-/* Take a byte. LINE_DONE: text holds a line without its end. LINE_DAMAGED: the line that ended here is void, as it was
- * too long or had a byte that is not printable; the port gives such a byte where it lost one. */
-enum line_state line_take(struct line *line, uint8_t byte);
+/* Add a byte. LINE_DONE: text holds a line without its end. LINE_DAMAGED: the line that ends here is invalid, as it was
+ * too long or had an unprintable byte; the port inserts one where bytes were lost. */
+enum line_state line_receive(struct line *line, uint8_t byte);
 
-/* What a line asks for; 0, or an error. Numbers are not compared with bounds yet. */
+/* Parse a line into a request. Returns 0 or an error. Does not check bounds. */
 uint8_t line_parse(const char *text, struct request *request);
 
-/* A number in micro as text with six decimals; returns the place behind it. */
+/* Format a number in micro with six decimals. Returns the end of the text. */
 char *line_number(char *out, int32_t micro);
 
 #endif

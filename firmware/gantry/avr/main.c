@@ -6,14 +6,14 @@
 #include <util/atomic.h>
 #include <util/delay.h>
 
+#include "avr/uart.h"
 #include "gantry.h"
 #include "port.h"
 #include "protocol.h"
-#include "avr/uart.h"
 
-#define SELECT PB2       /* D10, low while a frame lasts */
+#define SELECT PB2       /* D10, low during a frame */
 #define DATA_OUT PB3     /* D11 */
-#define DATA_IN PB4      /* D12, pulled up: a line that nobody drives says 1 */
+#define DATA_IN PB4      /* D12, pulled up: an open line reads 1 */
 #define DATA_CLOCK PB5   /* D13 */
 #define DRIVERS_ALIVE PD4 /* D4, low resets the drivers */
 #define TICKS_A_MS (F_CPU / 64 / 1000)
@@ -32,7 +32,7 @@ uint32_t port_now(void)
     return now;
 }
 
-/* The first byte sent goes through to the last driver. */
+/* The first byte sent reaches the last driver. */
 void port_exchange(uint8_t *bytes)
 {
     PORTB &= (uint8_t)~(1 << SELECT);
@@ -59,7 +59,7 @@ void port_reset_drivers(void)
     _delay_ms(2);
 }
 
-/* The pull-up comes before the output, so that the drivers notice nothing of a short reset. */
+/* The pull-up comes before the output, so that a short reset does not reach the drivers. */
 static void start_pins(void)
 {
     PORTD |= 1 << DRIVERS_ALIVE;
@@ -77,7 +77,7 @@ static void start_clock(void)
     TIMSK0 = 1 << OCIE0A;
 }
 
-/* Until the next interrupt, a millisecond at most; one that comes just before is not slept over. */
+/* Sleep until the next interrupt, a millisecond at most. */
 static void doze(void)
 {
     cli();
@@ -98,12 +98,12 @@ int main(void)
     start_clock();
     uart_start();
     sei();
-    gantry_begin();
+    gantry_start();
     for (;;) {
         wdt_reset();
         uint8_t byte;
         if (uart_read(&byte))
-            gantry_take(byte);
+            gantry_receive(byte);
         gantry_tick();
         doze();
     }

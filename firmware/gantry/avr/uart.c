@@ -25,7 +25,7 @@ static bool put(uint8_t byte)
     return true;
 }
 
-/* A byte with an error, or one before which others were lost, is preceded by a 0. */
+/* A 0 precedes a byte that has an error or follows lost bytes. */
 ISR(USART_RX_vect)
 {
     bool damaged = (UCSR0A & ERRORS) != 0;
@@ -75,7 +75,7 @@ static void queue(char c)
     out_head = NEXT(out_head);
 }
 
-void port_answer(const char *line)
+void port_send_line(const char *line)
 {
     uint8_t room = (uint8_t)(out_tail - out_head - 1) & (SIZE - 1);
     if (strlen(line) + 1 > room)

@@ -1,7 +1,7 @@
 #include "drivers/drivers.h"
 
-#include "port.h"
 #include "drivers/units.h"
+#include "port.h"
 
 static uint32_t config_of(uint8_t motor)
 {
@@ -22,19 +22,19 @@ static void exchange_arguments(uint32_t values[MOTORS], uint8_t bytes)
     }
 }
 
-void drivers_send(const struct order orders[MOTORS], uint8_t bytes)
+void drivers_send(const struct driver_command commands[MOTORS], uint8_t bytes)
 {
     uint8_t frame[MOTORS];
     uint32_t values[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        frame[m] = orders[m].op;
-        values[m] = orders[m].op == OP_NOP ? 0 : orders[m].argument;
+        frame[m] = commands[m].op;
+        values[m] = commands[m].op == OP_NOP ? 0 : commands[m].argument;
     }
     port_exchange(frame);
     exchange_arguments(values, bytes);
 }
 
-static void ask(uint8_t op, uint8_t bytes, uint32_t values[MOTORS])
+static void query(uint8_t op, uint8_t bytes, uint32_t values[MOTORS])
 {
     uint8_t frame[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
@@ -47,15 +47,15 @@ static void ask(uint8_t op, uint8_t bytes, uint32_t values[MOTORS])
 
 void drivers_get(uint8_t reg, uint8_t bytes, uint32_t values[MOTORS])
 {
-    ask(OP_GET | reg, bytes, values);
+    query(OP_GET | reg, bytes, values);
 }
 
 void drivers_set(uint8_t reg, uint8_t bytes, const uint32_t values[MOTORS])
 {
-    struct order orders[MOTORS];
+    struct driver_command commands[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        orders[m] = (struct order){OP_SET | reg, values[m]};
-    drivers_send(orders, bytes);
+        commands[m] = (struct driver_command){OP_SET | reg, values[m]};
+    drivers_send(commands, bytes);
 }
 
 void drivers_set_all(uint8_t reg, uint8_t bytes, uint32_t value)
@@ -67,7 +67,7 @@ void drivers_set_all(uint8_t reg, uint8_t bytes, uint32_t value)
 void drivers_status(uint16_t status[MOTORS], bool clear)
 {
     uint32_t values[MOTORS];
-    ask(clear ? OP_GET_STATUS : OP_GET | REG_STATUS, 2, values);
+    query(clear ? OP_GET_STATUS : OP_GET | REG_STATUS, 2, values);
     for (uint8_t m = 0; m < MOTORS; m++)
         status[m] = (uint16_t)values[m];
 }
@@ -116,7 +116,7 @@ void drivers_configure(void)
     drivers_set_top_speeds(false);
 }
 
-bool drivers_remember(void)
+bool drivers_position_valid(void)
 {
     uint32_t configs[MOTORS], marks[MOTORS];
     drivers_get(REG_CONFIG, 2, configs);

@@ -13,46 +13,47 @@ enum { /* registers */
     REG_STEP_MODE = 0x16, REG_CONFIG = 0x18, REG_STATUS = 0x19
 };
 
-enum { /* commands; those that move forward are one more; GO_UNTIL copies the position to MARK, RELEASE zeroes it */
+enum { /* commands; add FORWARD to move forward; GO_UNTIL copies the position to MARK, RELEASE zeroes it */
     OP_NOP = 0x00, OP_SET = 0x00, OP_GET = 0x20, OP_MOVE = 0x40, OP_RUN = 0x50, OP_GOTO = 0x60, OP_GO_UNTIL = 0x8A,
-    OP_RELEASE = 0x92, OP_SOFT_STOP = 0xB0, OP_HARD_STOP = 0xB8, OP_GET_STATUS = 0xD0, OP_RESET_POS = 0xD8, FORWARD = 0x01
+    OP_RELEASE = 0x92, OP_SOFT_STOP = 0xB0, OP_HARD_STOP = 0xB8, OP_GET_STATUS = 0xD0, OP_RESET_POS = 0xD8,
+    FORWARD = 0x01
 };
 
 enum { /* flags of STATUS */
-    FLAG_SW_CLOSED = 1 << 2, FLAG_SW_EVENT = 1 << 3, FLAG_FORWARD = 1 << 4, FLAG_MOTION = 3 << 5, FLAG_NOT_PERFORMED = 1 << 7,
-    FLAG_WRONG = 1 << 8, FLAG_UVLO_NOT = 1 << 9, FLAG_WARM_NOT = 1 << 10,
+    FLAG_SW_CLOSED = 1 << 2, FLAG_SW_EVENT = 1 << 3, FLAG_FORWARD = 1 << 4, FLAG_MOTION = 3 << 5,
+    FLAG_NOT_PERFORMED = 1 << 7, FLAG_WRONG = 1 << 8, FLAG_UVLO_NOT = 1 << 9, FLAG_WARM_NOT = 1 << 10,
     FLAG_HOT_NOT = 1 << 11, FLAG_OCD_NOT = 1 << 12, FLAG_LOSS_A_NOT = 1 << 13, FLAG_LOSS_B_NOT = 1 << 14,
-    FLAGS_RIGHT = FLAG_UVLO_NOT | FLAG_OCD_NOT, FLAGS_LOSS = FLAG_LOSS_A_NOT | FLAG_LOSS_B_NOT,
-    FLAGS_SOUND = FLAGS_RIGHT | FLAG_HOT_NOT | FLAGS_LOSS, /* without one of them a rotor may be anywhere */
-    MOTION_BRAKES = 2 << 5, MOTION_CONSTANT = 3 << 5 /* values of FLAG_MOTION; 0 stands */
+    FLAGS_SUPPLY = FLAG_UVLO_NOT | FLAG_OCD_NOT, FLAGS_LOSS = FLAG_LOSS_A_NOT | FLAG_LOSS_B_NOT,
+    FLAGS_HEALTHY = FLAGS_SUPPLY | FLAG_HOT_NOT | FLAGS_LOSS, /* if one is missing, the position is unknown */
+    MOTION_BRAKES = 2 << 5, MOTION_CONSTANT = 3 << 5 /* values of FLAG_MOTION; 0: standing */
 };
 
-struct order {
-    uint8_t op; /* OP_NOP leaves a driver as it is */
+struct driver_command {
+    uint8_t op; /* OP_NOP does nothing */
     uint32_t argument;
 };
 
-/* Give each driver its order within one frame, and then the bytes of its argument. */
-void drivers_send(const struct order orders[MOTORS], uint8_t bytes);
+/* Send each driver its command in one frame, followed by the bytes of the arguments. */
+void drivers_send(const struct driver_command commands[MOTORS], uint8_t bytes);
 
-/* A register of each driver. */
+/* Read or write a register of each driver. */
 void drivers_get(uint8_t reg, uint8_t bytes, uint32_t values[MOTORS]);
 void drivers_set(uint8_t reg, uint8_t bytes, const uint32_t values[MOTORS]);
 void drivers_set_all(uint8_t reg, uint8_t bytes, uint32_t value);
 
-/* STATUS of each driver; clear takes back flags whose reason is over. */
+/* Read STATUS of each driver; clear resets flags whose cause is gone. */
 void drivers_status(uint16_t status[MOTORS], bool clear);
 
-/* ABS_POS of each driver in microsteps, with its sign. */
+/* Read ABS_POS of each driver in microsteps, signed. */
 void drivers_position(int32_t position[MOTORS]);
 
-/* Write everything that differs from a driver's reset state; they must stand. */
+/* Write all registers that differ from their reset values; the motors must stand. */
 void drivers_configure(void);
 
-/* The highest speeds of homing, or those of all else. */
+/* Set the maximum speeds for homing, or for everything else. */
 void drivers_set_top_speeds(bool homing);
 
-/* Whether all drivers are configured, and bear the mark of a valid position. */
-bool drivers_remember(void);
+/* Whether all drivers are configured and hold the mark of a valid position. */
+bool drivers_position_valid(void);
 
 #endif

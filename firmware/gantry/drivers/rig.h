@@ -1,4 +1,4 @@
-/* The rig as the firmware knows it: what it was told, what the drivers say, what went wrong. */
+/* The rig's state: targets, commands sent, what the drivers report, and trouble. */
 #ifndef RIG_H
 #define RIG_H
 
@@ -8,70 +8,70 @@
 #include "drivers/drivers.h"
 #include "protocol.h"
 
-enum mode { MODE_REST, MODE_RUN, MODE_GOTO_SOON, MODE_GOTO, MODE_HOMING };
+enum mode { MODE_REST, MODE_RUN, MODE_GOTO_PENDING, MODE_GOTO, MODE_HOMING };
 
-/* A motor's way since it has the speed that it was told. */
-struct way {
-    uint32_t since; /* ms */
-    int32_t begin;  /* microsteps */
-    int32_t told;   /* units of SPEED */
+/* A motor's travel since it reached the commanded speed. */
+struct travel {
+    uint32_t began;    /* ms */
+    int32_t start;     /* microsteps */
+    int32_t commanded; /* units of SPEED */
 };
 
 struct rig {
     enum mode mode;
     uint8_t trouble; /* the status that ended a motion, until it is acknowledged; 0 for none */
     bool calibrated;
-    bool resumed; /* the position is from before a reset, and nobody said that this was noticed */
-    uint32_t heard; /* ms, when the last RUN came */
-    uint32_t lived; /* ms, when the last valid line came, whatever it was */
-    uint32_t since; /* ms, when homing's phase began */
-    bool held;    /* the drivers' reset is down, as orders do not reach them */
-    uint8_t mute; /* looks in which a driver did not answer, one after the other */
+    bool resumed;           /* the position is from before a reset that the host has not acknowledged */
+    uint32_t run_received;  /* ms, time of the last RUN */
+    uint32_t line_received; /* ms, time of the last valid line */
+    uint32_t phase_began;   /* ms, start of homing's phase */
+    bool held;              /* the drivers are held in reset, as commands do not reach them */
+    uint8_t missed_polls;   /* consecutive polls that a driver did not answer */
     uint16_t status[MOTORS];
     int32_t position[MOTORS];
-    bool touched[MOTORS];   /* the switch closed, and has been dealt with */
-    int32_t want[AXES];     /* micro/s, of the last RUN */
-    int32_t told[AXES];     /* units of SPEED, of the last order */
-    uint32_t sent;          /* ms, when all orders of a RUN were last given */
-    uint32_t obeyed;        /* ms, when no driver contradicted what it was told */
-    bool doubted;           /* one still does after it was told to brake */
-    struct way way[MOTORS];
-    int32_t goal[AXES];     /* steps */
-    int8_t blocked[AXES];   /* the direction in which a switch was hit, until home is found; or 0 */
-    uint8_t phase, tries;   /* of homing */
-    uint8_t quiet, closed;  /* looks without any change; motors (1 << motor) whose switches were closed then */
-    int32_t begin[MOTORS];  /* position at the begin of homing's phase */
+    bool switch_handled[MOTORS]; /* the switch closed, and that was handled */
+    int32_t target[AXES];        /* micro/s, of the last RUN */
+    int32_t commanded[AXES];     /* units of SPEED, of the last command */
+    uint32_t sent;               /* ms, when all commands of a RUN were last sent */
+    uint32_t consistent;         /* ms, when no driver contradicted its command */
+    bool contradiction_handled;  /* a contradiction has already caused braking */
+    struct travel travel[MOTORS];
+    int32_t goal[AXES];            /* steps */
+    int8_t blocked[AXES];          /* the direction in which a switch was hit, until home is found; or 0 */
+    uint8_t phase, attempts;       /* of homing */
+    uint8_t quiet_polls, closed;   /* polls without change; motors (1 << motor) whose switches were closed then */
+    int32_t phase_start[MOTORS];   /* position at the start of homing's phase */
 };
 
 extern struct rig rig;
 
 /* Read STATUS and ABS_POS of all drivers. */
-void rig_look(void);
+void rig_poll(void);
 
-/* Whether any motor turns. */
-bool rig_moves(void);
+/* Whether any motor moves. */
+bool rig_moving(void);
 
-/* Measured position of an axis, micro. */
+/* The measured position of an axis, micro. */
 int32_t rig_position(enum axis axis);
 
-/* Brake all axes; those in the mask (1 << axis) stop at once. */
+/* Brake all axes; those in the mask hard (1 << axis) stop at once. */
 void rig_stop(uint8_t hard);
 
-/* The position is void from now on, also for whoever starts after a reset. */
-void rig_forget(void);
+/* Invalidate the position, also beyond a reset of the controller. */
+void rig_void_position(void);
 
-/* End the motion with a status, as rig_stop does. */
-void rig_trouble(uint8_t status, uint8_t hard);
+/* Stop as rig_stop does, and report a status from now on. */
+void rig_fail(uint8_t status, uint8_t hard);
 
-/* Take the current from all motors, as orders do not reach them; until the trouble is acknowledged. */
+/* Hold the drivers in reset, without current, until the trouble is acknowledged. */
 void rig_hold(void);
 
-/* Whether a driver does not answer, and whether any does not. */
-bool rig_absent(enum motor motor);
-bool rig_mute(void);
+/* Whether a driver, or any driver, does not answer. */
+bool rig_driver_absent(enum motor motor);
+bool rig_any_driver_absent(void);
 
-/* Take back flags whose reason is over, and the trouble. False when a flag or a driver that forgot what it was told
- * speaks against the position, which is void then. */
+/* Clear the trouble, and flags whose cause is gone. False, with the position void, when a flag or a driver that lost
+ * its configuration contradicts the position. */
 bool rig_acknowledge(void);
 
 #endif

@@ -36,10 +36,10 @@ bool switches_all_closed(void)
     return closed() == ALL;
 }
 
-bool switches_quiet(uint8_t looks)
+bool switches_quiet(uint8_t polls)
 {
     uint8_t now = closed();
-    rig.quiet = rig_moves() || now != rig.closed ? 0 : rig.quiet + 1;
+    rig.quiet_polls = rig_moving() || now != rig.closed ? 0 : rig.quiet_polls + 1;
     rig.closed = now;
-    return rig.quiet >= looks;
+    return rig.quiet_polls >= polls;
 }

@@ -1,4 +1,4 @@
-/* The limit switches, as the drivers saw them at the last look. Both ends of an axis share an input. */
+/* The limit switches as of the last poll. Both ends of an axis share an input. */
 #ifndef SWITCHES_H
 #define SWITCHES_H
 
@@ -7,13 +7,13 @@
 
 #include "protocol.h"
 
-/* Whether a motor's switch is closed; any of an axis, as y1 and y2 go together; any at all; all. */
+/* Whether the switch of a motor, any switch of an axis, any switch, or all switches are closed. */
 bool switches_closed(enum motor motor);
 bool switches_axis_closed(enum axis axis);
 bool switches_any_closed(void);
 bool switches_all_closed(void);
 
-/* Once a look: whether all motors have stood, and no switch has changed, for so many looks. */
-bool switches_quiet(uint8_t looks);
+/* Call once a poll: whether all motors have stood and no switch has changed for so many polls. */
+bool switches_quiet(uint8_t polls);
 
 #endif

@@ -1,4 +1,4 @@
-/* Conversions of Table 4.2, in integers, so that the tests on a host and the ATmega count alike. */
+/* Conversions of Table 4.2, in integers, so that host and ATmega compute the same. */
 #ifndef UNITS_H
 #define UNITS_H
 
@@ -13,14 +13,14 @@ extern const struct axis_constants axes[AXES];
 enum motor units_motor(enum axis axis);
 enum axis units_axis(enum motor motor);
 
-/* Micro to microsteps from home, y = c x + offset, and back. */
+/* Convert micro to microsteps from home, y = c x + offset, and back. */
 int32_t units_steps(enum axis axis, int32_t micro);
 int32_t units_micro(enum axis axis, int32_t steps);
 
-/* Micro/s to units of the drivers' SPEED, w = c v; the sign stays. */
+/* Convert micro/s to units of the drivers' SPEED, w = c v, signed. */
 int32_t units_speed(enum axis axis, int32_t micro_s);
 
-/* Whether a position is within workspace and steps from home. */
+/* Whether a position is within the workspace and not behind home. */
 bool units_inside(enum axis axis, int32_t micro);
 
 /* The speed (micro/s, a multiple of 100) from which an axis stops within room (micro), 0 without room. */

@@ -2,90 +2,90 @@
 
 #include <stdlib.h>
 
-#include "port.h"
 #include "drivers/rig.h"
 #include "drivers/switches.h"
 #include "drivers/units.h"
+#include "port.h"
 
-/* SETTLE: brake. START: the drivers begin anew, at which rotors jump by up to two steps, and hold them. LEAVE: leave a
- * switch that is closed, at whichever end it is. APPROACH: go to the switch at home. RELEASE: go until it opens. */
+/* SETTLE: brake. START: reset the drivers, which makes rotors jump by up to two steps, and hold them. LEAVE: leave a
+ * closed switch at either end. APPROACH: go to the switch at home. RELEASE: go until it opens. */
 enum phase { SETTLE, START, LEAVE, APPROACH, RELEASE };
 
-#define QUIET_LOOKS 10 /* in which all stands and no switch bounces, before the next phase begins */
-#define START_LOOKS 50 /* in which the rotors come to rest after their jump */
-#define WAYS_OUT 7 /* back_offs from behind a switch that was hit: a slip may lead far */
+#define QUIET_POLLS 10 /* without motion or a bouncing switch, before the next phase begins */
+#define START_POLLS 50 /* in which rotors come to rest after their jump */
+#define MOST_ATTEMPTS 7 /* back_offs from behind a switch that was hit; more than one, as a motor may slip */
 
 static int32_t travelled(enum motor motor)
 {
-    uint32_t way = ((uint32_t)rig.position[motor] - (uint32_t)rig.begin[motor]) & 0x3FFFFFUL;
-    return way < 0x200000UL ? (int32_t)way : (int32_t)(0x400000UL - way);
+    uint32_t travel = ((uint32_t)rig.position[motor] - (uint32_t)rig.phase_start[motor]) & 0x3FFFFFUL;
+    return travel < 0x200000UL ? (int32_t)travel : (int32_t)(0x400000UL - travel);
 }
 
 static void enter(enum phase phase)
 {
     rig.phase = (uint8_t)phase;
-    rig.quiet = 0;
-    rig.since = port_now();
+    rig.quiet_polls = 0;
+    rig.phase_began = port_now();
     for (uint8_t m = 0; m < MOTORS; m++)
-        rig.begin[m] = rig.position[m];
+        rig.phase_start[m] = rig.position[m];
 }
 
-/* How many back_offs an axis goes next to leave its switch, 0 when it has tried all: the way it came from, or to either
- * side when nobody knows. */
-static int8_t way_out(enum axis axis)
+/* How many back_offs an axis moves next to leave its switch, signed: back where it came from, or to either side when
+ * that is unknown. 0 when all attempts failed. */
+static int8_t escape_direction(enum axis axis)
 {
     static const int8_t unknown[] = {1, -2};
     if (rig.blocked[axis] != 0)
-        return rig.tries < WAYS_OUT ? (int8_t)-rig.blocked[axis] : 0;
-    return rig.tries < sizeof unknown ? unknown[rig.tries] : 0;
+        return rig.attempts < MOST_ATTEMPTS ? (int8_t)-rig.blocked[axis] : 0;
+    return rig.attempts < sizeof unknown ? unknown[rig.attempts] : 0;
 }
 
-/* False when a switch stays closed. */
-static bool leave(void)
+/* Move axes off their closed switches; false when a switch stays closed. */
+static bool leave_switches(void)
 {
-    struct order orders[MOTORS];
+    struct driver_command commands[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        int8_t times = switches_axis_closed(units_axis(m)) ? way_out(units_axis(m)) : 0;
+        int8_t times = switches_axis_closed(units_axis(m)) ? escape_direction(units_axis(m)) : 0;
         if (times == 0 && switches_axis_closed(units_axis(m)))
             return false;
-        uint32_t way = (uint32_t)(axes[units_axis(m)].back_off * abs(times));
+        uint32_t distance = (uint32_t)(axes[units_axis(m)].back_off * abs(times));
         uint8_t op = times > 0 ? OP_MOVE + FORWARD : times < 0 ? OP_MOVE : OP_NOP;
-        orders[m] = (struct order){op, way};
+        commands[m] = (struct driver_command){op, distance};
     }
-    rig.tries++;
-    drivers_send(orders, 3);
+    rig.attempts++;
+    drivers_send(commands, 3);
     enter(LEAVE);
     return true;
 }
 
 static void approach(void)
 {
-    struct order orders[MOTORS];
+    struct driver_command commands[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        orders[m] = (struct order){OP_GO_UNTIL, (uint32_t)axes[units_axis(m)].homing_speed};
-    drivers_send(orders, 3);
+        commands[m] = (struct driver_command){OP_GO_UNTIL, (uint32_t)axes[units_axis(m)].homing_speed};
+    drivers_send(commands, 3);
     enter(APPROACH);
 }
 
-/* The counters begin at 0 here as well, so that the way to where the switches open is seen. */
+/* The counters restart at 0, so that the travel until the switches open is measured. */
 static void release(void)
 {
-    struct order orders[MOTORS], zero[MOTORS];
+    struct driver_command commands[MOTORS], zero[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
-        zero[m] = (struct order){OP_RESET_POS, 0};
-        orders[m] = (struct order){OP_RELEASE + FORWARD, 0};
+        zero[m] = (struct driver_command){OP_RESET_POS, 0};
+        commands[m] = (struct driver_command){OP_RELEASE + FORWARD, 0};
     }
     drivers_send(zero, 0);
-    rig_look();
-    drivers_send(orders, 0);
+    rig_poll();
+    drivers_send(commands, 0);
     enter(RELEASE);
 }
 
-static void set_up(void)
+static void restart_drivers(void)
 {
-    struct order hold[MOTORS];
+    struct driver_command hold[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        hold[m] = (struct order){OP_HARD_STOP, 0};
+        hold[m] = (struct driver_command){OP_HARD_STOP, 0};
     port_reset_drivers();
     drivers_configure();
     rig_acknowledge();
@@ -96,10 +96,10 @@ static void set_up(void)
 
 static void fail(void)
 {
-    rig_trouble(STATUS_FAULT, (1 << AXES) - 1);
+    rig_fail(STATUS_FAULT, (1 << AXES) - 1);
 }
 
-/* Farther than the axis is long, or than a switch takes to open: the switch is stuck. Or y1 and y2 part. */
+/* Whether an axis moved farther than its length, or than a switch needs to open, or y1 and y2 drift apart. */
 static bool too_far(void)
 {
     if (rig.phase != APPROACH && rig.phase != RELEASE)
@@ -128,33 +128,33 @@ static void finish(void)
         rig.blocked[a] = 0;
 }
 
-/* All motors stand: go on with the next phase. */
+/* Start the next phase; all motors stand. */
 static void next_phase(void)
 {
     if (rig.phase == SETTLE)
-        set_up();
+        restart_drivers();
     else if (rig.phase < APPROACH && !switches_any_closed())
         approach();
     else if (rig.phase < APPROACH)
-        leave() ? (void)0 : fail();
+        leave_switches() ? (void)0 : fail();
     else if (rig.phase == APPROACH)
         switches_all_closed() ? release() : fail();
     else
         finish();
 }
 
-void homing_begin(void)
+void homing_start(void)
 {
     rig_acknowledge();
     rig_stop(0);
-    rig_forget();
+    rig_void_position();
     rig.mode = MODE_HOMING;
     rig.phase = SETTLE;
-    rig.tries = rig.quiet = 0;
-    rig.since = port_now();
+    rig.attempts = rig.quiet_polls = 0;
+    rig.phase_began = port_now();
 }
 
-bool homing_brakes(void)
+bool homing_settling(void)
 {
     return rig.mode == MODE_HOMING && rig.phase == SETTLE;
 }
@@ -163,17 +163,17 @@ void homing_tick(uint32_t now)
 {
     if (rig.mode != MODE_HOMING)
         return;
-    if (too_far() || now - rig.since >= HOMING_PHASE_MS)
+    if (too_far() || now - rig.phase_began >= HOMING_PHASE_MS)
         fail();
-    else if (switches_quiet(rig.phase == START ? START_LOOKS : QUIET_LOOKS))
+    else if (switches_quiet(rig.phase == START ? START_POLLS : QUIET_POLLS))
         next_phase();
 }
 
-void homing_wake(void)
+void homing_restore(void)
 {
-    rig_look();
+    rig_poll();
     int32_t skew = rig.position[MOTOR_Y1] - rig.position[MOTOR_Y2];
-    rig.calibrated = drivers_remember() && labs(skew) <= axes[AXIS_Y].square;
+    rig.calibrated = drivers_position_valid() && labs(skew) <= axes[AXIS_Y].square;
     if (rig.calibrated) {
         rig.resumed = true;
         rig_stop(0);

@@ -1,20 +1,20 @@
-/* CALIBRATE: find each axis' switch, and call the place where it opens step 0. */
+/* CALIBRATE: find the switch of each axis; it opens at step 0. */
 #ifndef HOMING_H
 #define HOMING_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Begin; whatever moves brakes first, and the position is void until the end. */
-void homing_begin(void);
+/* Start; all motors brake first, and the position is void until homing ends. */
+void homing_start(void);
 
-/* Whether it still waits for what moved before to stand. */
-bool homing_brakes(void);
+/* Whether homing waits for the motors to stand. */
+bool homing_settling(void);
 
-/* One step; now is in ms. */
+/* Control homing; call once a tick. now is in ms. */
 void homing_tick(uint32_t now);
 
-/* Take up a position that the drivers kept over a reset of the controller, or set them up anew. */
-void homing_wake(void);
+/* Restore the position that the drivers kept during a reset of the controller, or reset and configure them. */
+void homing_restore(void);
 
 #endif

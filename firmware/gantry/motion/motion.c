@@ -4,51 +4,51 @@
 
 #include "drivers/units.h"
 
-#define LAG_MS 4 /* from a measurement to the driver's answer to it, at the most */
-#define AGAIN_MS 50 /* after which an order is given again, as it may have got lost */
+#define LAG_MS 4 /* the longest time from a measurement to the driver's reaction */
+#define RESEND_MS 50 /* after which a command is sent again, as it may be lost */
 
 static int8_t sign(int32_t value)
 {
     return (int8_t)((value > 0) - (value < 0));
 }
 
-/* What is left of a velocity (micro/s) so that the axis can still brake before the edge. */
-static int32_t clipped(enum axis axis, int32_t want)
+/* Limit a velocity (micro/s) so that the axis can brake before the edge. */
+static int32_t limited(enum axis axis, int32_t velocity)
 {
-    int32_t at = rig_position(axis), size = labs(want);
-    int32_t room = want > 0 ? axes[axis].high - at : at - axes[axis].low;
+    int32_t at = rig_position(axis), size = labs(velocity);
+    int32_t room = velocity > 0 ? axes[axis].high - at : at - axes[axis].low;
     int32_t fastest = units_braking_speed(axis, room - size * LAG_MS / 1000);
-    return sign(want) * (size < fastest ? size : fastest);
+    return sign(velocity) * (size < fastest ? size : fastest);
 }
 
-/* Tell the drivers of an axis a speed; both motors of y get it in one frame. */
-static void tell(struct order *orders, enum axis axis, int32_t speed)
+/* Set the commands that give an axis a speed; both motors of y get theirs in one frame. */
+static void set_command(struct driver_command *commands, enum axis axis, int32_t speed)
 {
     uint8_t op = speed == 0 ? OP_SOFT_STOP : speed > 0 ? OP_RUN | FORWARD : OP_RUN;
     for (uint8_t m = 0; m < MOTORS; m++)
         if (units_axis(m) == axis)
-            orders[m] = (struct order){op, (uint32_t)labs(speed)};
-    rig.told[axis] = speed;
+            commands[m] = (struct driver_command){op, (uint32_t)labs(speed)};
+    rig.commanded[axis] = speed;
 }
 
 static void drive(uint32_t now)
 {
-    struct order orders[MOTORS] = {{OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}};
-    bool again = now - rig.sent >= AGAIN_MS, news = again;
+    struct driver_command commands[MOTORS] = {{OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}, {OP_NOP, 0}};
+    bool resend = now - rig.sent >= RESEND_MS, changed = resend;
     for (uint8_t a = 0; a < AXES; a++) {
-        int32_t speed = units_speed(a, clipped(a, rig.want[a]));
-        if (again || speed != rig.told[a]) {
-            tell(orders, a, speed);
-            news = true;
+        int32_t speed = units_speed(a, limited(a, rig.target[a]));
+        if (resend || speed != rig.commanded[a]) {
+            set_command(commands, a, speed);
+            changed = true;
         }
     }
-    if (again)
+    if (resend)
         rig.sent = now;
-    if (news)
-        drivers_send(orders, 3);
+    if (changed)
+        drivers_send(commands, 3);
 }
 
-static uint8_t refused(void)
+static uint8_t refusal(void)
 {
     if (rig.mode == MODE_HOMING)
         return ERROR_HOMING;
@@ -61,7 +61,7 @@ static uint8_t refused(void)
 
 uint8_t motion_run(const int32_t *velocity, uint32_t now)
 {
-    uint8_t error = refused();
+    uint8_t error = refusal();
     if (error != 0)
         return error;
     for (uint8_t a = 0; a < AXES; a++)
@@ -70,68 +70,68 @@ uint8_t motion_run(const int32_t *velocity, uint32_t now)
     if (rig.mode != MODE_RUN && rig.mode != MODE_REST)
         rig_stop(0);
     for (uint8_t a = 0; a < AXES; a++)
-        rig.want[a] = velocity[a];
+        rig.target[a] = velocity[a];
     rig.mode = MODE_RUN;
-    rig.heard = now;
+    rig.run_received = now;
     drive(now);
     return 0;
 }
 
 uint8_t motion_goto(const int32_t *position)
 {
-    bool slept = rig.trouble == STATUS_WATCHDOG;
-    uint8_t error = slept ? 0 : refused();
+    bool timed_out = rig.trouble == STATUS_WATCHDOG;
+    uint8_t error = timed_out ? 0 : refusal();
     for (uint8_t a = 0; a < AXES && error == 0; a++)
         error = units_inside(a, position[a]) ? 0 : ERROR_BOUNDS;
     if (error != 0)
         return error;
-    if (slept)
+    if (timed_out)
         rig_acknowledge();
     if (!rig.calibrated)
         return ERROR_UNCALIBRATED;
     rig_stop(0);
     for (uint8_t a = 0; a < AXES; a++)
         rig.goal[a] = units_steps(a, position[a]);
-    rig.mode = MODE_GOTO_SOON;
+    rig.mode = MODE_GOTO_PENDING;
     return 0;
 }
 
-static void set_off(void)
+static void start_goto(void)
 {
-    struct order orders[MOTORS];
+    struct driver_command commands[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++) {
         enum axis axis = units_axis(m);
-        orders[m] = (struct order){OP_GOTO, (uint32_t)rig.goal[axis] & 0x3FFFFFUL};
+        commands[m] = (struct driver_command){OP_GOTO, (uint32_t)rig.goal[axis] & 0x3FFFFFUL};
     }
-    drivers_send(orders, 3);
+    drivers_send(commands, 3);
     rig.mode = MODE_GOTO;
 }
 
-static void arrive(void)
+static void finish_goto(void)
 {
     rig.mode = MODE_REST;
     for (uint8_t m = 0; m < MOTORS; m++)
         if (rig.position[m] != rig.goal[units_axis(m)])
-            rig_trouble(STATUS_FAULT, 0);
+            rig_fail(STATUS_FAULT, 0);
 }
 
 static void supervise_run(uint32_t now)
 {
-    bool standing = rig.told[AXIS_X] == 0 && rig.told[AXIS_Y] == 0 && rig.told[AXIS_YAW] == 0;
-    if (now - rig.heard < WATCHDOG_MS)
+    bool standing = rig.commanded[AXIS_X] == 0 && rig.commanded[AXIS_Y] == 0 && rig.commanded[AXIS_YAW] == 0;
+    if (now - rig.run_received < WATCHDOG_MS)
         drive(now);
     else if (standing)
         rig.mode = MODE_REST;
     else
-        rig_trouble(STATUS_WATCHDOG, 0);
+        rig_fail(STATUS_WATCHDOG, 0);
 }
 
 void motion_tick(uint32_t now)
 {
     if (rig.mode == MODE_RUN)
         supervise_run(now);
-    else if (rig.mode == MODE_GOTO_SOON && !rig_moves())
-        set_off();
-    else if (rig.mode == MODE_GOTO && !rig_moves())
-        arrive();
+    else if (rig.mode == MODE_GOTO_PENDING && !rig_moving())
+        start_goto();
+    else if (rig.mode == MODE_GOTO && !rig_moving())
+        finish_goto();
 }

@@ -1,4 +1,4 @@
-/* Motion that is asked for: RUN and GOTO, kept within the limits. */
+/* RUN and GOTO within the limits. */
 #ifndef MOTION_H
 #define MOTION_H
 
@@ -6,13 +6,13 @@
 
 #include "drivers/rig.h"
 
-/* Begin or go on with velocities (micro/s); 0 or an error. */
+/* Start or continue moving with velocities (micro/s). Returns 0 or an error. */
 uint8_t motion_run(const int32_t *velocity, uint32_t now);
 
-/* Move to a position (micro); 0 or an error. */
+/* Move to a position (micro). Returns 0 or an error. */
 uint8_t motion_goto(const int32_t *position);
 
-/* One step of the motion. */
+/* Control the motion; call once a tick. now is in ms. */
 void motion_tick(uint32_t now);
 
 #endif

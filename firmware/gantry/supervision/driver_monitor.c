@@ -2,78 +2,80 @@
 
 #include <stdlib.h>
 
-#include "motion/homing.h"
 #include "drivers/rig.h"
 #include "drivers/units.h"
+#include "motion/homing.h"
 
-#define PATIENCE_MS 120 /* in which an order that got lost has been given twice again */
-#define WAY_MS 100
-#define SPEEDS_A_MS 524 /* units of SPEED that are a microstep a millisecond: 67.1 units are a step/s of 128 */
-#define SLACK 16        /* microsteps */
+#define CONTRADICTION_MS 120      /* long enough to send a lost command twice more */
+#define TRAVEL_MS 100
+#define SPEED_OF_MICROSTEP_MS 524 /* units of SPEED per microstep/ms: 67.1 units are a step/s of 128 */
+#define TOLERANCE 16              /* microsteps */
 
-/* Whether a motor stands, moves, or goes steadily the other way than it was told. One that brakes may still obey. */
+/* Whether a motor stands, moves or moves in the wrong direction against its command. A braking motor may still obey. */
 static bool contradicts(enum motor motor)
 {
-    int32_t told = rig.told[units_axis(motor)];
+    int32_t commanded = rig.commanded[units_axis(motor)];
     uint16_t motion = rig.status[motor] & FLAG_MOTION;
     bool forward = (rig.status[motor] & FLAG_FORWARD) != 0;
     if (motion == 0)
-        return told != 0;
-    return told == 0 ? motion != MOTION_BRAKES : motion == MOTION_CONSTANT && forward != (told > 0);
+        return commanded != 0;
+    return commanded == 0 ? motion != MOTION_BRAKES : motion == MOTION_CONSTANT && forward != (commanded > 0);
 }
 
-/* The ways are compared only from when a motor has reached the speed that it was told. */
-static void begin_way(enum motor motor, uint32_t now)
+/* The travel is compared only after a motor has reached its commanded speed. */
+static void begin_travel(enum motor motor, uint32_t now)
 {
-    rig.way[motor] = (struct way){now, rig.position[motor], rig.told[units_axis(motor)]};
+    rig.travel[motor] = (struct travel){now, rig.position[motor], rig.commanded[units_axis(motor)]};
 }
 
-/* Whether a counter goes another way than a motor was told. */
-static bool strays(enum motor motor, uint32_t now)
+/* Whether a counter's travel deviates from the commanded speed. */
+static bool deviates(enum motor motor, uint32_t now)
 {
-    const struct way *way = &rig.way[motor];
-    bool steady = (rig.status[motor] & FLAG_MOTION) == MOTION_CONSTANT && way->told == rig.told[units_axis(motor)];
-    uint32_t time = now - way->since;
-    if (steady && time < WAY_MS)
+    const struct travel *travel = &rig.travel[motor];
+    bool constant = (rig.status[motor] & FLAG_MOTION) == MOTION_CONSTANT;
+    bool steady = constant && travel->commanded == rig.commanded[units_axis(motor)];
+    uint32_t time = now - travel->began;
+    if (steady && time < TRAVEL_MS)
         return false;
-    int32_t expected = way->told * (int32_t)time / SPEEDS_A_MS, moved = rig.position[motor] - way->begin;
-    begin_way(motor, now);
-    return steady && labs(moved - expected) > labs(expected) / 4 + SLACK;
+    int32_t expected = travel->commanded * (int32_t)time / SPEED_OF_MICROSTEP_MS;
+    int32_t moved = rig.position[motor] - travel->start;
+    begin_travel(motor, now);
+    return steady && labs(moved - expected) > labs(expected) / 4 + TOLERANCE;
 }
 
-static void distrust(void)
+static void report_fault(void)
 {
-    rig_trouble(STATUS_FAULT, 0);
-    rig_forget();
+    rig_fail(STATUS_FAULT, 0);
+    rig_void_position();
 }
 
-/* The first time they are told to brake; if that does not help either, they lose their current. */
-static void check_orders(uint32_t now)
+/* A contradiction first makes all axes brake; if it persists, the motors lose their current. */
+static void check_commands(uint32_t now)
 {
     bool contradicted = false;
     for (uint8_t m = 0; m < MOTORS; m++)
         contradicted = contradicted || contradicts(m);
     if (!contradicted) {
-        rig.obeyed = now;
-        rig.doubted = false;
-    } else if (now - rig.obeyed >= PATIENCE_MS) {
-        rig.obeyed = now;
-        rig.doubted ? rig_hold() : distrust();
-        rig.doubted = true;
+        rig.consistent = now;
+        rig.contradiction_handled = false;
+    } else if (now - rig.consistent >= CONTRADICTION_MS) {
+        rig.consistent = now;
+        rig.contradiction_handled ? rig_hold() : report_fault();
+        rig.contradiction_handled = true;
     }
 }
 
 void driver_monitor_tick(uint32_t now)
 {
-    bool brakes = rig.mode == MODE_REST || rig.mode == MODE_GOTO_SOON || homing_brakes();
-    bool judged = (rig.mode == MODE_RUN || brakes) && !rig.held && !rig_mute();
+    bool brakes = rig.mode == MODE_REST || rig.mode == MODE_GOTO_PENDING || homing_settling();
+    bool monitored = (rig.mode == MODE_RUN || brakes) && !rig.held && !rig_any_driver_absent();
     for (uint8_t m = 0; m < MOTORS; m++)
-        if (!judged)
-            begin_way(m, now);
-        else if (strays(m, now) && rig.mode == MODE_RUN)
-            distrust();
-    if (judged)
-        check_orders(now);
+        if (!monitored)
+            begin_travel(m, now);
+        else if (deviates(m, now) && rig.mode == MODE_RUN)
+            report_fault();
+    if (monitored)
+        check_commands(now);
     else
-        rig.obeyed = now;
+        rig.consistent = now;
 }

@@ -1,10 +1,10 @@
-/* Whether the drivers do what they were told, as far as their answers show. */
+/* Compares what the drivers report with their commands. */
 #ifndef DRIVER_MONITOR_H
 #define DRIVER_MONITOR_H
 
 #include <stdint.h>
 
-/* One look, after the motion's step; now is in ms. */
+/* Check all drivers; call once a tick after motion_tick. now is in ms. */
 void driver_monitor_tick(uint32_t now);
 
 #endif

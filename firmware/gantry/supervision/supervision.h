@@ -1,8 +1,8 @@
-/* Supervision: what the drivers say, and what follows from it. */
+/* Supervision: checks what the drivers report, and stops the rig. */
 #ifndef SUPERVISION_H
 #define SUPERVISION_H
 
-/* One look. */
+/* Check all drivers; call once a tick after a poll. */
 void supervision_tick(void);
 
 #endif
