@@ -1,8 +1,8 @@
-/* The firmware's core on a host, against the models of drivers and mechanics, in a time that only orders advance.
+/* The firmware's core on a host, with the models of drivers and mechanics; time passes only on command.
  *
- * Lines on standard input: `send HEX` gives the core bytes, `run S` lets time pass, `pass S` while the core is busy,
- * `wraps S` lets the core's clock of milliseconds wrap in S seconds, `restart` is a reset of the controller, `quit`, and
- * those of control.h. Each is answered by JSON lines; `{"done": true}` is the last. */
+ * Commands on standard input, a line each: `send HEX` sends bytes to the core, `run S` lets time pass, `pass S` lets it
+ * pass while the core is busy, `wraps S` makes the core's clock wrap around in S seconds, `restart` resets the
+ * controller, `quit`, and those of plant_commands.h. JSON lines answer each; `{"done": true}` is the last. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -69,7 +69,7 @@ static void run(double seconds)
     }
 }
 
-static bool obey(char *line)
+static bool execute(char *line)
 {
     line[strcspn(line, "\n")] = '\0';
     if (strncmp(line, "send ", 5) == 0)
@@ -93,9 +93,9 @@ int main(int argc, char **argv)
     double place[AXES] = {0.1, -0.1, 0.2};
     for (int a = 0; a < AXES && a + 1 < argc; a++)
         place[a] = strtod(argv[a + 1], NULL);
-    plant_begin(&plant, place);
+    plant_start(&plant, place);
     gantry_start();
     while (fgets(line, sizeof line, stdin) != NULL && strcmp(line, "quit\n") != 0)
-        telemetry_send("\"done\": %s", obey(line) ? "true" : "false");
+        telemetry_send("\"done\": %s", execute(line) ? "true" : "false");
     return 0;
 }

@@ -40,5 +40,7 @@ void telemetry_send(const char *format, ...)
 
 void telemetry_event(double time, const char *event, enum motor motor, double value)
 {
-    telemetry_send("\"event\": \"%s\", \"t\": %.4f, \"motor\": \"%s\", \"value\": %.4g", event, time, telemetry_motors[motor], value);
+    telemetry_send(
+        "\"event\": \"%s\", \"t\": %.4f, \"motor\": \"%s\", \"value\": %.4g", event, time,
+        telemetry_motors[motor], value);
 }

@@ -16,7 +16,7 @@ static void log_nothing(avr_t *avr, const int level, const char *format, va_list
     (void)avr, (void)level, (void)format, (void)arguments;
 }
 
-void board_note(double *worst, avr_cycle_count_t cycles)
+void board_record_worst(double *worst, avr_cycle_count_t cycles)
 {
     if ((double)cycles / BOARD_HZ > *worst)
         *worst = (double)cycles / BOARD_HZ;
@@ -36,7 +36,7 @@ static avr_cycle_count_t wake(avr_t *avr, avr_cycle_count_t when, void *paramete
 static void run_processor(void)
 {
     const avr_cycle_count_t slice = (avr_cycle_count_t)(BOARD_HZ * PLANT_DT);
-    if (board.debt >= slice) { /* it slept through */
+    if (board.debt >= slice) { /* it slept throughout */
         board.debt -= slice;
         return;
     }
@@ -55,7 +55,7 @@ void board_step(void)
 {
     if (board_runs() && !board_crashed())
         run_processor();
-    board_see_alive_line();
+    board_update_standby();
     plant_step(board.plant);
 }
 
@@ -79,20 +79,20 @@ static void *module(const char *kind)
     return NULL;
 }
 
-/* The processor sleeps, and we need not wait. */
+/* Skip the time in which the processor sleeps. */
 static void sleep_through(avr_t *avr, avr_cycle_count_t cycles)
 {
     (void)avr;
     board.slept += cycles;
 }
 
-/* The loop resets the watchdog each time round. */
-static int hear_watchdog(avr_io_t *io, uint32_t what, void *parameter)
+/* The loop resets the watchdog in each iteration. */
+static int watchdog_reset(avr_io_t *io, uint32_t what, void *parameter)
 {
     (void)io, (void)parameter;
     if (what == AVR_IOCTL_WATCHDOG_RESET) {
         if (board.looped != 0)
-            board_note(&board.worst.loop, board.avr->cycle - board.looped - board.slept);
+            board_record_worst(&board.worst.loop, board.avr->cycle - board.looped - board.slept);
         board.looped = board.avr->cycle;
         board.slept = 0;
     }
@@ -106,14 +106,14 @@ static void wire(void)
     board.spi = module("spi");
     avr->sleep = sleep_through;
     avr->run_cycle_limit = 1000;
-    board.listener = (avr_io_t){.kind = "listener", .ioctl = hear_watchdog};
+    board.listener = (avr_io_t){.kind = "listener", .ioctl = watchdog_reset};
     avr_register_io(avr, &board.listener);
     board_wire_resets();
     board_wire_uart();
     board_wire_spi();
 }
 
-/* simavr takes anything for a program. */
+/* simavr does not check this. */
 static bool is_firmware(const char *elf)
 {
     unsigned char head[20] = {0};
@@ -125,7 +125,7 @@ static bool is_firmware(const char *elf)
     return whole && memcmp(head, "\177ELF", 4) == 0 && head[18] == AVR_MACHINE && head[19] == 0;
 }
 
-bool board_begin(struct plant *plant, const char *elf, double boot)
+bool board_start(struct plant *plant, const char *elf, double boot)
 {
     elf_firmware_t firmware = {.frequency = (uint32_t)BOARD_HZ};
     avr_global_logger_set(log_nothing);

@@ -1,4 +1,4 @@
-/* What the parts of the board share. */
+/* Shared by the parts of the board. */
 #ifndef BOARD_INTERNAL_H
 #define BOARD_INTERNAL_H
 
@@ -18,8 +18,8 @@ struct board {
     avr_uart_t *uart;
     avr_spi_t *spi;
     void (*reset)(avr_t *avr);
-    bool powered, held, was_reset, by_order, restarting;
-    double boot, starts, alive_until;
+    bool powered, held, was_reset, requested, restarting;
+    double boot, starts, standby_until;
     avr_cycle_count_t debt, busy_until;
     uint8_t spi_byte, sent[4096];
     size_t sent_count;
@@ -36,7 +36,7 @@ struct board {
 
 extern struct board board;
 
-/* Put our own between simavr and its parts. */
+/* Hook into simavr's peripherals. */
 void board_wire_resets(void);
 void board_wire_uart(void);
 void board_wire_spi(void);
@@ -44,11 +44,11 @@ void board_wire_spi(void);
 /* Whether the controller has power, is not held in reset, and has started. */
 bool board_runs(void);
 
-/* The drivers' reset follows the controller's pin. */
-void board_see_alive_line(void);
+/* Let the drivers' reset follow the controller's pin. */
+void board_update_standby(void);
 
-/* Cycles of a byte on the serial line; the longest of some times so far. */
+/* Cycles of a byte on the serial line; update the longest of some times. */
 avr_cycle_count_t board_byte_cycles(void);
-void board_note(double *worst, avr_cycle_count_t cycles);
+void board_record_worst(double *worst, avr_cycle_count_t cycles);
 
 #endif

@@ -1,13 +1,13 @@
-/* Resets, power, and the line that keeps the drivers awake. */
+/* Resets, power, and the drivers' standby line. */
 #include <string.h>
 
 #include "board/board_internal.h"
 #include "telemetry.h"
 
-#define ALIVE_MASK 0x10 /* of port D */
+#define STANDBY_MASK 0x10 /* of port D */
 #define MCUSR_DATA 0x54
 #define START_UP 0.065  /* s, the chip's own after any reset */
-#define HOLD 0.25       /* s that the drivers' reset stays up by its capacitor when nobody drives it */
+#define HOLD 0.25       /* s that a capacitor keeps the undriven reset of the drivers high */
 #define JUMP_TO_ITSELF 0xCFFF
 
 static void unhang(void)
@@ -18,7 +18,7 @@ static void unhang(void)
     board.hung_word = 0;
 }
 
-/* simavr calls it at the end of each reset, the watchdog's too. */
+/* simavr calls it at the end of each reset, also the watchdog's. */
 static void after_reset(avr_t *avr)
 {
     if (board.reset != NULL)
@@ -29,7 +29,7 @@ static void after_reset(avr_t *avr)
     board.busy_until = board.debt = board.looped = board.line_end = 0;
     board.starts = board.plant->time + START_UP;
     chain_select(&board.plant->chain, false);
-    if (!board.by_order)
+    if (!board.requested)
         telemetry_send("\"event\": \"reset\", \"t\": %.4f, \"reason\": \"watchdog\"", board.plant->time);
 }
 
@@ -39,9 +39,9 @@ void board_reset(enum board_reset reason)
     static const uint8_t flags[] = {1, 2, 8, 2}; /* of MCUSR */
     if (!board.powered)
         return;
-    board.by_order = true;
+    board.requested = true;
     avr_reset(board.avr);
-    board.by_order = false;
+    board.requested = false;
     board.avr->data[MCUSR_DATA] = flags[reason];
     board.starts = board.plant->time + START_UP + board.boot;
     telemetry_send("\"event\": \"reset\", \"t\": %.4f, \"reason\": \"%s\"", board.plant->time, names[reason]);
@@ -54,7 +54,7 @@ void board_power(bool on)
     if (begins)
         board_reset(RESET_POWER);
     if (!on)
-        board.alive_until = board.plant->time;
+        board.standby_until = board.plant->time;
 }
 
 void board_hold(bool held)
@@ -62,7 +62,7 @@ void board_hold(bool held)
     bool ends = board.held && !held;
     board.held = held;
     if (ends)
-        board_reset(RESET_ORDERED);
+        board_reset(RESET_BUTTON);
 }
 
 void board_hang(void)
@@ -76,16 +76,16 @@ void board_hang(void)
     board.avr->state = cpu_Running;
 }
 
-/* A pin that nobody drives keeps its level for a while; a controller without power pulls it down. */
-void board_see_alive_line(void)
+/* An undriven pin keeps its level for a while; a controller without power pulls it low. */
+void board_update_standby(void)
 {
     avr_ioport_state_t port = {.ddr = 0};
     double now = board.plant->time;
     avr_ioctl(board.avr, AVR_IOCTL_IOPORT_GETSTATE('D'), &port);
-    bool driven = board_runs() && (port.ddr & ALIVE_MASK) != 0;
+    bool driven = board_runs() && (port.ddr & STANDBY_MASK) != 0;
     if (driven)
-        board.alive_until = (port.port & ALIVE_MASK) != 0 ? now + HOLD : now;
-    bool alive = board.powered && now < board.alive_until;
+        board.standby_until = (port.port & STANDBY_MASK) != 0 ? now + HOLD : now;
+    bool alive = board.powered && now < board.standby_until;
     for (int i = 0; i < CHIPS; i++)
         l6470_wake(&board.plant->chain.chips[i], alive);
 }

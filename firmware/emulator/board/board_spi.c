@@ -1,4 +1,4 @@
-/* The SPI: a byte takes eight clocks of the rate that is set, not simavr's 100 us. */
+/* The SPI: a byte takes eight clocks of the configured rate instead of simavr's 100 us. */
 #include "board/board_internal.h"
 
 #define SELECT_PIN 2 /* of port B */

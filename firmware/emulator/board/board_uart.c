@@ -4,10 +4,10 @@
 #include "board/board_internal.h"
 
 #define DATA_OVERRUN 0x08 /* of UCSR0A */
-#define FIFO 3          /* bytes of the real receiver: two, and the one that comes in */
+#define FIFO 3          /* bytes of the real receiver: two, and the one in the shift register */
 #define BYTE_BITS 10
 
-/* Reading a byte takes back the flag that others were lost, as on the chip. */
+/* Reading a byte clears the overrun flag, as on the chip. */
 static uint8_t uart_read(avr_t *avr, avr_io_addr_t address, void *parameter)
 {
     (void)parameter;
@@ -26,7 +26,7 @@ static void uart_sent(avr_irq_t *irq, uint32_t value, void *parameter)
 {
     (void)irq, (void)parameter;
     if (board.line_end != 0 && board.avr->cycle >= board.line_end)
-        board_note(&board.worst.answer, board.avr->cycle - board.line_end);
+        board_record_worst(&board.worst.answer, board.avr->cycle - board.line_end);
     board.line_end = 0;
     if (board.sent_count < sizeof board.sent)
         board.sent[board.sent_count++] = (uint8_t)value;
@@ -46,12 +46,12 @@ static unsigned waiting_bytes(void)
     return (unsigned)(fifo->write - fifo->read) & 63;
 }
 
-bool board_wants(void)
+bool board_ready(void)
 {
     return board.avr->cycle >= board.busy_until || !board_runs();
 }
 
-void board_give(uint8_t byte)
+void board_receive(uint8_t byte)
 {
     if (!board_runs() || !avr_regbit_get(board.avr, board.uart->rxen))
         return;
@@ -67,7 +67,7 @@ void board_give(uint8_t byte)
     avr_raise_irq(avr_io_getirq(board.avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
 }
 
-size_t board_sent(uint8_t *bytes, size_t size)
+size_t board_transmitted(uint8_t *bytes, size_t size)
 {
     size_t count = board.sent_count < size ? board.sent_count : size;
     memcpy(bytes, board.sent, count);

@@ -1,6 +1,6 @@
 #include "l6470/chain.h"
 
-#define PULLED_UP 0xFF /* what the controller reads when no driver speaks */
+#define PULLED_UP 0xFF /* what the controller reads from an open line */
 
 void chain_select(struct chain *chain, bool selected)
 {
@@ -8,9 +8,9 @@ void chain_select(struct chain *chain, bool selected)
         selected = chain->selected = false;
     for (int i = 0; i < CHIPS; i++) {
         if (selected && !chain->selected)
-            chain->shift[i] = l6470_next(&chain->chips[i]);
+            chain->shift[i] = l6470_transmit(&chain->chips[i]);
         else if (!selected && chain->selected)
-            l6470_take(&chain->chips[i], chain->shift[i]);
+            l6470_receive(&chain->chips[i], chain->shift[i]);
     }
     chain->selected = selected;
 }

@@ -1,4 +1,4 @@
-/* Drivers behind one another: their shift registers are one, as long as chip select is low. */
+/* Daisy chain: the drivers form one shift register while chip select is low. */
 #ifndef CHAIN_H
 #define CHAIN_H
 
@@ -6,7 +6,7 @@
 
 #define CHIPS 4
 
-/* What is cut of the wires to the drivers: nothing, chip select (or all), clock, data to the first. */
+/* Which wire to the drivers is cut: none, chip select (or all), clock, data to the first. */
 enum cut { CUT_NOTHING, CUT_SELECT, CUT_CLOCK, CUT_DATA };
 
 struct chain {
@@ -18,7 +18,7 @@ struct chain {
 
 void chain_select(struct chain *chain, bool selected);
 
-/* A byte in at the first, one out at the last. */
+/* Shift a byte in at the first driver and one out at the last. */
 uint8_t chain_shift(struct chain *chain, uint8_t byte);
 
 #endif

@@ -42,7 +42,8 @@ static uint16_t motion_bits(const struct l6470 *chip)
 
 uint16_t l6470_status(const struct l6470 *chip)
 {
-    const uint16_t low_when_raised = L6470_UNDERVOLTAGE | L6470_WARMING | L6470_SHUTDOWN | L6470_OVERCURRENT | L6470_LOSS;
+    const uint16_t low_when_raised =
+        L6470_UNDERVOLTAGE | L6470_WARMING | L6470_SHUTDOWN | L6470_OVERCURRENT | L6470_LOSS;
     uint16_t status = (uint16_t)(chip->latched ^ low_when_raised);
     status |= (uint16_t)(chip->bridges_off | l6470_reached(chip) << 1 | chip->switch_closed << 2 | chip->forward << 4);
     return (uint16_t)(status | motion_bits(chip) << 5);

@@ -1,5 +1,5 @@
-/* A model of one L6470 stepper driver (ST, DocID 16737 Rev 3): registers, commands, ramps, flags. No hardware, no clock:
- * bytes and time come in. Positions are microsteps, speeds microsteps/s. */
+/* A model of one L6470 stepper driver (ST, DocID 16737 Rev 3): registers, commands, ramps, flags. Bytes and time are
+ * its inputs. Positions are microsteps, speeds microsteps/s. */
 #ifndef L6470_H
 #define L6470_H
 
@@ -12,17 +12,17 @@ enum l6470_heat { L6470_COOL, L6470_WARM, L6470_TOO_HOT };
 struct l6470 {
     uint32_t registers[32];
     enum l6470_motion motion;
-    double field; /* where the field stands, in microsteps of 1/128 */
+    double field; /* position of the field, in microsteps of 1/128 */
     double zero;  /* where ABS_POS is 0 */
     double speed, wanted, goal;
     bool powered, awake; /* motor supply, and reset high */
     bool bridges_off, off_after_stop, forward, copy_to_mark;
     bool switch_closed;
-    bool deaf;   /* it answers, and does nothing of what it is told */
-    bool frozen; /* the counter stands still */
+    bool deaf;   /* it answers, and ignores commands */
+    bool frozen; /* the counter does not count */
     int32_t frozen_at;
     enum l6470_heat heat;
-    uint16_t latched; /* flags of STATUS that are raised, all active high here */
+    uint16_t latched; /* flags of STATUS that are raised, active high */
     uint8_t op, left, answer_left;
     uint32_t argument, answer;
 };
@@ -32,28 +32,28 @@ enum { /* bits of `latched`, where STATUS has them */
     L6470_WARMING = 1 << 10, L6470_SHUTDOWN = 1 << 11, L6470_OVERCURRENT = 1 << 12, L6470_LOSS = 3 << 13
 };
 
-/* Motor supply, and the reset input; without either everything is forgotten. */
+/* Switch the motor supply and the reset input; without either the chip resets. */
 void l6470_power(struct l6470 *chip, bool powered);
 void l6470_wake(struct l6470 *chip, bool awake);
 
-/* What chip select's rising edge brings in; the byte that will be shifted out in the next frame. */
-void l6470_take(struct l6470 *chip, uint8_t byte);
-uint8_t l6470_next(const struct l6470 *chip);
+/* Receive a byte at chip select's rising edge; the byte to shift out in the next frame. */
+void l6470_receive(struct l6470 *chip, uint8_t byte);
+uint8_t l6470_transmit(const struct l6470 *chip);
 
 void l6470_switch(struct l6470 *chip, bool closed);
 void l6470_heat(struct l6470 *chip, enum l6470_heat heat);
 
-/* A motor that slipped, and a short circuit. */
+/* The motor slipped; the motor is short-circuited. */
 void l6470_loss(struct l6470 *chip);
 void l6470_short(struct l6470 *chip);
 
-/* A counter that stands still from now on, or goes on. */
+/* Stop or continue counting. */
 void l6470_freeze(struct l6470 *chip, bool frozen);
 
-/* A driver that starts anew without a word. */
+/* Reset without raising a flag. */
 void l6470_forget(struct l6470 *chip);
 
-/* Time passes, s. */
+/* Let time pass, s. */
 void l6470_advance(struct l6470 *chip, double dt);
 
 int32_t l6470_position(const struct l6470 *chip);

@@ -11,7 +11,7 @@ static void answer(struct l6470 *chip, uint32_t value, uint8_t bytes)
     chip->answer_left = bytes;
 }
 
-/* Whether the bridges can drive a motor; a motion ends their high impedance. */
+/* Whether the bridges can drive a motor; if so, end their high impedance. */
 static bool ready(struct l6470 *chip)
 {
     if ((chip->latched & (L6470_SHUTDOWN | L6470_OVERCURRENT)) != 0) {
@@ -36,16 +36,16 @@ static void run(struct l6470 *chip, enum l6470_motion motion, bool forward, doub
     chip->wanted = forward ? speed : -speed;
 }
 
-static void go(struct l6470 *chip, double way)
+static void go(struct l6470 *chip, double distance)
 {
     if (!l6470_reached(chip)) {
         chip->latched |= L6470_NOT_PERFORMED;
         return;
     }
-    if (way == 0 || !ready(chip))
+    if (distance == 0 || !ready(chip))
         return;
     chip->motion = L6470_GOES;
-    chip->goal = floor(chip->field) + way;
+    chip->goal = floor(chip->field) + distance;
     chip->wanted = top_speed(chip);
 }
 
@@ -59,8 +59,8 @@ static void move(struct l6470 *chip, bool forward, uint32_t steps)
 
 static void go_to(struct l6470 *chip, uint32_t position)
 {
-    int64_t way = ((int64_t)position - l6470_position(chip)) & 0x3FFFFF;
-    go(chip, way < 0x200000 ? (double)way : (double)way - 0x400000);
+    int64_t distance = ((int64_t)position - l6470_position(chip)) & 0x3FFFFF;
+    go(chip, distance < 0x200000 ? (double)distance : (double)distance - 0x400000);
 }
 
 static void release(struct l6470 *chip, bool forward)
@@ -93,7 +93,7 @@ static void perform(struct l6470 *chip)
     }
 }
 
-/* Commands without an argument; false for those that are none. */
+/* Perform a command without an argument; false when it is unknown. */
 static bool perform_bare(struct l6470 *chip, uint8_t op)
 {
     if ((op & 0xF6) == 0x92) {
@@ -143,7 +143,7 @@ static void begin(struct l6470 *chip, uint8_t op)
         chip->latched |= L6470_WRONG;
 }
 
-void l6470_take(struct l6470 *chip, uint8_t byte)
+void l6470_receive(struct l6470 *chip, uint8_t byte)
 {
     if (!chip->powered || !chip->awake)
         return;
@@ -159,7 +159,7 @@ void l6470_take(struct l6470 *chip, uint8_t byte)
         perform(chip);
 }
 
-uint8_t l6470_next(const struct l6470 *chip)
+uint8_t l6470_transmit(const struct l6470 *chip)
 {
     if (!chip->powered || !chip->awake || chip->answer_left == 0)
         return 0;

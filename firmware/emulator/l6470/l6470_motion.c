@@ -27,7 +27,7 @@ void l6470_shut(struct l6470 *chip)
     l6470_stand(chip);
 }
 
-static void note_position(struct l6470 *chip)
+static void record_position(struct l6470 *chip)
 {
     if (chip->copy_to_mark)
         chip->registers[MARK] = (uint32_t)l6470_position(chip) & 0x3FFFFF;
@@ -44,11 +44,11 @@ void l6470_switch(struct l6470 *chip, bool closed)
     if (closes)
         chip->latched |= L6470_SWITCH_EVENT;
     if (opens && chip->motion == L6470_RELEASES) {
-        note_position(chip);
+        record_position(chip);
         l6470_stand(chip);
     }
     if (closes && chip->motion == L6470_UNTIL)
-        note_position(chip);
+        record_position(chip);
     if (closes && chip->motion == L6470_UNTIL && (chip->registers[CONFIG] & STOPS_SOFT))
         l6470_brake(chip, false);
     else if (closes && chip->motion != L6470_STANDS && !(chip->registers[CONFIG] & STOPS_SOFT))
@@ -69,10 +69,10 @@ static void approach(struct l6470 *chip, double wanted, double dt)
 
 static void advance_to_goal(struct l6470 *chip, double dt)
 {
-    double way = chip->goal - chip->field, braking = sqrt(2 * chip->registers[DEC] * RAMP_UNIT * fabs(way));
+    double distance = chip->goal - chip->field, braking = sqrt(2 * chip->registers[DEC] * RAMP_UNIT * fabs(distance));
     double speed = fmin(braking, chip->wanted);
-    approach(chip, way > 0 ? speed : -speed, dt);
-    if (fabs(chip->speed) * dt < fabs(way)) {
+    approach(chip, distance > 0 ? speed : -speed, dt);
+    if (fabs(chip->speed) * dt < fabs(distance)) {
         chip->field += chip->speed * dt;
         return;
     }

@@ -12,15 +12,14 @@
 #define BARRIER (PULL * 4 / M_PI) /* (full steps/s)2, half the square of the speed that one pole can catch: 480 */
 #define BOUNCING 0.003            /* s that a switch bounces when it closes or opens */
 #define BOUNCE 0.0003             /* s between two edges of that */
-#define FRICTION 20000.0          /* full steps/s2 of a rotor that no field holds, 6 m/s2 */
-
-#define CAUGHT 0.6                /* of a turn of four steps; at a half a rotor can fall to either side */
+#define FRICTION 20000.0          /* full steps/s2 of a rotor without a holding field, 6 m/s2 */
+#define CAUGHT 0.6                /* of a turn of four steps; at one half a rotor can fall either way */
 
 static const struct axis_constants constants[AXES] = AXIS_ROWS;
 static const enum axis axis_of[MOTORS] = MOTOR_AXES;
 
 /* In m or degrees: from step 0 to where the switch at home closes, from the highest position to where the other one
- * closes, how much earlier that one opens, and how far behind them the frame ends. */
+ * closes, its hysteresis, and from both to the end of the frame. */
 static const struct {
     double closes, beyond, hysteresis, frame;
 } ends[AXES] = {{0.001, 0.005, 0.001, 0.02}, {0.001, 0.005, 0.001, 0.02}, {1, 1.5, 1, 8}};
@@ -42,7 +41,7 @@ static double length_of(enum motor motor)
     return c->high * 1e-6 / plant_unit(motor) + c->offset / MICRO;
 }
 
-/* The field goes in microsteps. */
+/* The field moves in microsteps. */
 static double field_of(const struct plant *plant, enum motor motor)
 {
     return floor(plant->chain.chips[motor].field) / MICRO + plant->carriages[motor].origin;
@@ -54,7 +53,7 @@ static bool bounces(const struct plant *plant, const struct carriage *c)
     return left > 0 && (int)(left / BOUNCE) % 2 == 1;
 }
 
-static void see_switch(struct plant *plant, enum motor motor)
+static void update_switch(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
     enum axis axis = axis_of[motor];
@@ -72,10 +71,11 @@ static void see_switch(struct plant *plant, enum motor motor)
     l6470_switch(&plant->chain.chips[motor], seen);
 }
 
-static void hit_frame(struct plant *plant, enum motor motor)
+static void limit_to_frame(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
-    double room = steps_of(motor, ends[axis_of[motor]].frame), at = fmin(fmax(c->at, -room), length_of(motor) + room);
+    double room = steps_of(motor, ends[axis_of[motor]].frame);
+    double at = fmin(fmax(c->at, -room), length_of(motor) + room);
     if (at == c->at) {
         c->crashed = false;
         return;
@@ -89,7 +89,7 @@ static void hit_frame(struct plant *plant, enum motor motor)
     c->speed = 0;
 }
 
-static void note_slip(struct plant *plant, enum motor motor)
+static void detect_slip(struct plant *plant, enum motor motor)
 {
     struct carriage *c = &plant->carriages[motor];
     double turns = (field_of(plant, motor) - c->at) / 4;
@@ -104,14 +104,14 @@ static void note_slip(struct plant *plant, enum motor motor)
     c->slips = slips;
 }
 
-static void rub(struct carriage *c)
+static void apply_friction(struct carriage *c)
 {
     double loss = FRICTION * PLANT_DT;
     c->speed = fabs(c->speed) < loss ? 0 : c->speed - copysign(loss, c->speed);
 }
 
-/* A rotor that is too quick for a pole slips over one after the other: they pull it to and fro, and only friction brakes
- * it. Pull and damping come from the same current, so both together are no more than the most that there is. */
+/* A rotor that is too fast for a pole slips from one to the next: their pull averages out, and only friction brakes it.
+ * Pull and damping come from the same current, so their sum is limited. */
 static void move_rotor(struct plant *plant, enum motor motor, double field_speed)
 {
     struct carriage *c = &plant->carriages[motor];
@@ -122,11 +122,11 @@ static void move_rotor(struct plant *plant, enum motor motor, double field_speed
     if (!off)
         c->speed += fmin(fmax(pull, -PULL), PULL) * PLANT_DT;
     if (off || slips)
-        rub(c);
+        apply_friction(c);
     c->at += c->speed * PLANT_DT;
 }
 
-static void note_extremes(struct plant *plant, enum motor motor, double before, double field)
+static void record_extremes(struct plant *plant, enum motor motor, double before, double field)
 {
     struct extremes *e = &plant->extremes[motor];
     const struct l6470 *chip = &plant->chain.chips[motor];
@@ -142,13 +142,13 @@ static void step_motor(struct plant *plant, enum motor motor)
     struct l6470 *chip = &plant->chain.chips[motor];
     double before = chip->speed, field = chip->field;
     l6470_advance(chip, PLANT_DT);
-    note_extremes(plant, motor, before, field);
+    record_extremes(plant, motor, before, field);
     if (!plant->carriages[motor].torn) {
         move_rotor(plant, motor, chip->speed / MICRO);
-        hit_frame(plant, motor);
-        note_slip(plant, motor);
+        limit_to_frame(plant, motor);
+        detect_slip(plant, motor);
     }
-    see_switch(plant, motor);
+    update_switch(plant, motor);
 }
 
 void plant_step(struct plant *plant)
@@ -158,7 +158,7 @@ void plant_step(struct plant *plant)
     plant->time += PLANT_DT;
 }
 
-void plant_begin(struct plant *plant, const double *place)
+void plant_start(struct plant *plant, const double *place)
 {
     memset(plant, 0, sizeof *plant);
     for (int m = 0; m < MOTORS; m++) {
@@ -167,7 +167,7 @@ void plant_begin(struct plant *plant, const double *place)
         chip->awake = true;
         l6470_power(chip, true);
         c->at = c->origin = place[axis_of[m]] / plant_unit(m) + constants[axis_of[m]].offset / MICRO;
-        see_switch(plant, m);
+        update_switch(plant, m);
     }
 }
 

@@ -20,7 +20,7 @@ struct carriage {
 };
 
 struct extremes {
-    double speed, ramp, way; /* of a driver, in m, s or rad, s; way adds up */
+    double speed, ramp, way; /* of a driver, in m, s or rad, s; way is the total travel */
 };
 
 struct plant {
@@ -35,10 +35,10 @@ struct pose {
     double place[AXES], speed[AXES], skew; /* m, m, rad */
 };
 
-/* A rig that stands at a place (m, m, rad), with all power on. */
-void plant_begin(struct plant *plant, const double *place);
+/* Set up a rig that stands at a place (m, m, rad), with all power on. */
+void plant_start(struct plant *plant, const double *place);
 
-/* One step of PLANT_DT. */
+/* Let PLANT_DT pass. */
 void plant_step(struct plant *plant);
 
 struct pose plant_pose(const struct plant *plant);
@@ -49,7 +49,7 @@ bool plant_moves(const struct plant *plant);
 /* m or rad of a motor's full step. */
 double plant_unit(enum motor motor);
 
-/* Push a carriage by full steps, as someone's hand does. */
+/* Push a carriage by full steps, as by hand. */
 void plant_push(struct plant *plant, enum motor motor, double steps);
 
 void plant_motor_power(struct plant *plant, bool on);

@@ -21,29 +21,29 @@ static int motor_of(const char *word)
     return which(word, telemetry_motors, MOTORS);
 }
 
-static bool on_motor(struct plant *plant, const char *order, int motor, const char *how)
+static bool inject_fault(struct plant *plant, const char *command, int motor, const char *how)
 {
     static const char *const stuck[] = {"works", "open", "closed"}, *const heats[] = {"cool", "warm", "hot"};
     static const char *const off_on[] = {"off", "on"};
     struct l6470 *chip = &plant->chain.chips[motor];
     int choice;
-    if (strcmp(order, "push") == 0 && fabs(strtod(how, NULL)) <= 10000)
+    if (strcmp(command, "push") == 0 && fabs(strtod(how, NULL)) <= 10000)
         plant_push(plant, (enum motor)motor, strtod(how, NULL));
-    else if (strcmp(order, "switch") == 0 && (choice = which(how, stuck, 3)) >= 0)
+    else if (strcmp(command, "switch") == 0 && (choice = which(how, stuck, 3)) >= 0)
         plant->carriages[motor].stuck = (enum stuck)choice;
-    else if (strcmp(order, "heat") == 0 && (choice = which(how, heats, 3)) >= 0)
+    else if (strcmp(command, "heat") == 0 && (choice = which(how, heats, 3)) >= 0)
         l6470_heat(chip, (enum l6470_heat)choice);
-    else if (strcmp(order, "miscount") == 0 && fabs(strtod(how, NULL)) <= 10000)
+    else if (strcmp(command, "miscount") == 0 && fabs(strtod(how, NULL)) <= 10000)
         chip->zero += round(strtod(how, NULL) * 128);
-    else if (strcmp(order, "tear") == 0)
+    else if (strcmp(command, "tear") == 0)
         plant->carriages[motor].torn = true;
-    else if (strcmp(order, "short") == 0)
+    else if (strcmp(command, "short") == 0)
         l6470_short(chip);
-    else if (strcmp(order, "freeze") == 0 && (choice = which(how, off_on, 2)) >= 0)
+    else if (strcmp(command, "freeze") == 0 && (choice = which(how, off_on, 2)) >= 0)
         l6470_freeze(chip, choice);
-    else if (strcmp(order, "deaf") == 0 && (choice = which(how, off_on, 2)) >= 0)
+    else if (strcmp(command, "deaf") == 0 && (choice = which(how, off_on, 2)) >= 0)
         chip->deaf = choice;
-    else if (strcmp(order, "forget") == 0)
+    else if (strcmp(command, "forget") == 0)
         l6470_forget(chip);
     else
         return false;
@@ -61,19 +61,19 @@ static bool cut(struct plant *plant, const char *word)
 
 bool plant_command(struct plant *plant, const char *line)
 {
-    char order[16] = "", first[16] = "", second[16] = "";
-    int words = sscanf(line, "%15s %15s %15s", order, first, second);
-    if (words == 1 && strcmp(order, "pose") == 0) {
+    char command[16] = "", first[16] = "", second[16] = "";
+    int words = sscanf(line, "%15s %15s %15s", command, first, second);
+    if (words == 1 && strcmp(command, "pose") == 0) {
         plant_report_pose(plant);
-    } else if (words == 1 && strcmp(order, "extremes") == 0) {
+    } else if (words == 1 && strcmp(command, "extremes") == 0) {
         plant_report_extremes(plant);
         memset(plant->extremes, 0, sizeof plant->extremes);
-    } else if (words == 2 && strcmp(order, "cut") == 0) {
+    } else if (words == 2 && strcmp(command, "cut") == 0) {
         return cut(plant, first);
-    } else if (words == 2 && strcmp(order, "motors") == 0 && (!strcmp(first, "on") || !strcmp(first, "off"))) {
+    } else if (words == 2 && strcmp(command, "motors") == 0 && (!strcmp(first, "on") || !strcmp(first, "off"))) {
         plant_motor_power(plant, strcmp(first, "on") == 0);
     } else {
-        return words >= 2 && motor_of(first) >= 0 && on_motor(plant, order, motor_of(first), second);
+        return words >= 2 && motor_of(first) >= 0 && inject_fault(plant, command, motor_of(first), second);
     }
     return true;
 }

@@ -19,8 +19,8 @@ static double largest(double a, double b)
 
 void plant_report_extremes(const struct plant *plant)
 {
-    const struct extremes *x = &plant->extremes[MOTOR_X], *y = &plant->extremes[MOTOR_Y1], *w = &plant->extremes[MOTOR_Y2];
-    const struct extremes *a = &plant->extremes[MOTOR_ALPHA];
+    const struct extremes *x = &plant->extremes[MOTOR_X], *a = &plant->extremes[MOTOR_ALPHA];
+    const struct extremes *y = &plant->extremes[MOTOR_Y1], *w = &plant->extremes[MOTOR_Y2];
     telemetry_send("\"speed\": [%.5f, %.5f, %.5f], \"ramp\": [%.5f, %.5f, %.5f], \"way\": [%.7f, %.7f, %.7f]", x->speed,
         largest(y->speed, w->speed), a->speed, x->ramp, largest(y->ramp, w->ramp), a->ramp, x->way,
         largest(y->way, w->way), a->way);

@@ -11,11 +11,11 @@
 #include <unistd.h>
 
 #define PATIENCE_MS 5000
-#define LOOK_EVERY 10 /* calls of cable_opened between two looks at the terminal */
+#define POLL_EVERY 10 /* calls of cable_opened between two polls of the terminal */
 
 static int master = -1;
 static bool hung, dtr;
-static unsigned noise, looks;
+static unsigned noise, polls;
 static uint8_t buffer[8192];
 static size_t begin, end, written;
 static char terminal[64], *linked;
@@ -72,7 +72,7 @@ static bool stays_up(void)
 bool cable_opened(void)
 {
     struct pollfd state = {.fd = master, .events = 0};
-    if (master < 0 || ++looks % LOOK_EVERY != 0)
+    if (master < 0 || ++polls % POLL_EVERY != 0)
         return false;
     poll(&state, 1, 0);
     bool now_hung = (state.revents & POLLHUP) != 0, rises = hung && !now_hung && !dtr;
@@ -96,7 +96,7 @@ static uint8_t through_noise(uint8_t byte)
     return byte;
 }
 
-void cable_listen(void)
+void cable_fetch(void)
 {
     if (master < 0)
         return;
@@ -110,11 +110,11 @@ void cable_listen(void)
 bool cable_await(size_t count)
 {
     struct pollfd state = {.fd = master, .events = POLLIN};
-    cable_listen();
+    cable_fetch();
     while (end - begin < count && end < sizeof buffer && poll(&state, 1, PATIENCE_MS) > 0) {
         if ((state.revents & POLLIN) == 0)
             break;
-        cable_listen();
+        cable_fetch();
     }
     return end - begin >= count;
 }

@@ -12,7 +12,7 @@
 #include "program/state.h"
 #include "telemetry.h"
 
-#define MOST_STEPPED 3600.0 /* s of one order */
+#define MOST_STEPPED 3600.0 /* s of one command */
 
 bool commands_plug(void)
 {
@@ -42,7 +42,7 @@ static bool step(const char *text)
     return true;
 }
 
-static bool question(const char *line)
+static bool query(const char *line)
 {
     if (strcmp(line, "overruns") == 0)
         telemetry_send("\"overruns\": %lu", board_overruns());
@@ -56,7 +56,7 @@ static bool question(const char *line)
     return true;
 }
 
-static bool obey(const char *line)
+static bool execute(const char *line)
 {
     if (strcmp(line, "plug") == 0)
         return commands_plug();
@@ -67,7 +67,7 @@ static bool obey(const char *line)
     else if (strncmp(line, "await ", 6) == 0)
         return cable_await(strtoul(line + 6, NULL, 10));
     else if (strcmp(line, "reset") == 0)
-        board_reset(RESET_ORDERED);
+        board_reset(RESET_BUTTON);
     else if (strcmp(line, "hold on") == 0 || strcmp(line, "hold off") == 0)
         board_hold(line[6] == 'n');
     else if (strcmp(line, "lose") == 0)
@@ -77,7 +77,7 @@ static bool obey(const char *line)
     else if (strcmp(line, "quit") == 0)
         emulator.ended = 1;
     else
-        return question(line) || plant_command(&emulator.plant, line);
+        return query(line) || plant_command(&emulator.plant, line);
     return true;
 }
 
@@ -91,10 +91,10 @@ static void execute_line(const char *line)
     if (strncmp(line, "run ", 4) == 0) {
         if (!step(line + 4))
             telemetry_send("\"error\": \"run takes seconds up to %g, with --stepped\"", MOST_STEPPED);
-    } else if (obey(line))
+    } else if (execute(line))
         commands_done();
     else
-        telemetry_send("\"error\": \"no such order, see --help\"");
+        telemetry_send("\"error\": \"no such command, see --help\"");
 }
 
 void commands_execute(void)

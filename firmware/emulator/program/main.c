@@ -38,8 +38,8 @@ int main(int argc, char **argv)
         fputs("rig-emulator: expected options as --help shows them, and the firmware's ELF file\n", stderr);
         return 2;
     }
-    plant_begin(&emulator.plant, emulator.place);
-    if (!board_begin(&emulator.plant, elf, emulator.boot)) {
+    plant_start(&emulator.plant, emulator.place);
+    if (!board_start(&emulator.plant, elf, emulator.boot)) {
         fprintf(stderr, "rig-emulator: %s is no firmware that can be read: build it with make firmware\n", elf);
         return 2;
     }
@@ -52,6 +52,6 @@ int main(int argc, char **argv)
     cable_unplug();
     if (!board_crashed())
         return 0;
-    fputs("rig-emulator: the controller's program emulator.ended, which it must not\n", stderr);
+    fputs("rig-emulator: the controller's program ended, which it must not\n", stderr);
     return 1;
 }

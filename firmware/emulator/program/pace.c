@@ -12,8 +12,8 @@
 #include "program/state.h"
 #include "telemetry.h"
 
-#define SLICE 10 /* steps between two looks at the world: 1 ms */
-#define LISTEN 5 /* steps between two looks at the cable */
+#define SLICE_STEPS 10 /* steps between two polls of the commands: 1 ms */
+#define FETCH_EVERY 5 /* steps between two fetches from the cable */
 #define LATE 0.05 /* s */
 
 double pace_clock(void)
@@ -26,7 +26,7 @@ double pace_clock(void)
 static void serve_cable(void)
 {
     uint8_t bytes[256];
-    size_t count = board_sent(bytes, sizeof bytes);
+    size_t count = board_transmitted(bytes, sizeof bytes);
     if (cable_opened())
         board_reset(RESET_OPENED);
     if (count > 0)
@@ -36,11 +36,11 @@ static void serve_cable(void)
 static void pass_slice(void)
 {
     uint8_t byte;
-    for (int i = 0; i < SLICE; i++) {
-        if (i % LISTEN == 0)
-            cable_listen();
-        if (board_wants() && cable_read(&byte))
-            board_give(byte);
+    for (int i = 0; i < SLICE_STEPS; i++) {
+        if (i % FETCH_EVERY == 0)
+            cable_fetch();
+        if (board_ready() && cable_read(&byte))
+            board_receive(byte);
         board_step();
         serve_cable();
     }
@@ -50,16 +50,17 @@ static void pass_slice(void)
     }
 }
 
-static void admit_lateness(double late)
+static void report_lateness(double late)
 {
     emulator.late += late;
-    telemetry_send("\"event\": \"late\", \"t\": %.4f, \"late\": %.4f, \"total\": %.4f", emulator.plant.time, late, emulator.late);
+    telemetry_send(
+        "\"event\": \"late\", \"t\": %.4f, \"late\": %.4f, \"total\": %.4f", emulator.plant.time, late, emulator.late);
     emulator.base_wall = pace_clock();
     emulator.base_time = emulator.plant.time;
 }
 
-/* ms that there is nothing to do */
-static int idle(void)
+/* Milliseconds until there is something to do. */
+static int idle_ms(void)
 {
     double ahead = emulator.plant.time - emulator.base_time - (pace_clock() - emulator.base_wall);
     if (emulator.pace == FAST)
@@ -67,11 +68,11 @@ static int idle(void)
     if (emulator.pace == STEPPED)
         return emulator.plant.time < emulator.until - PLANT_DT / 2 ? 0 : 1000;
     if (ahead < -LATE)
-        admit_lateness(-ahead);
+        report_lateness(-ahead);
     return ahead > 0.001 ? (int)(ahead * 1000) : 0;
 }
 
-static void look_around(int patience)
+static void poll_commands(int patience)
 {
     struct pollfd input = {.fd = emulator.running ? STDIN_FILENO : -1, .events = POLLIN};
     commands_execute();
@@ -85,8 +86,8 @@ static void look_around(int patience)
 void pace_run(void)
 {
     while (!emulator.ended && !board_crashed()) {
-        look_around(idle());
-        if (idle() > 0)
+        poll_commands(idle_ms());
+        if (idle_ms() > 0)
             continue;
         pass_slice();
         if (emulator.waiting && emulator.plant.time >= emulator.until - PLANT_DT / 2) {
