@@ -7,7 +7,7 @@ from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import printable
-from dodo_dsl.run import capabilities
+from dodo_dsl.run.capabilities import examine
 from dodo_dsl.run.work_folder import reap_folders
 
 EXAMPLES = """examples:
@@ -26,10 +26,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.clean:
         reap_folders()
-        reaped = capabilities.clean()
+        reaped = examine.clean()
         stderr.writelines(f"removed: {printable(line)}\n" for line in reaped.removed)
         stderr.writelines(f"cannot be removed: {printable(line)}\n" for line in reaped.left)
-    findings = capabilities.examine()
+    findings = examine.examine()
     if options.json:
         stdout.write(json.dumps([dataclasses.asdict(f) for f in findings], indent=2) + "\n")
     else:

@@ -1,4 +1,4 @@
-"""What the runner tells a test's bus: that everything is ready, and on real rigs that it is still there."""
+"""What the runner sends on a test's bus: that everything is ready, and on real rigs that it is still running."""
 
 import asyncio
 import contextlib
@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 
 def begin_frame(seed: int) -> bytes:
-    """``dodo.TestBegin`` as a datagram, sampled now."""
+    """``dodo.TestBegin`` as a datagram, with the current time as its sample time."""
     return _frame(MessageSet.standard().type("dodo.TestBegin")(seed=seed))
 
 
@@ -30,26 +30,26 @@ def _frame(message: Message) -> bytes:
 
 
 def send_on_host(cid: int, frame: bytes) -> None:
-    """To a session on this machine's own network; raises OSError."""
+    """Sends a datagram to a session on this machine's own network; raises OSError."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(frame, (f"225.0.0.{cid}", _PORT))
 
 
 @contextlib.asynccontextmanager
-async def signs_of_life(cid: int) -> AsyncIterator[None]:
-    """Meanwhile a session of this machine hears each second that the runner is there."""
-    task = asyncio.ensure_future(_live(cid))
+async def heartbeat(cid: int) -> AsyncIterator[None]:
+    """Within the block, sends ``dodo.Alive`` each second to a session of this machine."""
+    task = asyncio.ensure_future(_beat(cid))
     try:
         yield
     finally:
         task.cancel()
 
 
-async def _live(cid: int) -> None:
+async def _beat(cid: int) -> None:
     kind = MessageSet.standard().type("dodo.Alive")
     while True:
         try:
             send_on_host(cid, _frame(kind()))
         except OSError as error:
-            _log.warning("CID %d cannot be told that the runner is there: %s", cid, error)
+            _log.warning("cannot send a sign of life to CID %d: %s", cid, error)
         await asyncio.sleep(ALIVE_S)

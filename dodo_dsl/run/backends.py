@@ -1,4 +1,4 @@
-"""Where tests run: each kind of backend prepares once for a run, and makes one backend a test."""
+"""Where tests run: each kind of backend prepares once for a run, and makes one backend for each test."""
 
 import asyncio
 import contextlib
@@ -15,19 +15,19 @@ from dodo_dsl.run.docker import cleanup
 from dodo_dsl.run.docker.backend import DockerBackend, other_subnets
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.pulls import Pulls
-from dodo_dsl.run.process import host_isolation
+from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
-from dodo_dsl.run.process.commands import Lane
-from dodo_dsl.run.process.fork_server_client import Nursery
+from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs import rigs
+from dodo_dsl.run.rigs.attendance import attended, is_real
 
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Job:
-    """A Plan, the folder that it was compiled into, and the one that takes its logs and pictures.
+    """A Plan, the folder that it was compiled into, and the folder for its logs and pictures.
 
     ``test`` is the slug that all repetitions of a test share.
     """
@@ -53,15 +53,15 @@ class Backends(Protocol):
         ...
 
     def open(self, job: Job, say: Say, keep: bool) -> AbstractAsyncContextManager[Backend]:
-        """A backend for one test; raises BackendError when there is none to be had."""
+        """A backend for one test; raises BackendError when none is available."""
         ...
 
 
 class Processes:
-    """Local processes, each test in namespaces of its own, or on the host in a leased lane, as a real rig always is."""
+    """Local processes, each test in namespaces of its own, or on the host in a leased slot, as on a real rig."""
 
     name = "process"
-    _nursery: Nursery | None = None
+    _fork_server: ForkServer | None = None
 
     def __init__(self, cids: Sequence[int], isolation: str | None, descriptors: tuple[int, ...]) -> None:
         self._cids = cids
@@ -69,43 +69,43 @@ class Processes:
         self._descriptors = descriptors
         self._alone = asyncio.Lock()
 
-    def _turn(self, plan: Plan) -> AbstractAsyncContextManager[None]:
-        """Tests of this run that need the machine for themselves queue here, where waiting has no limit."""
+    def _exclusively(self, plan: Plan) -> AbstractAsyncContextManager[None]:
+        """A queue without time limit for tests of this run that need the machine for themselves."""
         return self._alone if host_isolation.runs_alone(plan) else contextlib.nullcontext()
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        for left in host_isolation.reap():
+        for left in leftovers.reap():
             note(f"removed what a killed run left: {left}")
         wanted = {self._isolation or plan.isolation for plan in plans}
         if self._isolation is None and "network" in wanted:
             refusal = await asyncio.to_thread(host_isolation.namespaces_refusal)
             if refusal:
-                note(f"no namespaces here ({refusal}): tests share the host, each with leases")
+                note(f"no namespaces on this machine ({refusal}): tests share the host, each with leases")
                 self._isolation = "host"
         if "network" in wanted and self._isolation != "host":
-            self._nursery = Nursery(self._descriptors)
+            self._fork_server = ForkServer(self._descriptors)
 
     def close(self) -> None:
-        if self._nursery is not None:
-            self._nursery.close()
+        if self._fork_server is not None:
+            self._fork_server.close()
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
         plan = job.plan
-        isolation = "host" if rigs.is_real(plan) else self._isolation or plan.isolation
+        isolation = "host" if is_real(plan) else self._isolation or plan.isolation
         if isolation == "network":
-            lane = Lane(plan.cid, descriptors=self._descriptors)
-            yield ProcessBackend(plan, job.folder, job.report, isolation, lane, self._nursery)
+            slot = Slot(plan.cid, descriptors=self._descriptors)
+            yield ProcessBackend(plan, job.folder, job.report, isolation, slot, self._fork_server)
             return
         async with (
-            self._turn(plan),
-            host_isolation.host_lane(
-                plan, () if rigs.is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
+            self._exclusively(plan),
+            host_isolation.host_slot(
+                plan, () if is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
             ) as leased,
-            rigs.attended(plan, leased.cid, leased.descriptors, say) as descriptors,
+            attended(plan, leased.cid, leased.descriptors, say) as descriptors,
         ):
-            lane = replace(leased, descriptors=(*descriptors, *self._descriptors))
-            yield ProcessBackend(plan, job.folder, job.report, isolation, lane)
+            slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
+            yield ProcessBackend(plan, job.folder, job.report, isolation, slot)
 
 
 class Containers:
@@ -133,7 +133,7 @@ class Containers:
             note(f"what a killed run left cannot be removed: {left}")
 
     def close(self) -> None:
-        """Nothing but the tests' own is up."""
+        """Does nothing: only the tests' own containers run, and each test removes them."""
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
@@ -146,12 +146,12 @@ class Containers:
         subnets = other_subnets(plan.subnet, self._subnets)
         backend = DockerBackend(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say)
         try:
-            if plan.isolation == "network" and not rigs.is_real(plan):
+            if plan.isolation == "network" and not is_real(plan):
                 yield backend
             else:
                 async with (
-                    host_isolation.host_lane(plan, (plan.cid,), say, alone=True) as lane,
-                    rigs.attended(plan, lane.cid, lane.descriptors, say),
+                    host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
+                    attended(plan, slot.cid, slot.descriptors, say),
                 ):
                     yield backend
         finally:

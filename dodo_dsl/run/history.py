@@ -1,4 +1,4 @@
-"""How long tests took on this machine, kept over runs: for forecasts, and for the picture of set-up and execution."""
+"""How long tests took on this machine, kept over runs: for forecasts, and for the plot of set-up and execution."""
 
 import contextlib
 import json
@@ -6,14 +6,16 @@ import math
 import os
 import statistics
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.state_folder import NoStateFolder, state_path
 
-_MOST_BYTES = 4_000_000
+_MAX_BYTES = 4_000_000
 _RECENT = 5
+PATH_VARIABLE = "DODO_HISTORY"
 
 
 @dataclass(frozen=True)
@@ -32,32 +34,31 @@ class Run:
 
 
 def default_path() -> Path:
-    """``DODO_HISTORY``, else a file of this user's state (XDG base directories); none for a user without a home."""
-    if named := os.environ.get("DODO_HISTORY"):
-        return Path(named)
+    """``DODO_HISTORY``, else a file in this user's state folder; the null device for a user without a home folder."""
     try:
-        state = Path(os.environ.get("XDG_STATE_HOME") or "~/.local/state").expanduser()
-    except RuntimeError:
+        return state_path(PATH_VARIABLE, "history.jsonl")
+    except NoStateFolder:
         return Path(os.devnull)
-    return state / "dodo" / "history.jsonl"
 
 
 class History:
-    """A file with a line of JSON a run. One that cannot be read or written is as good as none."""
+    """A file with a line of JSON for each run of a test. Nothing is kept where it cannot be read or written."""
 
-    def __init__(self, path: Path | None = None) -> None:
+    def __init__(self, path: Path | None = None, clock: Callable[[], float] = time.time) -> None:
+        """``clock`` gives seconds since the epoch."""
         self.path = path or default_path()
+        self._clock = clock
         self.runs = list(_read(self.path))
         self._saved = len(self.runs)
 
     def seconds(self, spec: str, test: str, backend: str, clock: str) -> float | None:
-        """What the test took lately, from the begin of its set-up to its end; None when it never ran."""
+        """The median time of the latest runs, from the begin of set-up to the end; None when the test never ran."""
         key = (spec, test, backend, clock)
         took = [r.setup_s + r.execution_s for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key]
         return statistics.median(took[-_RECENT:]) if took else None
 
     def times(self, tests: Iterable[tuple[str, str]], backend: str) -> dict[str, list[tuple[float, float]]]:
-        """Seconds of set-up and execution of all runs of tests, each given as spec and name."""
+        """Seconds of set-up and execution of all runs of ``tests``, which are pairs of spec and name."""
         found: dict[str, list[tuple[float, float]]] = {}
         wanted = set(tests)
         for r in self.runs:
@@ -67,20 +68,20 @@ class History:
         return found
 
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
-        """Remember outcomes beside the name of their test; those that ended in error tell nothing about its time."""
+        """Adds pairs of a test's name and its outcome; errors are left out, as they say nothing about its time."""
         self.runs += [
-            Run(int(time.time()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s)
+            Run(int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s)
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
         ]
 
     def save(self) -> None:
-        """Add to the file what was remembered since it was read."""
+        """Appends to the file what was added since it was read."""
         text = "".join(json.dumps(asdict(run)) + "\n" for run in self.runs[self._saved :])
         self._saved = len(self.runs)
         with contextlib.suppress(OSError):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            if self.path.is_file() and self.path.stat().st_size > _MOST_BYTES:
+            if self.path.is_file() and self.path.stat().st_size > _MAX_BYTES:
                 self._shorten()
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(text)
@@ -93,7 +94,7 @@ class History:
 
 
 def _read(path: Path) -> Iterator[Run]:
-    """What can be read; a line that a killed run left unfinished is left out."""
+    """The valid lines; one that a killed run left unfinished is skipped."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -1,7 +1,7 @@
 """Leases: lock files that die with their holder, for CIDs, shared-memory prefixes and running alone.
 
-A lease is a ``flock`` on an open file, which every process that inherited the descriptor holds; beside it lies a
-record of what it covers, so that the next run can remove what a killed holder left.
+A lease is a ``flock`` on an open file, held by every process that inherited the descriptor. Beside it lies a record of
+what it covers, so that the next run can remove what a killed holder left.
 """
 
 import asyncio
@@ -10,7 +10,6 @@ import errno
 import fcntl
 import json
 import os
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,10 +19,10 @@ FOLDER_VARIABLE = "DODO_LEASES"
 DEFAULT_PATIENCE_S = 600.0
 RUN, PROJECT = "run-", "docker-"
 ONCE = (RUN, PROJECT)
-"""Leases of random names: nobody ever waits for one, so their lock files need not stay."""
+"""Prefixes of leases with random names: nobody ever waits for one, so their lock files are removed."""
 _RETRY_S = 0.2
 _NO_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
-"""What reading a record raises that is damaged, or that somebody else wrote."""
+"""Raised by reading a record that is damaged or was written by another program."""
 
 
 class LeaseTimeout(Exception):
@@ -45,15 +44,15 @@ def folder() -> Path:
 
 @dataclass(frozen=True)
 class Lease:
-    """A held lock; ``descriptor`` is handed to whoever shall hold it too."""
+    """A held lock; a process that inherits ``descriptor`` holds it, too."""
 
     name: str
     descriptor: int
     record: Path
 
     def release(self) -> None:
-        """Gives up this process's hold and the record; the lock file goes too where its name never comes again."""
-        with contextlib.suppress(OSError):  # what cannot be removed is the next run's to remove
+        """Gives up this process's hold and removes the record, and the lock file where its name is never used again."""
+        with contextlib.suppress(OSError):  # the next run removes the rest
             self.record.unlink(missing_ok=True)
             if self.name.startswith(ONCE):
                 _lock_file(self.name).unlink(missing_ok=True)
@@ -69,7 +68,7 @@ def _lock_file(name: str) -> Path:
 
 
 def _open(name: str) -> int:
-    """The lock file, made where there is none: kernels refuse O_CREAT on another user's file in a sticky folder."""
+    """Opens the lock file, or creates it: kernels refuse O_CREAT on another user's file in a sticky folder."""
     flags = os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW
     while True:
         try:
@@ -101,7 +100,7 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
 
 
 def holder(name: str) -> str:
-    """Who holds a lease, for a sentence; its record may be another user's."""
+    """Who holds a lease, for a message; its record may be another user's."""
     for record in sorted(folder().glob(f"{name}.*.json")):
         with contextlib.suppress(OSError, *_NO_RECORD):
             about = json.loads(record.read_text())
@@ -116,7 +115,7 @@ def _is_alive(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except PermissionError:
-        return True  # it is another user's
+        return True  # another user's process
     return True
 
 
@@ -127,18 +126,22 @@ async def lease_any(
     shared: bool = False,
     patience_s: float = DEFAULT_PATIENCE_S,
 ) -> Lease:
-    """The first of the leases that is free; waits for one, says once for whom, and raises LeaseTimeout at the limit."""
-    deadline = time.monotonic() + patience_s
-    told = False
+    """The first of the leases that is free; waits for one, calls ``waiting`` once with a sentence, raises LeaseTimeout.
+
+    Times are of the event loop's clock, in s.
+    """
+    now = asyncio.get_running_loop().time
+    deadline = now() + patience_s
+    is_announced = False
     while True:
         for name in names:
             if lease := try_lease(name, about, shared):
                 return lease
-        if time.monotonic() > deadline:
+        if now() > deadline:
             raise LeaseTimeout(f"no {_kind(names)} came free within {patience_s:g} s; {holder(names[0])} holds one")
-        if not told:
+        if not is_announced:
             waiting(f"waiting for {holder(names[0])}")
-            told = True
+            is_announced = True
         await asyncio.sleep(_RETRY_S)
 
 
@@ -147,7 +150,7 @@ def _kind(names: Sequence[str]) -> str:
 
 
 def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
-    """This user's leases that nobody holds any more but whose record is still there; each is yielded held."""
+    """This user's leases that nobody holds but whose record is still there; each is yielded held, with its record."""
     for record in sorted(folder().glob(f"{prefix}*.json")):
         name = record.name.split(".")[0]
         with contextlib.suppress(OSError):
@@ -164,7 +167,7 @@ def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
 
 
 def _about(record: Path) -> dict[str, Any]:
-    """What a record says; nothing when its writer was killed before it was whole."""
+    """The content of a record; empty when its writer was killed before it was complete."""
     with contextlib.suppress(*_NO_RECORD):
         about = json.loads(record.read_text())
         return about if isinstance(about, dict) else {}
@@ -172,7 +175,7 @@ def _about(record: Path) -> dict[str, Any]:
 
 
 def forget_dead() -> None:
-    """Removes the records of machine leases whose process has gone; their locks went with it."""
+    """Removes the records of machine leases whose process has ended; their locks ended with it."""
     for record in folder().glob("machine.*.json"):
         with contextlib.suppress(OSError, *_NO_RECORD):
             if not Path("/proc", str(int(json.loads(record.read_text())["pid"]))).exists():

@@ -1,4 +1,4 @@
-"""What a backend tells the engine while a test runs."""
+"""What a backend is, and the events that it reports to the engine while a test runs."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -21,7 +21,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Malformed:
-    """A line that means to be a verdict and is none."""
+    """A line that should be a verdict and is not one."""
 
     service: str
     problem: str
@@ -29,7 +29,7 @@ class Malformed:
 
 @dataclass(frozen=True)
 class Exited:
-    """A service has ended; ``code`` is negative for a signal, as subprocess has it."""
+    """A service has ended; ``code`` is negative for a signal, as in subprocess."""
 
     service: str
     code: int
@@ -38,7 +38,7 @@ class Exited:
 
 @dataclass(frozen=True)
 class Overrun:
-    """A service has lost messages of the bus, so many up to now, as its receive buffer was full."""
+    """A service has lost ``messages`` of the bus up to now, as its receive buffer was full."""
 
     service: str
     messages: int
@@ -46,7 +46,7 @@ class Overrun:
 
 @dataclass(frozen=True)
 class Noted:
-    """A sentence of the backend's to know of the test beside its outcome."""
+    """A note on the test beside its outcome."""
 
     text: str
 
@@ -66,7 +66,7 @@ class Lost:
 
 @dataclass(frozen=True)
 class Time:
-    """How far the clock of a lockstep test is: test time in seconds; ``last`` when it goes no further."""
+    """How far the clock of a lockstep test is: test time in seconds; ``last`` when it has stopped."""
 
     seconds: float
     last: bool
@@ -84,7 +84,7 @@ Event = Ready | Verdict | Malformed | Overrun | Noted | Exited | Unstartable | L
 
 
 class Backend(Protocol):
-    """Where a test's services live. ``open`` raises BackendError, the rest reports through events."""
+    """Where a test's services run. ``open`` raises BackendError, the rest reports through events."""
 
     name: str
     cid: int
@@ -92,13 +92,13 @@ class Backend(Protocol):
     async def open(self) -> None: ...
 
     async def start(self, layer: str) -> dict[str, bool]:
-        """Starts the services of a layer; returns their names, and whether each will say that it is ready."""
+        """Starts the services of a layer; returns their names, and whether each will report that it is ready."""
         ...
 
     async def next_event(self) -> Event: ...
 
     async def begin(self) -> None:
-        """Tells the test's bus that everything is ready."""
+        """Announces on the test's bus that everything is ready; may be repeated."""
         ...
 
     async def close(self, keep: bool) -> list[str]:
@@ -111,4 +111,4 @@ class Backend(Protocol):
 
 
 class BackendError(Exception):
-    """The test cannot be run here, in a sentence."""
+    """The test cannot be run here; the text is a sentence."""

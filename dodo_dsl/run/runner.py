@@ -1,8 +1,7 @@
-"""Several tests at once, each on a backend of its own, and a clean machine whatever happens."""
+"""Runs several tests at once, each on a backend of its own, and leaves a clean machine whatever happens."""
 
 import asyncio
 import signal
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,15 +11,15 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
-from dodo_dsl.run.error_outcomes import cause, reason, without_answer, without_number
-from dodo_dsl.run.schedule import Places, Schedule
+from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
+from dodo_dsl.run.schedule import CorePool, Schedule
 
 BackendName = Literal["process", "docker"]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Progress(Protocol):
-    """Who is told how the run goes."""
+    """Shows how the run goes."""
 
     def __enter__(self) -> Self: ...
 
@@ -36,21 +35,21 @@ class Progress(Protocol):
 
 
 def default_backend(plans: Sequence[Plan]) -> BackendName:
-    """Processes when every application service says how to start as one, else containers."""
+    """Processes when every service of the applications can be started as one, else containers."""
     services = [s for plan in plans for s in plan.application.services]
     return "process" if all(s.process for s in services) else "docker"
 
 
 @dataclass(frozen=True)
 class Policy:
-    """What to do when a test does not pass: begin no further ones, run it again when it ended in error."""
+    """What to do when a test does not pass: begin no further ones; run it again when it ended in error."""
 
     fail_fast: bool = False
     retries: int = 0
 
 
 class Runner:
-    """Runs jobs, as many at once as ``schedule`` allows, in its order."""
+    """Runs jobs, as many at once as ``schedule`` allows, in its order. Times are of the event loop's clock, in s."""
 
     def __init__(
         self, progress: Progress, backends: Backends, schedule: Schedule, policy: Policy, keep: bool = False
@@ -63,7 +62,7 @@ class Runner:
         self.kept: list[str] = []
         self.interrupted = False
         self.skipped: list[Job] = []
-        self._places = Places(schedule.capacity)
+        self._cores = CorePool(schedule.capacity)
         self._waiting: list[Job] = []
         self._began: dict[str, tuple[Job, float]] = {}
         self._stop = False
@@ -92,33 +91,33 @@ class Runner:
                 task.cancel()
 
     async def _one(self, job: Job) -> Outcome | None:
-        """A test's outcome, or None when it was not to begin any more."""
+        """A test's outcome, or None when no further test was to begin."""
         try:
-            async with self._places.take(self.schedule.need(job)):
+            async with self._cores.take(self.schedule.need(job)):
                 self._waiting.remove(job)
                 if self._stop:
                     self.skipped.append(job)
                     return None
-                self._began[job.plan.slug] = (job, time.monotonic())
-                outcome = await self._tried(job)
+                self._began[job.plan.slug] = (job, _now())
+                outcome = await self._with_retries(job)
         except asyncio.CancelledError:
-            outcome = without_answer(job.plan, self.backends.name, "the run was interrupted before this test began")
-        except Exception as error:  # noqa: BLE001  (no job takes the results of the others with it)
-            outcome = without_answer(job.plan, self.backends.name, reason(job, error))
+            outcome = error_outcome(job.plan, self.backends.name, "the run was interrupted before this test began")
+        except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
+            outcome = error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
         self._began.pop(job.plan.slug, None)
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
-        self._tell_rest()
+        self._show_rest()
         return outcome
 
-    def _tell_rest(self) -> None:
-        now = time.monotonic()
+    def _show_rest(self) -> None:
+        now = _now()
         running = [(job, now - began) for job, began in self._began.values()]
         if running or self._waiting:
             self.progress.rest(self.schedule.forecast(self._waiting, running), len(running) + len(self._waiting))
 
-    async def _tried(self, job: Job) -> Outcome:
-        """The outcome of the last attempt; what an earlier one left lies in the report, too."""
+    async def _with_retries(self, job: Job) -> Outcome:
+        """The outcome of the last attempt; earlier ones are kept in the report, too."""
         notes: tuple[str, ...] = ()
         for attempt in range(1, self.policy.retries + 2):
             outcome = await self._attempt(job)
@@ -128,9 +127,9 @@ class Runner:
             try:
                 set_aside(job.report, attempt)
             except OSError as error:
-                notes = (*notes, f"not tried again, as its report cannot be set aside: {without_number(error)}")
+                notes = (*notes, f"not retried, as its report cannot be moved: {system_error(error)}")
                 break
-            self.progress.phase(job.plan.slug, f"error, once more: {outcome.reason}")
+            self.progress.phase(job.plan.slug, f"retrying after error: {outcome.reason}")
         return replace(outcome, notes=(*notes, *outcome.notes))
 
     async def _attempt(self, job: Job) -> Outcome:
@@ -144,15 +143,21 @@ class Runner:
             async with self.backends.open(job, say, self.keep) as backend:
                 outcome, kept = await Engine(job.plan, backend, say).run(self.keep)
                 self.kept.extend(kept)
-        except Exception as error:  # noqa: BLE001  (whatever it was, it is about this test alone)
+        except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
             if outcome is None:
-                return without_answer(job.plan, self.backends.name, reason(job, error))
-            return replace(outcome, notes=(*outcome.notes, f"not all of the test was taken down: {cause(job, error)}"))
+                return error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
+            return replace(
+                outcome, notes=(*outcome.notes, f"not all of the test was taken down: {describe(error, job.report)}")
+            )
         return outcome
 
 
+def _now() -> float:
+    return asyncio.get_running_loop().time()
+
+
 def set_aside(report: Path, attempt: int) -> None:
-    """Move what an attempt reported into ``attempts/<number>`` of the same folder."""
+    """Moves what an attempt reported into ``attempts/<number>`` of the same folder."""
     if not report.is_dir():
         return
     target = report / "attempts" / str(attempt)

@@ -1,4 +1,4 @@
-"""Which test comes when: as many at once as the machine carries, those that take longest first."""
+"""The order of tests: as many at once as the machine carries, the longest first."""
 
 import asyncio
 import contextlib
@@ -14,14 +14,15 @@ from dodo_dsl.run.backends import Job
 
 _EPSILON = 1e-9
 _BASE, _PIXELS_PER_CORE = 0.25, 7_500_000.0
+"""Cores for a test without pictures, and pixels a second that a core renders, shares and analyses."""
 _RIG = 2.0
-"""Cores for all of a test's programs, and pixels a second that a core draws, shares and searches for things."""
+"""Cores for all programs of a test on a rig."""
 
 
 def cores_needed(plan: Plan) -> float:
-    """The share of a core that keeps a test in real time, by its pictures; in lockstep one, as nothing waits there.
+    """The cores that keep a test in real time, by the size of its pictures; one in lockstep, which runs at full speed.
 
-    A rig gets room: an emulated one that is late spoils its test.
+    A rig gets more: an emulated one that is late spoils its test.
     """
     if plan.rig:
         return _RIG
@@ -40,7 +41,7 @@ def _pixels_a_second(plan: Plan) -> list[float]:
 
 
 def schedule(jobs: int | None, expected: Callable[[Job], float]) -> "Schedule":
-    """So many jobs at once, or as many as this process's cores carry."""
+    """A schedule of ``jobs`` at once, or of as many as this process's cores carry."""
     if jobs is not None:
         return Schedule(jobs, lambda job: 1.0, expected)
     return Schedule(len(os.sched_getaffinity(0)), lambda job: cores_needed(job.plan), expected)
@@ -48,21 +49,21 @@ def schedule(jobs: int | None, expected: Callable[[Job], float]) -> "Schedule":
 
 @dataclass(frozen=True)
 class Schedule:
-    """How many cores there are to give, what each job takes of them, and how long in s."""
+    """How many cores there are, how many each job needs, and how long it is expected to take in s."""
 
     capacity: float
     need: Callable[[Job], float]
     expected: Callable[[Job], float]
 
     def ordered(self, jobs: Sequence[Job]) -> list[Job]:
-        """Those that take longest first, so that none of them is left over at the end."""
+        """The longest first, so that none of them runs alone at the end."""
         return sorted(jobs, key=self.expected, reverse=True)
 
     def forecast(self, jobs: Sequence[Job], running: Sequence[tuple[Job, float]] = ()) -> float:
-        """Seconds until the last of ``jobs`` has ended; ``running`` have so many seconds behind them."""
+        """Seconds until the last of ``jobs`` has ended; ``running`` are jobs with the seconds that they ran already."""
         now, free = 0.0, self.capacity
         ends: list[tuple[float, int, float]] = []
-        begun = [(job, max(self.expected(job) - gone, 0.0)) for job, gone in running]
+        begun = [(job, max(self.expected(job) - elapsed, 0.0)) for job, elapsed in running]
         for number, (job, left) in enumerate([*begun, *((job, self.expected(job)) for job in jobs)]):
             need = min(self.need(job), self.capacity)
             while ends and free < need - _EPSILON and number >= len(begun):
@@ -73,7 +74,7 @@ class Schedule:
         return max((end for end, _, _ in ends), default=0.0)
 
 
-class Places:
+class CorePool:
     """Cores that tests take and give back, first come, first served."""
 
     def __init__(self, capacity: float) -> None:
@@ -82,7 +83,7 @@ class Places:
 
     @contextlib.asynccontextmanager
     async def take(self, need: float) -> AsyncIterator[None]:
-        """Wait until there is room; what needs more than there is takes all."""
+        """Waits until ``need`` cores are free; a test that needs more than there are takes all."""
         need = min(need, self._capacity)
         turn = asyncio.get_running_loop().create_future()
         self._waiting.append((need, turn))

@@ -1,4 +1,4 @@
-"""A service's output: raw into its log, the last lines in memory, lines for the runner as events."""
+"""A service's output: raw into its log, the last lines in memory, lines of the protocol to a callback."""
 
 import asyncio
 import os
@@ -15,7 +15,7 @@ _TAIL_WIDTH = 300
 class Output:
     """The reading end of a pipe. ``writer`` is handed to the service; ``done`` is set at the end of its output.
 
-    ``on_line`` is told every line, and says whether it was for the runner and is no log.
+    ``on_line`` is called with every line, and returns whether it belongs to the protocol and not to the log.
     """
 
     def __init__(self, log: Path, on_line: Callable[[bytes], bool]) -> None:
@@ -39,19 +39,19 @@ class Output:
         return [line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in self._tail]
 
     def hand_over(self) -> tuple[int, int]:
-        """Stops reading; the descriptors of the pipe and of the log are for whoever goes on."""
+        """Stops reading; returns the descriptors of pipe and log for the process that goes on."""
         asyncio.get_running_loop().remove_reader(self._reader)
         return self._reader, self._log.fileno()
 
     def close(self) -> None:
-        """Takes what is there already, and stops reading."""
+        """Reads the rest that is there already, and stops."""
         while not self.done.is_set() and self._read():
             pass
         if not self.done.is_set():
             self._finish()
 
     def _read(self) -> bool:
-        """Whether there was something to read."""
+        """Reads once; whether there was something to read."""
         try:
             data = os.read(self._reader, 1 << 16)
         except BlockingIOError:
@@ -70,7 +70,7 @@ class Output:
         return True
 
     def _write(self, data: bytes) -> None:
-        """Into the log, while that has room; what a service says to the runner counts either way."""
+        """Writes to the log up to its limit; lines of the protocol count beyond it, too."""
         if self._written > _MAX_LOG:
             return
         if self._written + len(data) > _MAX_LOG:

@@ -1,4 +1,4 @@
-"""Where a run's tests are compiled: a folder that is gone afterwards, or with the next run."""
+"""The temporary folder in which a run's tests are compiled; the next run removes that of a killed one."""
 
 import secrets
 import shutil
@@ -14,7 +14,7 @@ FOLDER_PREFIX = "dodo-run-"
 
 @dataclass
 class WorkFolder:
-    """Where a run's tests are compiled; the next run removes it should this one be killed."""
+    """A leased folder that exists within the block, and stays where ``kept`` was set."""
 
     path: Path
     lease: leases.Lease
@@ -32,7 +32,7 @@ class WorkFolder:
 
 
 def work_folder() -> WorkFolder:
-    """A folder of a fresh name, leased."""
+    """A folder with a fresh name, leased."""
     token = secrets.token_hex(4)
     path = Path(tempfile.gettempdir()).resolve() / f"{FOLDER_PREFIX}{token}"
     lease = leases.try_lease(f"{leases.RUN}{token}", {"folder": str(path)})
@@ -51,6 +51,6 @@ def reap_folders() -> None:
 
 
 def _remove(folder: Path, lease: leases.Lease) -> None:
-    """What cannot be removed now keeps its record, for the next run to try."""
+    """Removes a folder; where that fails its record stays, and the next run tries again."""
     shutil.rmtree(folder, ignore_errors=True)
     lease.leave() if folder.exists() else lease.release()

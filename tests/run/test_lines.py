@@ -3,11 +3,11 @@
 import json
 
 import pytest
+from dodo_dsl.run.service_lines import read_line
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.run.protocol import Malformed, Overrun, Ready, Verdict
-from dodo_dsl.run.service_lines import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
 

@@ -10,7 +10,9 @@ from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.rig import truth_command
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.run import leases
-from dodo_dsl.run.rigs import rigs
+from dodo_dsl.run.rigs import quarantine
+from dodo_dsl.run.rigs.access import MANUAL, query_exclusively
+from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import Parameter
@@ -74,9 +76,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     except (_Usage, *truth_command.PROBLEMS) as error:
         stderr.write(f"dodo rig: {error}\n")
         return Exit.USAGE
-    except (rigs.RigProblem, leases.LeaseTimeout) as problem:
+    except (RigProblem, leases.LeaseTimeout) as problem:
         stderr.write(f"dodo rig: {problem}\n")
-        return Exit.USAGE if isinstance(problem, rigs.RigProblem) and problem.usage else Exit.ERROR
+        return Exit.USAGE if isinstance(problem, RigProblem) and problem.usage else Exit.ERROR
     if options.json:
         stdout.write(json.dumps(results, indent=2) + "\n")
     else:
@@ -104,17 +106,17 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
     """Does the action on one rig; a fault of it is part of a status."""
     result: dict[str, Any] = {"rig": rig.name, "kind": rig.kind, "quarantine": ""}
     if options.action == "clear":
-        rigs.clear(rig.name)
+        quarantine.clear(rig.name)
         return result
     if not rig.is_emulated:
-        result["quarantine"] = rigs.quarantined(rig.name)
+        result["quarantine"] = quarantine.quarantined(rig.name)
     if rig.entry("serial") is None:
         if options.action != "status":
             raise _Usage(f"rig '{rig.name}' has no serial port: nothing of it moves")
         return result
     try:
         return {**result, **_moved(options, rig, say)}
-    except rigs.RigProblem as problem:
+    except RigProblem as problem:
         if options.action != "status":
             raise
         return {**result, "error": str(problem)}
@@ -123,7 +125,7 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
 def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
     place = (options.x, options.y, options.yaw) if options.action == "goto" else ()
     words = [*_flags(rig), options.action, *(f"{number:g}" for number in place)]
-    return rigs.ask_alone(rig.cid, f"'dodo rig {options.action}'", (rigs.HAND, words), say, options.wait)
+    return query_exclusively(rig.cid, f"'dodo rig {options.action}'", (MANUAL, words), say, options.wait)
 
 
 def _flags(rig: Rig) -> list[str]:

@@ -12,7 +12,8 @@ from dodo_dsl.rec import truth
 from dodo_dsl.rec.outputs import OutputExists, refuse_existing
 from dodo_dsl.rec.truth import Mark, TruthError
 from dodo_dsl.rec.truth_files import TruthFiles, decoded, given
-from dodo_dsl.run.rigs import camera, rigs
+from dodo_dsl.run.rigs import camera
+from dodo_dsl.run.rigs.access import query_exclusively
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
@@ -97,12 +98,12 @@ def _looked(
         if rig.is_emulated and not (options.box or options.boxes):
             raise TruthError("--picture has no virtual scene: mark its boxes with --box or --boxes")
         return given(options.picture), {}
-    look = camera.look(rig, manifests, spec)
+    snapshot = camera.snapshot(rig, manifests, spec)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "snapshot.png"
-        words = [*look.words, f"--output={path}"]
-        words += [f"--truth-classes={options.classes}"] if look.is_drawn and "=" in options.classes else []
-        said = rigs.ask_alone(rig.cid, "'dodo rig truth'", (look.program, words), say, options.wait)
+        words = [*snapshot.words, f"--output={path}"]
+        words += [f"--truth-classes={options.classes}"] if snapshot.is_rendered and "=" in options.classes else []
+        said = query_exclusively(rig.cid, "'dodo rig truth'", (snapshot.program, words), say, options.wait)
         if said.get("reason"):
             say(f"warning: {said['reason']}")
         return path.read_bytes(), said

@@ -20,7 +20,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.report_folder import Drawable, forget, write_report
 from dodo_dsl.run.backends import Backends, Containers, Job, Processes
 from dodo_dsl.run.history import History
-from dodo_dsl.run.rigs import rigs
+from dodo_dsl.run.rigs.attendance import is_real
 from dodo_dsl.run.runner import Policy, Runner, default_backend
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
@@ -109,7 +109,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 def _refuse_to_keep(plans: Sequence[Plan]) -> None:
     for plan in plans:
-        if rigs.is_real(plan):
+        if is_real(plan):
             raise Usage(f"{plan.name} runs on rig '{plan.rig}', which --keep would leave driven: run it without")
 
 

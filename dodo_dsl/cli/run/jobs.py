@@ -14,7 +14,6 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import runs
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.rigs import rigs
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.settings import Settings
 

@@ -1,4 +1,4 @@
-"""Files out of a container, as the stream that the engine sends: never more of it in memory than a piece."""
+"""Copies files out of a container, from the stream that the engine sends, with one chunk at a time in memory."""
 
 import errno
 import functools
@@ -11,23 +11,24 @@ from typing import IO, Any
 
 from dodo_dsl.emit.output_folder import replace_file
 
-MOST_BYTES = 4 << 30
+MAX_BYTES = 4 << 30
 
 
-def copy_out(container: Any, folder: str, target: Path, most: int = MOST_BYTES) -> None:
-    """The plain files of a container's folder; names that would leave ``target`` and links are passed over.
+def copy_out(container: Any, folder: str, target: Path, max_bytes: int = MAX_BYTES) -> None:
+    """Copies the regular files of a container's folder by their last name; links are skipped.
 
-    Each file is whole or not there. Raises OSError where the disk, the stream or ``most`` bytes of it end.
+    Each file is complete or absent. Raises OSError when the disk is full, or the stream is damaged or longer than
+    ``max_bytes``.
     """
     chunks, _ = container.get_archive(folder)
     try:
-        with tarfile.open(fileobj=_Stream(chunks, most), mode="r|") as tar:
+        with tarfile.open(fileobj=_Stream(chunks, max_bytes), mode="r|") as tar:
             for member in tar:
                 name = Path(member.name).name
                 if member.isfile() and name not in ("", ".", "..") and (content := tar.extractfile(member)):
                     replace_file(target / name, functools.partial(_fill, content))
     except tarfile.TarError as error:
-        raise OSError(errno.EIO, f"what the engine sends of it is damaged ({error})") from error
+        raise OSError(errno.EIO, f"the archive from the engine is damaged ({error})") from error
 
 
 def _fill(content: IO[bytes], path: Path) -> None:
@@ -36,11 +37,11 @@ def _fill(content: IO[bytes], path: Path) -> None:
 
 
 class _Stream(io.RawIOBase):
-    """Chunks of bytes as a file that can be read once; OSError when they are more than ``most`` bytes."""
+    """Chunks of bytes as a file that can be read once; raises OSError beyond ``max_bytes`` bytes."""
 
-    def __init__(self, chunks: Iterable[bytes], most: int) -> None:
+    def __init__(self, chunks: Iterable[bytes], max_bytes: int) -> None:
         self._chunks = iter(chunks)
-        self._most = most
+        self._max_bytes = max_bytes
         self._taken = 0
         self._rest = memoryview(b"")
 
@@ -51,8 +52,8 @@ class _Stream(io.RawIOBase):
         if not self._rest:
             self._rest = memoryview(next((chunk for chunk in self._chunks if chunk), b""))
             self._taken += len(self._rest)
-        if self._taken > self._most:
-            raise OSError(errno.EFBIG, f"they are more than {self._most:,} bytes")
+        if self._taken > self._max_bytes:
+            raise OSError(errno.EFBIG, f"more than {self._max_bytes:,} bytes")
         count = min(len(buffer), len(self._rest))
         buffer[:count], self._rest = self._rest[:count], self._rest[count:]
         return count

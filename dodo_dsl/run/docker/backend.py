@@ -4,31 +4,26 @@ import asyncio
 import contextlib
 import os
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import service_lines
-from dodo_dsl.run.announce import begin_frame, send_on_host
-from dodo_dsl.run.docker.archive import copy_out
-from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, remove_project, stop_project
-from dodo_dsl.run.docker.client import said
+from dodo_dsl.run import service_protocol
+from dodo_dsl.run.docker.bus import announce_begin
+from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
+from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.events import Watch
 from dodo_dsl.run.docker.pulls import Pulls, Say
+from dodo_dsl.run.docker.teardown import take_down, writers
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.service_output import Output
 
-_PORT = 12175
-_REPORT = "/dodo/report"
-# dd makes one datagram of it: bash itself would write one a line, and a frame may hold a byte that is a line's end
-_TELL = 'printf "%b" "$1" | dd bs=65507 iflag=fullblock status=none > "/dev/udp/$2/$3"'
-
 
 class DockerBackend:
-    """One test as a compose project of its own; ``subnets`` are tried in turn until the engine takes one."""
+    """One test as a compose project of its own; ``subnets`` are tried in turn until the engine accepts one."""
 
     name = "docker"
 
@@ -51,21 +46,21 @@ class DockerBackend:
         self._pulls = pulls
         self._subnets = subnets
         self._say = say
-        self._queue: asyncio.Queue[Event] = asyncio.Queue()
+        self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._compose = Compose(plan, folder, report, project, say)
         self._containers: dict[str, Any] = {}
         self._outputs: dict[str, Output] = {}
         self._out_of_memory: set[str] = set()
-        self._watch = Watch(self._heard, lambda why: self._queue.put_nowait(Lost(why)))
+        self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self.left_behind = False
 
     async def open(self) -> None:
         await self._compose.read()
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets)
-        await self._begin_to_watch()
+        await self._start_watching()
 
-    async def _begin_to_watch(self) -> None:
+    async def _start_watching(self) -> None:
         from docker.errors import DockerException
 
         try:
@@ -74,46 +69,46 @@ class DockerBackend:
             if SANDBOX in self._containers:
                 await asyncio.to_thread(self._containers[SANDBOX].start)
         except (DockerException, OSError) as error:
-            raise BackendError(f"the Docker engine cannot start the test: {said(error)}") from error
+            raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
     def _find_containers(self) -> dict[str, Any]:
         found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self.project}"})
         return {c.labels[SERVICE_LABEL]: c for c in found}
 
-    def _heard(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
+    def _take(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
         if action == "oom":
             self._out_of_memory.add(name)
         elif action == "health_status: healthy":
-            self._queue.put_nowait(Ready(name))
+            self._events.put_nowait(Ready(name))
         elif action == "die" and name in self._outputs:
             task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
             task.add_done_callback(lambda t: t.exception())
         elif action == "die":
-            self._queue.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+            self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
 
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
-        self._queue.put_nowait(Exited(name, code, name in self._out_of_memory))
+        self._events.put_nowait(Exited(name, code, name in self._out_of_memory))
 
     async def start(self, layer: str) -> dict[str, bool]:
         names = [s.name for s in self.plan.layer(layer)]
         if layer == "application":
             names = [s.name for s in self.plan.application.services if s.name in self._containers]
-        judges = {s.name for s in self.plan.services if s.judge}
+        evaluators = {s.name for s in self.plan.services if s.judge}
         for name in names:
             self._outputs[name] = Output(
-                self.report / "logs" / f"{layer}.{name}.log", self._reader(layer, name, judges)
+                self.report / "logs" / f"{layer}.{name}.log", self._line_reader(layer, name, evaluators)
             )
         await asyncio.gather(*(self._start(name) for name in self._compose.in_order(names)))
         is_ours = layer != "application"
         return {name: is_ours or self._compose.has_healthcheck(name) for name in names}
 
-    def _reader(self, layer: str, name: str, judges: set[str]) -> Any:
+    def _line_reader(self, layer: str, name: str, evaluators: set[str]) -> Callable[[bytes], bool]:
         def on_line(line: bytes) -> bool:
-            event = None if layer == "application" else service_lines.read_line(name, name in judges, line)
+            event = None if layer == "application" else service_protocol.read_line(name, name in evaluators, line)
             if event is not None:
-                self._queue.put_nowait(event)
+                self._events.put_nowait(event)
             return event is not None
 
         return on_line
@@ -126,14 +121,14 @@ class DockerBackend:
             await asyncio.to_thread(container.start)
         except (DockerException, OSError) as error:
             output.release_writer()
-            why = said(error)
-            self._queue.put_nowait(Unstartable(name, why))
+            why = engine_error(error)
+            self._events.put_nowait(Unstartable(name, why))
             return
         threading.Thread(target=self._follow, args=(container, output.writer), daemon=True).start()
 
     @staticmethod
     def _follow(container: Any, writer: int) -> None:
-        """The thread that copies a container's output into the pipe of its Output."""
+        """Copies a container's output into the pipe of its Output; runs in a thread of its own."""
         with contextlib.suppress(Exception):
             for chunk in container.logs(stream=True, follow=True):
                 os.write(writer, chunk)
@@ -141,31 +136,10 @@ class DockerBackend:
             os.close(writer)
 
     async def next_event(self) -> Event:
-        return await self._queue.get()
+        return await self._events.get()
 
     async def begin(self) -> None:
-        frame, group = begin_frame(self.plan.seed), f"225.0.0.{self.cid}"
-        if SANDBOX not in self._containers:
-            try:
-                send_on_host(self.cid, frame)
-            except OSError as error:
-                raise BackendError(f"the test's bus cannot be told that the test begins: {error}") from error
-            return
-        escaped = "".join(f"\\x{byte:02x}" for byte in frame)
-        words = ["bash", "-c", _TELL, "tell", escaped, group, str(_PORT)]
-        problem = await asyncio.to_thread(self._exec_problem, words)
-        if problem:
-            raise BackendError(f"the test's bus cannot be told that the test begins: {problem}")
-
-    def _exec_problem(self, words: list[str]) -> str:
-        """What a command in the sandbox container failed with, or nothing."""
-        from docker.errors import DockerException
-
-        try:
-            code, output = self._containers[SANDBOX].exec_run(words)
-        except (DockerException, OSError) as error:
-            return str(error)
-        return "" if code == 0 else (output or b"").decode("utf-8", "replace").strip() or f"exit code {code}"
+        await announce_begin(self.cid, self.plan.seed, self._containers.get(SANDBOX))
 
     async def close(self, keep: bool) -> list[str]:
         self._watch.ignores = True
@@ -180,39 +154,18 @@ class DockerBackend:
         return kept
 
     def _take_down(self) -> None:
-        """What cannot be removed, as when the engine has gone, is left to the next run."""
-        try:
-            stop_project(self._client, self.project)
-            for container in self._containers.values():
-                if self._records(container):
-                    self._copy_report(container)
-            remove_project(self._client, self.project)
-        except Exception:  # noqa: BLE001  (whatever it was, the record of what is there has to stay)
-            self.left_behind = True
-            self._note("the engine does not take it down: the next run does, or dodo doctor --clean")
-
-    def _copy_report(self, container: Any) -> None:
-        from docker.errors import DockerException
-
-        try:
-            copy_out(container, f"{_REPORT}/.", self.report)
-        except (DockerException, OSError) as error:
-            why = said(error)
-            self._note(f"the report misses files of {container.labels[SERVICE_LABEL]}: {why}")
+        report = (writers(self.plan), self.report)
+        self.left_behind = not take_down(self._client, self.project, self._containers, report, self._note)
 
     def _note(self, text: str) -> None:
-        """Said at once, and with the outcome."""
+        """Reports a sentence at once, and with the outcome; may be called from any thread."""
         self._say(text)
-        self._watch.tell(self._queue.put_nowait, Noted(text))
-
-    def _records(self, container: Any) -> bool:
-        name = container.labels[SERVICE_LABEL]
-        return any(f.kind == "report" for s in self.plan.services if s.name == name for f in s.flags)
+        self._watch.call_in_loop(self._events.put_nowait, Noted(text))
 
     def _kept(self) -> list[str]:
         compose = f"docker compose -p {self.project}"
         return [
-            f"{self.plan.slug} is kept up as compose project {self.project}",
+            f"{self.plan.slug} is kept running as compose project {self.project}",
             f"look inside:  {compose} ps;  {compose} logs camera;  {compose} exec {SANDBOX} bash",
             f"take it down: {compose} down -v",
         ]

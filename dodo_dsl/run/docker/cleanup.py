@@ -1,4 +1,4 @@
-"""Compose projects on an engine, by label: stop, remove, and find what killed runs left."""
+"""Stops and removes compose projects on an engine, by their label, and those that killed runs left."""
 
 import contextlib
 import functools
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.run import leases
-from dodo_dsl.run.docker.client import said
+from dodo_dsl.run.docker.client import engine_error
 
 PROJECT_LABEL = "com.docker.compose.project"
 SERVICE_LABEL = "com.docker.compose.service"
@@ -17,7 +17,7 @@ _STOP_S = 2
 
 @dataclass
 class Reaped:
-    """What became of what killed runs left, each a phrase: what was removed, and what could not be."""
+    """A phrase for each thing that killed runs left: those that were removed, and those that could not be."""
 
     removed: list[str] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
@@ -40,9 +40,9 @@ def stop_project(client: Any, project: str) -> None:
 
 
 def remove_project(client: Any, project: str) -> int:
-    """Removes containers, networks and volumes of a project, and says how many; what is gone already is no error.
+    """Removes containers, networks and volumes of a project and returns their number, without those already removed.
 
-    Goes on where one cannot be removed, and raises the first such error of the engine's at the end.
+    Goes on when one cannot be removed, and raises the first such error at the end.
     """
     from docker.errors import DockerException, NotFound
 
@@ -61,7 +61,7 @@ def remove_project(client: Any, project: str) -> int:
 
 
 def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
-    """In this order, as networks and volumes go only when no container has them."""
+    """Containers come first: networks and volumes can only be removed when no container uses them."""
     for container in client.containers.list(all=True, filters=_filters(project)):
         yield functools.partial(container.remove, force=True, v=True)
     yield from (network.remove for network in client.networks.list(filters=_filters(project)))
@@ -69,9 +69,9 @@ def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
 
 
 def reap_projects(client: Any) -> Reaped:
-    """Removes the projects of killed runs: those whose lease nobody holds, and nothing else.
+    """Removes the projects of killed runs, which are those whose lease nobody holds.
 
-    One that cannot be removed keeps its record for the next time, and the others go all the same.
+    A project that cannot be removed keeps its record for the next time.
     """
     from docker.errors import DockerException
 
@@ -81,7 +81,7 @@ def reap_projects(client: Any) -> Reaped:
         try:
             count = remove_project(client, project)
         except (DockerException, OSError) as error:
-            reaped.left.append(f"{test}: project {project}: {said(error)}")
+            reaped.left.append(f"{test}: project {project}: {engine_error(error)}")
             lease.leave()
             continue
         if count:

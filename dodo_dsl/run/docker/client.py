@@ -1,4 +1,4 @@
-"""The client of a Docker engine: how to reach one, and what it says in its own words."""
+"""The client of a Docker engine, and the texts of the engine's errors."""
 
 from typing import Any
 
@@ -20,6 +20,6 @@ def connect() -> Any:
     return client
 
 
-def said(error: Exception) -> str:
-    """The engine's own words, without those of the client around them; else the system's."""
+def engine_error(error: Exception) -> str:
+    """The engine's explanation of an error without the client's text around it, or the system's."""
     return str(getattr(error, "explanation", None) or getattr(error, "strerror", None) or error)

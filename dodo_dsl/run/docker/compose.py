@@ -1,4 +1,4 @@
-"""``docker compose`` for one compiled test: what its files mean, its images, its network, volumes and containers."""
+"""``docker compose`` for one compiled test: its configuration, images, network, volumes and containers."""
 
 import asyncio
 import contextlib
@@ -15,11 +15,11 @@ from dodo_dsl.run.protocol import BackendError
 
 _BUILD_PROJECT = "dodo-build"
 _OVERLAP = "overlaps"
-_YIELDING = ("nice", "-n", "10")  # the set-up of one test leaves the processor to those that drive already
+_YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already run
 
 
 class Compose:
-    """The test compiled into ``folder``, as a project; ``services`` are those of its files once they are read."""
+    """The test compiled into ``folder`` as a project; ``services`` are those of its files after ``read``."""
 
     def __init__(self, plan: Plan, folder: Path, report: Path, project: str, say: Say) -> None:
         self.plan = plan
@@ -33,7 +33,7 @@ class Compose:
         """Fills ``services``; raises BackendError."""
         code, out, problem = await self._run("config", "--format", "json")
         if code:
-            raise BackendError(f"docker compose does not take the compiled test: {traced(self.plan, problem)}")
+            raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         self.services = json.loads(out)["services"]
 
     def has_healthcheck(self, name: str) -> bool:
@@ -41,7 +41,7 @@ class Compose:
         return bool(check) and not check.get("disable") and check.get("test") != ["NONE"]
 
     def in_order(self, names: list[str]) -> list[str]:
-        """Services that others of the same layer depend on come first."""
+        """The names in the order of their dependencies within the layer."""
         ordered: list[str] = []
 
         def add(name: str) -> None:
@@ -55,7 +55,7 @@ class Compose:
         return ordered
 
     async def provide_images(self, pulls: Pulls) -> None:
-        """Pulls and builds what the services name, once for all tests of a run; raises BackendError."""
+        """Pulls and builds the services' images, once for all tests of a run; raises BackendError."""
         application = {s.name for s in self.plan.application.services}
         built = [name for name, s in self.services.items() if "build" in s and "@" not in s.get("image", "")]
         own = {s["image"] for name, s in self.services.items() if name not in application}
@@ -70,16 +70,16 @@ class Compose:
             await self._build([name for name in built if name not in named], self.project)
 
     async def _build(self, names: list[str], project: str) -> str:
-        """Builds images; compose writes the project into them, so images with names of their own get one for all."""
+        """Builds images; compose labels them with the project, so named images are built in one common project."""
         self._say(f"building {', '.join(names)}")
         log = self.report / "logs" / "build.log"
         code, _, problem = await self._run("build", *names, log=log, project=project)
         if code:
-            raise BackendError(f"the application's images cannot be built: {problem}; {log} has the whole output")
+            raise BackendError(f"the application's images cannot be built: {problem}; see {log}")
         return ""
 
     async def create(self, subnets: Iterable[str]) -> None:
-        """Network, volumes and containers; a subnet that the engine has in use is left to others. BackendError."""
+        """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError."""
         code, problem = 1, "no subnet is free"
         for subnet in subnets:
             code, _, problem = await self._run("create", "--no-build", "--pull", "never", subnet=subnet)
@@ -94,7 +94,7 @@ class Compose:
         """Exit code, standard output and the last line of standard error of a compose command."""
         environment = {**os.environ, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
-            environment.pop(name, None)  # the test's own .env decides
+            environment.pop(name, None)  # the test's own .env sets them
         if subnet:
             environment["DODO_SUBNET"] = subnet
         process = await asyncio.create_subprocess_exec(
@@ -111,5 +111,5 @@ class Compose:
         if log is not None:
             log.parent.mkdir(parents=True, exist_ok=True)
             log.write_bytes(out + err)
-        said = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
-        return process.returncode or 0, out.decode("utf-8", "replace"), said[-1].strip() if said else ""
+        errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
+        return process.returncode or 0, out.decode("utf-8", "replace"), errors[-1].strip() if errors else ""

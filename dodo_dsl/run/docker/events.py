@@ -1,4 +1,4 @@
-"""The events of one compose project on an engine, told in the loop of who watches it."""
+"""Watches the events of one compose project on an engine, in a thread of its own."""
 
 import asyncio
 import contextlib
@@ -10,44 +10,44 @@ from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 
 
 class Watch:
-    """``heard`` is told a service's name, what happened to it and its attributes; ``lost`` why nothing comes any more.
+    """Calls ``on_event`` with a service's name, action and attributes, and ``on_lost`` with the reason at the end.
 
-    Nobody is told anything once it ``ignores``, as teardown is.
+    Both are called in the event loop of the creator, and not after ``ignores`` was set, as during teardown.
     """
 
-    def __init__(self, heard: Callable[[str, str, Mapping[str, str]], None], lost: Callable[[str], None]) -> None:
+    def __init__(self, on_event: Callable[[str, str, Mapping[str, str]], None], on_lost: Callable[[str], None]) -> None:
         self.ignores = False
-        self._heard = heard
-        self._lost = lost
+        self._on_event = on_event
+        self._on_lost = on_lost
         self._loop = asyncio.get_running_loop()
         self._events: Any = None
 
     def begin(self, client: Any, project: str) -> None:
-        """From now on in a thread of its own; raises DockerException and OSError."""
+        """Starts the thread; raises DockerException and OSError."""
         self._events = client.events(decode=True, filters={"label": f"{PROJECT_LABEL}={project}"})
         threading.Thread(target=self._read, daemon=True).start()
 
-    def tell(self, work: Callable[..., object], *arguments: Any) -> None:
-        """Calls something in the loop, from whatever thread."""
+    def call_in_loop(self, work: Callable[..., object], *arguments: Any) -> None:
+        """Calls a function in the event loop, from any thread."""
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(work, *arguments)
 
     def _read(self) -> None:
         try:
             for event in self._events:
-                self.tell(self._take, event)
-        except Exception as error:  # noqa: BLE001  (whatever ends the stream, the engine is out of sight)
+                self.call_in_loop(self._take, event)
+        except Exception as error:  # noqa: BLE001  (whatever ended the stream, there are no more events)
             why = f"the Docker engine went away: {error}"
         else:
             why = "the Docker engine went away: its events ended"
         if not self.ignores:
-            self.tell(self._lost, why)
+            self.call_in_loop(self._on_lost, why)
 
     def _take(self, event: Mapping[str, Any]) -> None:
         attributes = event.get("Actor", {}).get("Attributes", {})
         name, action = attributes.get(SERVICE_LABEL, ""), str(event.get("Action", ""))
         if name and not self.ignores:
-            self._heard(name, action, attributes)
+            self._on_event(name, action, attributes)
 
     def close(self) -> None:
         self.ignores = True

@@ -1,26 +1,26 @@
-"""Images before a test's clock starts: DoDo's own are pulled when missing, the application's are resolved anew."""
+"""Pulls images before a test begins: DoDo's own when they are missing, the application's always."""
 
 import asyncio
 import threading
 from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
-from dodo_dsl.run.docker.client import said
+from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.protocol import BackendError
 
 Say = Callable[[str], None]
 
 
 class Pulls:
-    """Pulls for all tests of a run: each image once, several at a time."""
+    """Pulls images for all tests of a run: each once, several at a time."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
         self._tasks: dict[str, asyncio.Task[str]] = {}
-        self._over = threading.Event()
+        self._interrupted = threading.Event()
 
     async def provide(self, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
-        """Makes the images local; returns notes on what was taken as it is. Raises BackendError."""
+        """Makes the images local; returns notes on local images that could not be updated. Raises BackendError."""
         waits = [self._pull_once(image, self._own, say) for image in sorted(set(own))]
         waits += [self._pull_once(image, self._application, say) for image in sorted(set(application))]
         return [note for note in await asyncio.gather(*waits) if note]
@@ -29,17 +29,17 @@ class Pulls:
         return await self.once(image, lambda: self._in_thread(work, image, say))
 
     async def _in_thread(self, work: Callable[[str, Say], str], image: str, say: Say) -> str:
-        """Pulls on while tests wait for it; the end of an interrupted run does not."""
+        """Pulls in a thread, which stops at its next step when the run is interrupted."""
         try:
             return await asyncio.to_thread(work, image, say)
         except asyncio.CancelledError:
-            self._over.set()
+            self._interrupted.set()
             raise
 
     async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str]]) -> str:
-        """Does a piece of work once for all tests of the run; those that come later wait for the first.
+        """Does work once for all tests of the run; later callers wait for the first.
 
-        What failed is forgotten, so that a test that is tried again tries it again.
+        Failed work is forgotten, so that a retried test repeats it.
         """
         task = self._tasks.get(key)
         if task is None:
@@ -62,7 +62,7 @@ class Pulls:
         except BackendError as error:
             if not self._is_local(image):
                 raise
-            return f"{error}; the one on this machine is taken"
+            return f"{error}; the local image is used"
         return ""
 
     def _is_local(self, image: str) -> bool:
@@ -73,7 +73,7 @@ class Pulls:
         except ImageNotFound:
             return False
         except (DockerException, OSError) as error:
-            raise BackendError(f"the Docker engine does not answer about image {image}: {error}") from error
+            raise BackendError(f"the Docker engine cannot inspect image {image}: {error}") from error
         return True
 
     def _pull(self, image: str, say: Say) -> None:
@@ -82,11 +82,11 @@ class Pulls:
         progress = _Progress(image, say)
         try:
             for line in self._client.api.pull(*split_reference(image), stream=True, decode=True):
-                if self._over.is_set():
+                if self._interrupted.is_set():
                     return
                 progress.take(line)
         except (DockerException, OSError) as error:
-            raise BackendError(f"image {image} cannot be pulled: {_reason(said(error))}") from error
+            raise BackendError(f"image {image} cannot be pulled: {_reason(engine_error(error))}") from error
 
 
 def split_reference(image: str) -> tuple[str, str]:
@@ -100,18 +100,18 @@ def split_reference(image: str) -> tuple[str, str]:
 
 def _reason(text: str) -> str:
     if any(word in text for word in ("unauthorized", "denied", "no basic auth")):
-        return f"{text}; the registry wants a log-in: docker login"
+        return f"{text}; the registry requires a login: docker login"
     return text
 
 
 class _Progress:
-    """Megabytes of an image's layers, told once a tenth, and that the engine has to try again, told once."""
+    """Reports the megabytes of an image's layers at each tenth, and once that the engine retries."""
 
     def __init__(self, image: str, say: Say) -> None:
         self._image = image
         self._say = say
         self._layers: dict[str, tuple[int, int]] = {}
-        self._told = -1
+        self._reported = -1
         self._retried = False
 
     def take(self, line: dict[str, Any]) -> None:
@@ -119,15 +119,15 @@ class _Progress:
             raise BackendError(f"image {self._image} cannot be pulled: {_reason(str(line['error']))}")
         if str(line.get("status")).startswith("Retrying") and not self._retried:
             self._retried = True
-            self._say(f"pulling {self._image}: the connection broke, the engine tries again")
+            self._say(f"pulling {self._image}: the connection broke, the engine retries")
         detail = line.get("progressDetail") or {}
         if line.get("status") == "Downloading" and detail.get("total"):
             self._layers[line["id"]] = (detail["current"], detail["total"])
-            self._tell()
+            self._report()
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         done, total = (sum(part) for part in zip(*self._layers.values(), strict=True))
         tenth = 10 * done // max(total, 1)
-        if tenth > self._told:
-            self._told = tenth
+        if tenth > self._reported:
+            self._reported = tenth
             self._say(f"pulling {self._image}: {done / 1e6:.0f} of {total / 1e6:.0f} MB")

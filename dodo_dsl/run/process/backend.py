@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.plan.model import ApplicationService, Plan, Service
-from dodo_dsl.run import service_lines
+from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import begin_frame
-from dodo_dsl.run.process.commands import Command, Commands, Lane, changes, package_path
-from dodo_dsl.run.process.environment import MissingVariable
-from dodo_dsl.run.process.fork_server_client import Nursery
-from dodo_dsl.run.process.sandbox_client import LOG, Channel
+from dodo_dsl.run.process.commands import Command, Commands, changes
+from dodo_dsl.run.process.environment import EnvironmentProblem
+from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
+from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Unstartable
 from dodo_dsl.run.service_output import Output
-
-__all__ = ["Lane", "ProcessBackend", "package_path"]
 
 
 class ProcessBackend:
@@ -25,22 +24,24 @@ class ProcessBackend:
     name = "process"
 
     def __init__(
-        self, plan: Plan, folder: Path, report: Path, isolation: str, lane: Lane, nursery: Nursery | None = None
+        self, plan: Plan, folder: Path, report: Path, isolation: str, slot: Slot, fork_server: ForkServer | None = None
     ) -> None:
         self.plan = plan
         self.report = report
         self.isolation = isolation
-        self.lane = lane
-        self.cid = lane.cid
-        self._commands = Commands(plan, folder, report, lane)
+        self.slot = slot
+        self.cid = slot.cid
+        self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._outputs: dict[str, Output] = {}
-        self._channel = Channel(isolation, self._heard, lambda why: self._events.put_nowait(Lost(why)), nursery)
+        self._sandbox = SandboxClient(
+            isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
+        )
 
     async def open(self) -> None:
-        await self._channel.open(self.lane, self.report)
+        await self._sandbox.open(self.slot, self.report)
 
-    def _heard(self, message: dict[str, Any]) -> None:
+    def _take(self, message: dict[str, Any]) -> None:
         if "unstartable" in message:
             self._events.put_nowait(Unstartable(message["unstartable"], message["why"]))
         elif "exited" in message:
@@ -48,7 +49,7 @@ class ProcessBackend:
             task.add_done_callback(lambda t: t.exception())
 
     async def _exited(self, name: str, code: int) -> None:
-        """An end counts when its last output has been read, so that no verdict comes after it."""
+        """Reports an exit after the last output has been read, so that no verdict follows it."""
         output = self._outputs.get(name)
         if output is not None:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
@@ -60,7 +61,7 @@ class ProcessBackend:
         for service in self._services(layer):
             try:
                 commands.append(self._commands.of(service))
-            except MissingVariable as error:
+            except EnvironmentProblem as error:
                 self._events.put_nowait(Unstartable(service.name, str(error)))
         for command in commands:
             self._start(command)
@@ -73,17 +74,17 @@ class ProcessBackend:
         def on_line(line: bytes) -> bool:
             event = None
             if command.layer != "application":
-                event = service_lines.read_line(command.name, command.judge, line)
+                event = service_protocol.read_line(command.name, command.is_evaluator, line)
             if event is not None:
                 self._events.put_nowait(event)
             return event is not None
 
         output = Output(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
-        words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.module}
-        order = {"do": "start", "id": command.name, **words}
+        words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module}
+        message = {"do": "start", "id": command.name, **words}
         try:
-            self._channel.send({**order, "env": changes(os.environ, command.environment)}, (output.writer,))
+            self._sandbox.send({**message, "env": changes(os.environ, command.environment)}, (output.writer,))
         except ValueError as error:
             self._events.put_nowait(Unstartable(command.name, str(error)))
         output.release_writer()
@@ -92,12 +93,12 @@ class ProcessBackend:
         return await self._events.get()
 
     async def begin(self) -> None:
-        self._channel.send({"do": "send", "cid": self.lane.cid, "data": begin_frame(self.plan.seed).hex()})
+        self._sandbox.send({"do": "send", "cid": self.slot.cid, "data": begin_frame(self.plan.seed).hex()})
 
     async def close(self, keep: bool) -> list[str]:
-        if keep and (pid := self._channel.pid):
+        if keep and (pid := self._sandbox.pid):
             return self._kept(pid)
-        await self._channel.close()
+        await self._sandbox.close()
         for output in self._outputs.values():
             output.close()
         log = self.report / LOG
@@ -107,16 +108,16 @@ class ProcessBackend:
 
     def _kept(self, pid: int) -> list[str]:
         outputs = [output.hand_over() for output in self._outputs.values() if not output.done.is_set()]
-        self._channel.keep((*(reader for reader, _ in outputs), *(log for _, log in outputs)))
+        self._sandbox.keep((*(reader for reader, _ in outputs), *(log for _, log in outputs)))
         look = f"ps -f --ppid {pid}"
         if self.isolation == "network":
             user = "" if os.getuid() == 0 else "-U --preserve-credentials "
-            with contextlib.suppress(OSError, IndexError):  # the kernel tells no children
+            with contextlib.suppress(OSError, IndexError):  # the kernel does not list children
                 inner = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0]
                 look = f"nsenter {user}-t {inner} -n -i -m -p bash"
-        memory = f", shared memory '{self.lane.memory_prefix}*'" if self.lane.memory_prefix else ""
+        memory = f", shared memory '{self.slot.memory_prefix}*'" if self.slot.memory_prefix else ""
         return [
-            f"{self.plan.slug} is kept up: CID {self.lane.cid}{memory}, logs in {self.report / 'logs'}",
+            f"{self.plan.slug} is kept running: CID {self.slot.cid}{memory}, logs in {self.report / 'logs'}",
             f"look inside:  {look}",
             f"take it down: kill {pid}",
         ]

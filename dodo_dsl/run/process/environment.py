@@ -15,8 +15,8 @@ _VARIABLE = re.compile(
 )
 
 
-class MissingVariable(ValueError):
-    """A variable that must be set (``${NAME:?why}``) is not."""
+class EnvironmentProblem(ValueError):
+    """A required variable (``${NAME:?why}``) is not set, or a user has no home folder."""
 
 
 def interpolate(text: str, known: Mapping[str, str]) -> str:
@@ -44,12 +44,12 @@ def _value(match: re.Match[str], known: Mapping[str, str]) -> str:
     if present:
         return found or ""
     if match["operator"] == "?":
-        raise MissingVariable(f"variable {name} is not set: {word or 'it is required'}")
+        raise EnvironmentProblem(f"variable {name} is not set: {word or 'it is required'}")
     return interpolate(word, known) if match["operator"] == "-" else found or ""
 
 
 def dotenv(path: Path, known: Mapping[str, str]) -> dict[str, str]:
-    """The variables of a ``.env`` file, each as it is with those before it and ``known``; empty when there is none."""
+    """The variables of a ``.env`` file, interpolated with earlier ones and ``known``; empty when there is no file."""
     if not path.is_file():
         return {}
     found: dict[str, str] = {}
@@ -62,3 +62,11 @@ def base_environment() -> dict[str, str]:
     """DoDo's own environment, with the folder of its interpreter first in ``PATH`` and unbuffered Python."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     return {**os.environ, "PATH": path, "PYTHONUNBUFFERED": "1"}
+
+
+def expanded(path: str) -> Path:
+    """A path with ``~`` or ``~user`` replaced by a home folder; raises EnvironmentProblem."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        raise EnvironmentProblem(f"there is no home folder for '{path}'") from None

@@ -1,9 +1,9 @@
-"""A process that has loaded what DoDo's services need, and forks the sandboxes of tests: none loads it again.
+"""The fork server: a process that has loaded what DoDo's services need, and forks the sandboxes of tests.
 
 Loading numpy, OpenCV and the like takes most of the processor time of a short test's set-up. Sandboxes with namespaces
 of their own are forked from here; their services are forks of them in turn.
 
-    runner to nursery   {"lane": name} with the sandbox's end of its channel and its log's descriptor
+    runner to fork server   {"slot": name} with the sandbox's end of its channel and its log's descriptor
 """
 
 import contextlib
@@ -16,10 +16,11 @@ import socket
 import sys
 
 from dodo_dsl.run.process import sandbox
+from dodo_dsl.run.process.slot import SLOT_VARIABLE
 
 MAX_MESSAGE = 4096
 _THREADS = "OPENBLAS_NUM_THREADS"
-"""By default numpy's algebra has threads from its import on."""
+"""By default numpy's linear algebra starts threads when it is imported."""
 LOADED = (
     "dodo_dsl.opendlv.bus.session",
     "dodo_dsl.opendlv.memory.shared_memory",
@@ -30,18 +31,18 @@ LOADED = (
     "scipy.optimize",
     "trimesh",
 )
-"""What services import; what is not installed here is left out."""
+"""What services import; modules that are not installed are skipped."""
 
 
 def load() -> None:
-    """Imports it all, without threads; what lives from now on is looked at by no garbage collection of a fork."""
+    """Imports LOADED without starting threads, and exempts it from the garbage collection of the forks."""
     before = dict(os.environ)
     os.environ[_THREADS] = "1"
     for name in LOADED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
     os.environ.clear()
-    os.environ.update(before)  # OpenCV sets some, too, and applications are started with them
+    os.environ.update(before)  # OpenCV sets some, too, and applications inherit them
     from dodo_dsl.opendlv.messages.message_set import MessageSet
 
     MessageSet.standard()
@@ -52,35 +53,35 @@ def load() -> None:
 def serve(runner: socket.socket) -> None:
     """Forks a sandbox for each message, until the runner closes the socket."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for the forks
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel collects the forks
     while True:
         data, descriptors, _, _ = socket.recv_fds(runner, MAX_MESSAGE, 2)
         if not data:
             return
         channel, log = descriptors
         if os.fork() == 0:
-            os._exit(_sandbox(runner, channel, log, json.loads(data)["lane"]))
+            os._exit(_sandbox(runner, channel, log, json.loads(data)["slot"]))
         os.close(channel)
         os.close(log)
 
 
-def _sandbox(runner: socket.socket, channel: int, log: int, lane: str) -> int:
+def _sandbox(runner: socket.socket, channel: int, log: int, slot: str) -> int:
     """The fork's whole life; its exit code."""
     runner.close()
     os.dup2(log, sys.stderr.fileno())
     os.close(log)
     os.setsid()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    os.environ["DODO_LANE"] = lane
+    os.environ[SLOT_VARIABLE] = slot
     try:
         return sandbox.main([str(channel), "network", "--forks"])
-    except BaseException:  # noqa: BLE001  (it is told as Python does)
+    except BaseException:  # noqa: BLE001  (it is printed as Python does)
         sys.excepthook(*sys.exc_info())
         return 1
 
 
 def main(argv: list[str]) -> int:
-    """``nursery DESCRIPTOR``: serves the runner at the other end of the descriptor."""
+    """``fork_server DESCRIPTOR``: serves the runner at the other end of the descriptor."""
     runner = socket.socket(fileno=int(argv[0]))
     load()
     with contextlib.suppress(OSError):

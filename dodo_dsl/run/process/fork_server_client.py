@@ -1,4 +1,4 @@
-"""The runner's end of the nursery, and of the sandboxes that are its forks and not the runner's own children."""
+"""The runner's end of the fork server, and of sandboxes that are its forks and not the runner's own children."""
 
 import json
 import os
@@ -13,11 +13,11 @@ from dodo_dsl.run.process.commands import package_path
 END_S = 10.0
 
 
-class Nursery:
-    """The runner's end of the process that forks sandboxes; it ends when this is closed, or with the runner."""
+class ForkServer:
+    """The runner's end of the fork server, which ends when this is closed, or with the runner."""
 
     def __init__(self, descriptors: tuple[int, ...]) -> None:
-        """``descriptors`` are of leases that sandboxes hold, too."""
+        """``descriptors`` are those of leases that sandboxes hold, too."""
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
@@ -30,18 +30,18 @@ class Nursery:
                 env={**os.environ, "PYTHONPATH": package_path()},
             )
 
-    def fork(self, channel: socket.socket, log: int, lane: str) -> None:
-        """A sandbox at the other end of ``channel``; raises OSError when the nursery has gone."""
-        socket.send_fds(self._socket, [json.dumps({"lane": lane}).encode()], [channel.fileno(), log])
+    def fork(self, channel: socket.socket, log: int, slot: str) -> None:
+        """Starts a sandbox at the other end of ``channel``; raises OSError when the fork server has ended."""
+        socket.send_fds(self._socket, [json.dumps({"slot": slot}).encode()], [channel.fileno(), log])
 
     def close(self) -> None:
-        """Ends the nursery; the sandboxes stay."""
+        """Ends the fork server; the sandboxes stay."""
         self._socket.close()
         end(self._process)
 
 
-class Fork:
-    """A process that is another's child, as subprocess has its own."""
+class ForkedSandbox:
+    """A sandbox that is the fork server's child, with the interface of subprocess.Popen."""
 
     def __init__(self, pid: int) -> None:
         self.pid = pid
@@ -51,11 +51,11 @@ class Fork:
             self._descriptor = -1
 
     def poll(self) -> int | None:
-        """0 when it has ended."""
+        """0 when it has ended, else None."""
         return 0 if self._descriptor < 0 or select.select([self._descriptor], [], [], 0)[0] else None
 
     def wait(self, timeout: float | None = None) -> int:
-        """Until it has ended; raises TimeoutExpired."""
+        """Waits until it has ended; raises TimeoutExpired."""
         if self._descriptor >= 0:
             if not select.select([self._descriptor], [], [], timeout)[0]:
                 raise subprocess.TimeoutExpired("sandbox", timeout or 0.0)
@@ -64,13 +64,13 @@ class Fork:
         return 0
 
     def kill(self) -> None:
-        """End it at once."""
+        """Ends it at once."""
         if self._descriptor >= 0:
             signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
 
 
-def end(process: "subprocess.Popen[bytes] | Fork") -> None:
-    """Wait for a process that was told to end, and kill it where it does not."""
+def end(process: "subprocess.Popen[bytes] | ForkedSandbox") -> None:
+    """Waits for a process that is about to end, and kills it where it does not."""
     try:
         process.wait(END_S)
     except subprocess.TimeoutExpired:

@@ -1,4 +1,4 @@
-"""A Python module as a process that is forked instead of started: with what its parent has loaded already."""
+"""A Python module as a process that is forked instead of started: it has what its parent has loaded already."""
 
 import os
 import runpy
@@ -12,7 +12,7 @@ from typing import NoReturn
 _DESCRIPTORS = 65_536
 
 
-class Forked:
+class ForkedModule:
     """A child of this process, which has one thread; ``pid`` is that of its own session."""
 
     def __init__(self, words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> None:
@@ -24,20 +24,20 @@ class Forked:
             _become(words, environment, folder, output)
 
     def wait(self) -> int:
-        """Its exit code, below 0 for the signal that ended it, as subprocess has it."""
+        """Its exit code, below 0 for the signal that ended it, as in subprocess."""
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
 def _become(words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> NoReturn:
     code = 1
     try:
-        _settle(environment, folder, output)
+        _set_up(environment, folder, output)
         sys.argv[:] = words[2:]
         runpy.run_module(words[2], run_name="__main__", alter_sys=True)
         code = 0
     except SystemExit as end:
-        code = _code(end)
-    except BaseException:  # noqa: BLE001  (it is told as Python does)
+        code = _exit_code(end)
+    except BaseException:  # noqa: BLE001  (it is printed as Python does)
         traceback.print_exc()
     finally:
         for stream in (sys.stdout, sys.stderr):
@@ -45,15 +45,15 @@ def _become(words: Sequence[str], environment: Mapping[str, str], folder: str, o
         os._exit(code & 0xFF)
 
 
-def _settle(environment: Mapping[str, str], folder: str, output: int) -> None:
-    """Session, signals, descriptors, variables and folder as those of a program that was started."""
+def _set_up(environment: Mapping[str, str], folder: str, output: int) -> None:
+    """Session, signals, descriptors, variables and folder as those of a started program."""
     os.setsid()
     signal.set_wakeup_fd(-1)
     for caught in (signal.SIGCHLD, signal.SIGTERM):
         signal.signal(caught, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    for number, target in enumerate((nothing, output, output)):
+    no_input = os.open(os.devnull, os.O_RDONLY)
+    for number, target in enumerate((no_input, output, output)):
         os.dup2(target, number)
     os.closerange(3, _DESCRIPTORS)
     os.environ.clear()
@@ -64,7 +64,7 @@ def _settle(environment: Mapping[str, str], folder: str, output: int) -> None:
     sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115
 
 
-def _code(end: SystemExit) -> int:
+def _exit_code(end: SystemExit) -> int:
     if end.code is None:
         return 0
     if isinstance(end.code, int):

@@ -1,4 +1,4 @@
-"""A rig's camera by hand: which program looks through it, and with which flags."""
+"""Manual use of a rig's camera: the program that takes a snapshot, and its flags."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dodo_dsl.plan.emulated_rig import CAMERA, DRAWN, hardware
 from dodo_dsl.plan.model import Flag, Service
-from dodo_dsl.run.rigs.rigs import RigProblem
+from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.arguments import Argument, resolved
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
@@ -20,19 +20,19 @@ PROGRAMS = {
 
 
 @dataclass(frozen=True)
-class Look:
-    """A program that takes a snapshot, and its words but for the output; ``is_drawn`` when it knows the truth, too."""
+class Snapshot:
+    """A program that takes a snapshot, its words without the output, and whether it renders a scene with its truth."""
 
     program: tuple[str, ...]
     words: tuple[str, ...]
-    is_drawn: bool
+    is_rendered: bool
 
 
-def look(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> Look:
-    """How the service ``camera`` of a test on this rig looks, or the rig's camera alone; raises RigProblem."""
+def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> Snapshot:
+    """A snapshot as the service ``camera`` of a test sees it, or without a test as the rig is; raises RigProblem."""
     use = next((use for use in spec.uses if use.uses.text == CAMERA), None) if spec else None
     if spec and use is None:
-        raise RigProblem(f"test {spec.title} has no service '{CAMERA}', which a rig looks through", usage=True)
+        raise RigProblem(f"test '{spec.title}' has no service '{CAMERA}'", usage=True)
     if use is None and rig.is_emulated:
         raise RigProblem("the emulated rig's camera sees the map of a test: name one with --test", usage=True)
     if use is None and rig.entry("camera.source") is None:
@@ -41,7 +41,7 @@ def look(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> Look
     real = Service("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
     service = hardware(real, manifests, "")
     words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags)
-    return Look(PROGRAMS[service.uses], words, service.uses == DRAWN)
+    return Snapshot(PROGRAMS[service.uses], words, service.uses == DRAWN)
 
 
 def _flags(rig: Rig, manifest: Manifest, spec: Spec | None, use: Use | None) -> tuple[Flag, ...]:
@@ -68,7 +68,7 @@ def _of_rig(rig: Rig, parameter: Parameter) -> Argument:
 
 
 def judged_classes(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec) -> list[str]:
-    """The classes that count in a test; empty when it names none."""
+    """The classes that a test evaluates; empty when it names none."""
     texts = (
         resolved(spec, use, manifests[use.uses.text], rig).texts.get("classes", "")
         for use in spec.uses

@@ -1,13 +1,13 @@
-"""What is heard of one test while it runs, and what that decides."""
+"""The state of one test while it runs, and what it decides."""
 
-import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
-from dodo_dsl.run.decision import Facts, Finding, decide, how_it_ended, lost_messages, outcome_of
+from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended, lost_messages, outcome_of
 from dodo_dsl.run.protocol import (
     Backend,
     Event,
@@ -25,14 +25,15 @@ from dodo_dsl.run.protocol import (
 
 
 class Ended(Exception):
-    """The test is over; what decided it has been heard."""
+    """The test is over; what decided it is among the facts."""
 
 
 @dataclass
-class Hearing:
-    """Takes the events of one test. Times in s; ``began`` and ``finished`` on the monotonic clock."""
+class RunState:
+    """Takes the events of one test. Times in s; ``began`` and ``finished`` by ``clock``, which never goes back."""
 
     plan: Plan
+    clock: Callable[[], float]
     facts: Facts = field(init=False)
     layer_of: dict[str, str] = field(default_factory=dict)
     exits: dict[str, int] = field(default_factory=dict)
@@ -47,20 +48,20 @@ class Hearing:
     def __post_init__(self) -> None:
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
 
-    def all_judged(self) -> bool:
-        return all(judge in self.exits for judge in self.facts.judges)
+    def all_evaluators_ended(self) -> bool:
+        return all(name in self.exits for name in self.facts.evaluators)
 
-    def find(self, result: Result, reason: str, service: str = "") -> None:
+    def add_finding(self, result: Result, reason: str, service: str = "") -> None:
         self.facts.findings.append(Finding(result, reason, service))
 
     def end(self, result: Result, reason: str, service: str = "") -> None:
-        """A finding upon which the test is over: raises Ended."""
-        self.find(result, reason, service)
+        """Adds a finding with which the test is over: raises Ended."""
+        self.add_finding(result, reason, service)
         raise Ended
 
     def time_out(self) -> None:
         """The test's time is over, and an evaluator has not ended: raises Ended."""
-        late = next(judge for judge in self.facts.judges if judge not in self.exits)
+        late = next(name for name in self.facts.evaluators if name not in self.exits)
         self.end(
             "error",
             f"evaluator '{late}' gave no verdict within the timeout of {self.plan.timeout_s:g} s",
@@ -98,42 +99,42 @@ class Hearing:
         if kind == "timedout":
             self.time_out()
         is_silent = kind == "unanswered"
-        self.end("failed" if is_silent else "error", reason, self._who_answers() if is_silent else CLOCK)
+        self.end("failed" if is_silent else "error", reason, self._first_application() if is_silent else CLOCK)
 
     def _take_exit(self, service: str, code: int, out_of_memory: bool) -> None:
         layer, when = self.layer_of.get(service, "application"), self._when()
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}"
         if layer == "application":
-            if not self._all_given():
+            if not self._all_verdicts_given():
                 self.end("failed", f"application service '{service}' {ended}, before the test was decided", service)
         elif code != 0:
             self.end("error", f"service '{service}' of layer {layer} {ended}", service)
         elif service not in self.ready and self.began is None:
             self.end("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
-        elif service in self.facts.judges and not self.facts.verdicts.get(service):
+        elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
             self.end("error", f"evaluator '{service}' ended without a verdict {when}", service)
 
-    def _all_given(self) -> bool:
-        return all(self.facts.verdicts.get(judge) for judge in self.facts.judges)
+    def _all_verdicts_given(self) -> bool:
+        return all(self.facts.verdicts.get(name) for name in self.facts.evaluators)
 
     def _when(self) -> str:
         if self.began is None:
             return "during set-up"
-        return f"after {time.monotonic() - self.began:.1f} s"
+        return f"after {self.clock() - self.began:.1f} s"
 
-    def _who_answers(self) -> str:
-        """The application's service whose last lines may tell why there is no answer."""
+    def _first_application(self) -> str:
+        """The application's service whose last lines may explain why there is no answer."""
         return next((s.name for s in self.plan.application.services), "")
 
     def outcome(self, backend: Backend) -> Outcome:
-        """What all of it comes to; the last lines are those of the service that decided."""
+        """The test's outcome; the last lines are those of the service that decided it."""
         plan, finding = self.plan, decide(self.facts)
-        verdicts = [v for judge in self.facts.judges for v in self.facts.verdicts.get(judge, [])]
+        verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
             outcome_of(plan, finding, backend.name, backend.cid),
             setup_s=self.setup_s,
-            execution_s=self.finished - self.began if self.finished and self.began else None,
+            execution_s=None if self.finished is None or self.began is None else self.finished - self.began,
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
             checks=tuple(check for verdict in verdicts for check in verdict.checks),

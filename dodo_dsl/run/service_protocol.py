@@ -1,4 +1,4 @@
-"""Lines that services print: JSON with the key ``dodo`` is meant for the runner, the rest is log."""
+"""The protocol of services on standard output: JSON lines with the key ``dodo`` are for the runner, others are log."""
 
 import json
 import math
@@ -13,15 +13,15 @@ _MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
 
 
-def read_line(service: str, judge: bool, line: bytes) -> Event | None:
-    """The event that a line stands for, or None for a line of log; only judges give verdicts."""
+def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
+    """The event that a line represents, or None for a line of log; only evaluators give verdicts."""
     text = line.strip()
     if not text.startswith(b"{") or b'"dodo"' not in text:
         return None
     try:
         message = json.loads(text)
     except (ValueError, RecursionError):
-        return Malformed(service, "its JSON cannot be read") if judge and b'"verdict"' in text else None
+        return Malformed(service, "its JSON cannot be read") if is_evaluator and b'"verdict"' in text else None
     if not isinstance(message, dict):
         return None
     kind = message.get("dodo")
@@ -29,16 +29,15 @@ def read_line(service: str, judge: bool, line: bytes) -> Event | None:
         return Ready(service)
     if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
         return Overrun(service, message["messages"])
-    if kind == "verdict" and judge:
-        problem = _problem(message)
-        if problem:
+    if kind == "verdict" and is_evaluator:
+        if problem := _problem(message):
             return Malformed(service, problem)
         return Verdict(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
-    return _of_the_clock(kind, message) if service == CLOCK else None
+    return _clock_event(kind, message) if service == CLOCK else None
 
 
-def _of_the_clock(kind: object, message: dict[str, Any]) -> Event | None:
-    """How far the clock is, or why it goes no further."""
+def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
+    """How far the clock is, or why it stopped."""
     seconds, reason = message.get("s"), message.get("reason")
     if kind == "time" and _is_number(seconds):
         return Time(float(seconds or 0.0), message.get("last") is True)
@@ -51,10 +50,10 @@ def _problem(message: dict[str, Any]) -> str:
     if message.get("outcome") not in _OUTCOMES:
         return f"its outcome is {json.dumps(message.get('outcome'))[:40]}, expected passed or failed"
     if not _is_text(message.get("reason")):
-        return "it has no reason, or none that can be written"
+        return f"its reason is not a string of 1 to {_MAX_TEXT} characters of UTF-8"
     checks = message.get("checks")
     if not isinstance(checks, list):
-        return "its checks are no list"
+        return "its checks are not a list"
     return next((p for p in map(_check_problem, checks) if p), "")
 
 
@@ -69,14 +68,14 @@ def _check_problem(check: object) -> str:
     if surplus:
         return f"check '{name}' has an unknown key '{min(surplus)}'"
     if not _is_number(check.get("value"), none=True):
-        return f"check '{name}' has a value that is no finite number"
+        return f"the value of check '{name}' is not a finite number"
     if not isinstance(check["unit"], str) or not _is_text(check["unit"] or "1"):
-        return f"check '{name}' has a unit that is no text"
+        return f"the unit of check '{name}' is not a string"
     limit = check["limit"]
     if not isinstance(limit, dict) or not all(k in ("min", "max") and _is_number(v) for k, v in limit.items()):
-        return f"check '{name}' has a limit that is not of min and max"
+        return f"the limit of check '{name}' is not an object of numbers 'min' and 'max'"
     if not isinstance(check.get("ok"), bool):
-        return f"check '{name}' does not say whether it is ok"
+        return f"check '{name}': 'ok' is neither true nor false"
     return ""
 
 
@@ -90,7 +89,7 @@ def _is_number(value: object, none: bool = False) -> bool:
 
 
 def _is_text(value: object) -> bool:
-    """A text that UTF-8 can write, of a length that a report can show."""
+    """Whether a value is a string that UTF-8 can encode, of a length that a report can show."""
     if not isinstance(value, str) or not 0 < len(value) <= _MAX_TEXT:
         return False
     return not any("\ud800" <= character <= "\udfff" for character in value)

@@ -1,0 +1,92 @@
+"""What the kernel of this machine offers to tests, and its disks."""
+
+import os
+import shutil
+import socket
+import struct
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from dodo_dsl.run.capabilities.finding import Finding, State
+from dodo_dsl.run.process import host_isolation
+
+_PORT = 12175
+_RECEIVE_BUFFER = 26_214_400
+_RECEIVE_S = 1.0
+_FREE_BYTES = 2 << 30
+_SEGMENTS = 64
+_SEGMENT_BYTES = 64 << 20
+
+
+def namespaces() -> Iterator[Finding]:
+    """Whether tests can have namespaces of their own."""
+    refusal = host_isolation.namespaces_refusal()
+    if refusal:
+        advice = "tests run on the host with leases; for isolation allow user namespaces or run as root"
+        yield Finding("namespaces", "warning", f"the kernel refuses them: {refusal}", advice)
+    else:
+        yield Finding("namespaces", "ok", "each test of the process backend gets a network, IPC and /tmp of its own")
+
+
+def multicast() -> Iterator[Finding]:
+    """Whether a datagram to a multicast group is received."""
+    group, mark = "225.0.0.254", os.urandom(16)
+    membership = socket.inet_aton(group) + struct.pack("=I", socket.INADDR_ANY)
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+            receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            receiver.bind((group, _PORT))
+            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+            receiver.settimeout(_RECEIVE_S)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+                sender.sendto(mark, (group, _PORT))
+            deadline = time.monotonic() + _RECEIVE_S
+            while receiver.recv(65_535) != mark:
+                if time.monotonic() > deadline:
+                    raise TimeoutError("only other datagrams were received")
+    except OSError as error:
+        advice = "sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo"
+        yield Finding(
+            "multicast", "problem", f"does not work on the host ({error}); 'isolation: host' needs it", advice
+        )
+    else:
+        yield Finding("multicast", "ok", "works on the host")
+
+
+def receive_buffer() -> Iterator[Finding]:
+    """Whether sockets may buffer as much as OpenDLV requests."""
+    limit = _number("/proc/sys/net/core/rmem_max")
+    if limit < _RECEIVE_BUFFER:
+        advice = f"sudo sysctl -w net.core.rmem_max={_RECEIVE_BUFFER}"
+        text = f"sockets may hold {limit:,} bytes, OpenDLV requests {_RECEIVE_BUFFER:,}: bursts of messages may be lost"
+        yield Finding("receive buffer", "warning", text, advice)
+    else:
+        yield Finding("receive buffer", "ok", f"sockets may hold {limit:,} bytes")
+
+
+def shared_memory() -> Iterator[Finding]:
+    """Whether the limits of System V shared memory suffice."""
+    segments, size = _number("/proc/sys/kernel/shmmni"), _number("/proc/sys/kernel/shmmax")
+    if segments < _SEGMENTS or size < _SEGMENT_BYTES:
+        advice = f"sudo sysctl -w kernel.shmmni=4096 kernel.shmmax={_SEGMENT_BYTES * 16}"
+        yield Finding("shared memory", "problem", f"only {segments} segments of {size:,} bytes are allowed", advice)
+    else:
+        yield Finding("shared memory", "ok", f"{segments:,} segments are allowed")
+
+
+def _number(path: str) -> int:
+    try:
+        return int(Path(path).read_text().split()[0])
+    except (OSError, ValueError, IndexError):
+        return 0
+
+
+def disk() -> Iterator[Finding]:
+    """Whether there is room for recordings and images."""
+    for folder in dict.fromkeys((Path(tempfile.gettempdir()), Path.cwd())):
+        free = shutil.disk_usage(folder).free
+        state: State = "ok" if free >= _FREE_BYTES else "warning"
+        advice = "" if state == "ok" else "free some space: recordings and images need it"
+        yield Finding("disk", state, f"{free / (1 << 30):.1f} GiB free in {folder}", advice)

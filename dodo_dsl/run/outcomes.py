@@ -1,0 +1,136 @@
+"""From what happened in a test to its outcome: failed is the application's fault, error is anyone else's."""
+
+import signal
+import traceback
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dodo_dsl.outcome import Outcome, Result
+from dodo_dsl.plan.model import Plan, Service
+from dodo_dsl.run.protocol import BackendError, Verdict
+
+LOG = "logs/runner.log"
+"""The traceback of an internal error, in the test's report."""
+_RANK: dict[Result, int] = {"passed": 0, "failed": 1, "error": 2}
+_MAX_ERROR_TEXT = 300
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that decides an outcome, and the service whose last lines explain it."""
+
+    result: Result
+    reason: str
+    service: str = ""
+
+
+@dataclass
+class Facts:
+    """What the engine saw: findings of its own, and the verdicts of each evaluator."""
+
+    evaluators: tuple[str, ...]
+    findings: list[Finding] = field(default_factory=list)
+    verdicts: dict[str, list[Verdict]] = field(default_factory=dict)
+
+
+def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
+    """A test's outcome as far as plan and finding determine it; ``backend`` by its name."""
+    return Outcome(
+        name=plan.name,
+        slug=plan.slug,
+        spec=plan.spec,
+        description=plan.description,
+        level=plan.level,
+        kind=plan.kind,
+        outcome=finding.result,
+        reason=finding.reason,
+        cid=cid,
+        seed=plan.seed,
+        clock=plan.clock,
+        backend=backend,
+    )
+
+
+def worst(results: Iterable[Result]) -> Result:
+    """error > failed > passed."""
+    return max(results, key=_RANK.__getitem__, default="error")
+
+
+def decide(facts: Facts) -> Finding:
+    """The finding that decides: the first of the worst kind. Without a single verdict nothing passes."""
+    findings = [
+        *facts.findings,
+        *(f for name in facts.evaluators for f in _judged(name, facts.verdicts.get(name, []))),
+    ]
+    if not findings:
+        return Finding("error", "no evaluator gave a verdict")
+    result = worst(f.result for f in findings)
+    deciding = [f for f in findings if f.result == result]
+    if result == "passed":
+        return Finding("passed", "; ".join(f.reason for f in deciding), deciding[0].service)
+    return deciding[0]
+
+
+def _judged(evaluator: str, verdicts: Sequence[Verdict]) -> list[Finding]:
+    if len(verdicts) > 1:
+        return [Finding("error", f"evaluator '{evaluator}' gave {len(verdicts)} verdicts, expected one", evaluator)]
+    return [Finding("passed" if v.passed else "failed", v.reason, evaluator) for v in verdicts]
+
+
+def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:
+    """The outcome of a test that never began; ``backend`` by its name."""
+    return outcome_of(plan, Finding("error", reason), backend, plan.cid)
+
+
+def error_reason(error: Exception, report: Path) -> str:
+    """Why an exception left a test without a verdict, in a sentence; ``report`` takes the log of an internal error."""
+    text = describe(error, report)
+    return f"this machine cannot run the test: {text}" if isinstance(error, OSError) else text
+
+
+def describe(error: Exception, report: Path) -> str:
+    """The text of an exception; the traceback of an internal error goes into LOG in the folder ``report``."""
+    if isinstance(error, BackendError):
+        return str(error)
+    if isinstance(error, OSError):
+        return system_error(error)
+    log = report / LOG
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("a", encoding="utf-8", errors="replace") as file:
+            traceback.print_exception(error, file=file)
+        more = f" (traceback in {LOG})"
+    except OSError:
+        more = ""
+    text = " ".join(str(error).split())[:_MAX_ERROR_TEXT]
+    return f"internal error: {type(error).__name__}: {text}{more}"
+
+
+def system_error(error: OSError) -> str:
+    """File and meaning of a system error, without its number."""
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror or error}"
+
+
+def lost_messages(service: Service, messages: int) -> str:
+    """A sentence on a service whose receive buffer was full, and on what that means."""
+    meaning = "it worked without them"
+    if any(flag.kind == "report" for flag in service.flags):
+        meaning = "the recording is incomplete"
+    elif service.judge:
+        meaning = "its verdict does not consider them"
+    count = f"{messages} message{'s' * (messages != 1)}"
+    return f"service '{service.name}' lost {count}, as its receive buffer was full: {meaning}"
+
+
+def how_it_ended(code: int) -> str:
+    """An exit code in words; negative codes and those above 128 are signals."""
+    number = -code if code < 0 else code - 128
+    if code < 0 or 128 < code < 160:
+        try:
+            name = signal.Signals(number).name
+        except ValueError:
+            name = f"signal {number}"
+        return f"was killed by {name}"
+    return f"ended with exit code {code}"

@@ -1,0 +1,101 @@
+"""Manual access to a rig through its service's program, while nobody else uses the rig."""
+
+import asyncio
+import contextlib
+import json
+import signal
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from dodo_dsl.run import leases
+from dodo_dsl.run.process.commands import package_path
+from dodo_dsl.run.process.environment import base_environment
+from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
+from dodo_dsl.run.rigs.rig_leases import devices_in, leased
+
+MANUAL = ("python", "-m", "services.gantry.manual")
+PATIENCE_S = 180.0
+_END_S = 5.0
+
+
+async def query(
+    program: Sequence[str], words: Sequence[str], patience_s: float = PATIENCE_S, descriptors: tuple[int, ...] = ()
+) -> dict[str, Any]:
+    """The JSON object that a rig's program prints; raises RigProblem.
+
+    When the caller is cancelled, the program gets SIGTERM, upon which it stops the rig. ``descriptors`` are those of
+    leases that the program holds, too.
+    """
+    process = await asyncio.create_subprocess_exec(
+        *program,
+        *words,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+        env={**base_environment(), "PYTHONPATH": package_path()},
+        start_new_session=True,
+        pass_fds=descriptors,
+    )
+    try:
+        async with asyncio.timeout(patience_s):
+            out, err = await process.communicate()
+    except TimeoutError:
+        raise ProgramTimeout(f"the rig's program gave no answer within {patience_s:g} s") from None
+    finally:
+        await _end(process)
+    return _answer(out, err, process.returncode)
+
+
+def _answer(out: bytes, err: bytes, code: int | None) -> dict[str, Any]:
+    try:
+        answer: dict[str, Any] = json.loads(out)
+    except ValueError:
+        last = (err.decode(errors="replace").strip().splitlines() or ["no output"])[-1]
+        raise NoAnswer(f"the rig's program gave no answer: {last}") from None
+    if "error" in answer:
+        raise RigProblem(str(answer["error"]), usage=code == 2)
+    return answer
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    if process.returncode is not None:
+        return
+    with contextlib.suppress(ProcessLookupError):
+        process.send_signal(signal.SIGTERM)
+    try:
+        await asyncio.wait_for(process.wait(), _END_S)
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+
+
+def query_exclusively(
+    cid: int | None,
+    user: str,
+    command: tuple[Sequence[str], Sequence[str]],
+    say: Callable[[str], None],
+    patience_s: float = leases.DEFAULT_PATIENCE_S,
+) -> dict[str, Any]:
+    """``query`` with a program and its words, while nobody else uses the rig; a signal ends both.
+
+    ``user`` names the holder of the lease to others. Raises RigProblem and LeaseTimeout.
+    """
+    try:
+        return asyncio.run(_query_exclusively(cid, user, command, say, patience_s))
+    except asyncio.CancelledError:
+        raise KeyboardInterrupt from None
+
+
+async def _query_exclusively(
+    cid: int | None,
+    user: str,
+    command: tuple[Sequence[str], Sequence[str]],
+    say: Callable[[str], None],
+    patience_s: float,
+) -> dict[str, Any]:
+    task = asyncio.current_task()
+    assert task is not None
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    async with leased(cid, user, say, patience_s, devices_in(command[1])) as descriptors:
+        return await query(*command, descriptors=descriptors)

@@ -1,0 +1,79 @@
+"""The health check of a rig before each test on it, and quarantine for a rig that fails."""
+
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dodo_dsl.plan.model import Plan, Service
+from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.rigs.access import query
+from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
+from dodo_dsl.run.rigs.quarantine import quarantine, quarantined
+
+PATIENCE_S, TRIES = 90.0, 2
+"""s: from the far corner the rig searches its home position for 20 s, and for most of a minute if it repeats that."""
+RANGES = ("range-x", "range-y", "range-yaw")
+
+
+@dataclass(frozen=True)
+class HealthCheck:
+    """The Python module that checks a service's hardware, its action, and the flags of the service that it takes."""
+
+    module: str
+    action: tuple[str, ...]
+    flags: tuple[str, ...]
+
+
+CHECKS = {
+    "gantry": HealthCheck("services.gantry.manual", ("check",), ("serial", *RANGES)),
+    "camera": HealthCheck("services.camera.health_check", (), ("source", "width", "height", "freq", "exposure")),
+}
+"""By the name of the service."""
+
+
+async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...]) -> None:
+    """Checks the real rig of a test; a rig that fails goes into quarantine.
+
+    Raises BackendError when the rig is in quarantine, fails, or cannot be checked. ``descriptors`` are those of the
+    rig's leases, which the check goes on to hold if this process is killed.
+    """
+    try:
+        reason = quarantined(plan.rig)
+        if not reason:
+            say(f"checking rig '{plan.rig}'")
+            reason = await _failure(plan, descriptors)
+            if reason:
+                quarantine(plan.rig, reason)
+    except RigProblem as problem:
+        raise BackendError(f"rig '{plan.rig}' cannot be checked: {problem}") from problem
+    if reason:
+        raise BackendError(f"rig '{plan.rig}' is in quarantine: {reason} ('dodo rig clear {plan.rig}' ends it)")
+
+
+async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:
+    """Why the rig's gantry or camera is unfit; empty when both are fit. Raises RigProblem."""
+    for service in plan.services:
+        check = CHECKS.get(service.uses)
+        if check is None or _reads_a_file(service):
+            continue
+        words = [f"--{flag.name}={flag.value}" for flag in service.flags if flag.name in check.flags]
+        try:
+            answer = await _query(("python", "-m", check.module), [*words, *check.action], descriptors)
+        except ProgramTimeout as timeout:
+            return f"its health check hung {TRIES} times: {timeout}"
+        if not answer.get("ok"):
+            return str(answer.get("reason") or "its health check failed")
+    return ""
+
+
+def _reads_a_file(service: Service) -> bool:
+    return any(flag.kind == "path" and flag.name == "file" for flag in service.flags)
+
+
+async def _query(program: Sequence[str], words: Sequence[str], descriptors: tuple[int, ...]) -> dict[str, Any]:
+    """The answer of a health check; one that hangs is repeated, and raises ProgramTimeout at last."""
+    for _ in range(TRIES - 1):
+        with contextlib.suppress(ProgramTimeout):
+            return await query(program, words, PATIENCE_S, descriptors)
+    return await query(program, words, PATIENCE_S, descriptors)

@@ -1,0 +1,17 @@
+"""What can go wrong with a rig."""
+
+
+class RigProblem(Exception):
+    """A rig cannot do what was requested; ``usage`` when the request was not allowed."""
+
+    def __init__(self, text: str, usage: bool = False) -> None:
+        super().__init__(text)
+        self.usage = usage
+
+
+class NoAnswer(RigProblem):
+    """The rig's program did not run as it should, which says nothing about the rig."""
+
+
+class ProgramTimeout(NoAnswer):
+    """The rig's program hung, as it does when the rig hangs."""

@@ -1,0 +1,51 @@
+"""The leases of a rig: of its CID, and of its devices."""
+
+import contextlib
+import os
+import stat
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from pathlib import Path
+
+from dodo_dsl.run import leases
+
+DEVICE_FLAGS = ("--serial", "--source")
+"""Flags of programs and services that name hardware."""
+
+
+@contextlib.asynccontextmanager
+async def leased(
+    cid: int | None,
+    user: str,
+    say: Callable[[str], None],
+    patience_s: float = leases.DEFAULT_PATIENCE_S,
+    devices: Sequence[str] = (),
+) -> AsyncIterator[tuple[int, ...]]:
+    """Holds the leases that tests on the rig take, too: of its CID and its devices. The emulated rig has neither.
+
+    Gives the descriptors by which a program holds them, too. Raises LeaseTimeout when one does not come free.
+    """
+    names = [] if cid is None else [f"cid-{cid}"]
+    held: list[leases.Lease] = []
+    try:
+        for name in [*names, *device_leases(devices)]:
+            held.append(await leases.lease_any([name], {"test": user}, say, patience_s=patience_s))
+        yield tuple(lease.descriptor for lease in held)
+    finally:
+        for lease in reversed(held):
+            lease.release()
+
+
+def devices_in(words: Iterable[str]) -> list[str]:
+    """The hardware that flags ``--name=value`` name."""
+    return [value for flag, _, value in (word.partition("=") for word in words) if flag in DEVICE_FLAGS]
+
+
+def device_leases(devices: Sequence[str]) -> list[str]:
+    """A lease's name for each device file, by its numbers: two rigs that name one device exclude each other."""
+    names = set()
+    for device in devices:
+        with contextlib.suppress(OSError, ValueError):
+            found = Path(device).stat()
+            if device.startswith("/") and stat.S_ISCHR(found.st_mode):
+                names.add(f"device-{os.major(found.st_rdev)}-{os.minor(found.st_rdev)}")
+    return sorted(names)

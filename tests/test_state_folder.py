@@ -1,0 +1,54 @@
+"""Where a user's state is kept, also for a user without a home folder."""
+
+import pwd
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.state_folder import NoStateFolder, state_path
+
+NOBODY = 3_999_999_999
+"""A user without an entry in the password database, as in a container that runs with ``--user``."""
+
+
+@pytest.fixture(autouse=True)
+def nothing_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "XDG_STATE_HOME", "DODO_HISTORY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: NOBODY)
+
+
+@pytest.mark.parametrize(
+    ("variables", "expected"),
+    [
+        ({"HOME": "/home/a"}, "/home/a/.local/state/dodo/history.jsonl"),
+        ({"HOME": "/home/a", "XDG_STATE_HOME": "/var/a"}, "/var/a/dodo/history.jsonl"),
+        ({"HOME": "/home/a", "XDG_STATE_HOME": "~/state"}, "/home/a/state/dodo/history.jsonl"),
+        ({"XDG_STATE_HOME": "/var/a"}, "/var/a/dodo/history.jsonl"),
+        ({"DODO_HISTORY": "/tmp/mine"}, "/tmp/mine"),
+        ({"DODO_HISTORY": "", "HOME": "/home/a", "XDG_STATE_HOME": ""}, "/home/a/.local/state/dodo/history.jsonl"),
+    ],
+    ids=str,
+)
+def test_variables_decide(variables: dict[str, str], expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert state_path("DODO_HISTORY", "history.jsonl") == Path(expected)
+
+
+@pytest.mark.parametrize("empty", [{}, {"HOME": ""}, {"XDG_STATE_HOME": "~/state"}], ids=str)
+def test_without_a_home_folder_the_error_says_what_to_set(
+    empty: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in empty.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(NoStateFolder) as caught:
+        state_path("DODO_HISTORY", "history.jsonl")
+    assert str(caught.value) == f"user {NOBODY} has no home folder: set DODO_HISTORY or XDG_STATE_HOME"
+
+
+def test_the_password_database_names_the_home_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.getuid", lambda: 0)
+    assert state_path("DODO_HISTORY", "history.jsonl") == Path(
+        pwd.getpwuid(0).pw_dir, ".local/state/dodo/history.jsonl"
+    )
