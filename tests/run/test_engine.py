@@ -1,0 +1,339 @@
+"""One test from set-up to outcome, on a backend that reports given events."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.engine import BEGIN_PATIENCE_S, LAST_TIME_PATIENCE_S, ORDER, READY_PATIENCE_S, Engine
+from dodo_dsl.run.protocol import (
+    BackendError,
+    Event,
+    Exited,
+    Lost,
+    Malformed,
+    Noted,
+    Overrun,
+    Ready,
+    Stopped,
+    Time,
+    Unstartable,
+    Verdict,
+)
+from tests.run.scripted import FAILED, PASSED, READY, Events, ScriptedBackend, drives, plan, run
+
+ENDED = Exited("track", 0)
+
+
+def outcome(backend: ScriptedBackend, keep: bool = False) -> Outcome:
+    return run(Engine(backend.plan, backend, lambda _: None).run(keep))[0]
+
+
+def begun(*events: tuple[float, Event], tested: Plan | None = None) -> Outcome:
+    """The outcome of a test whose services get ready after 1 s each, and then report events."""
+    return outcome(ScriptedBackend(tested or plan(), {**READY, "begin": events}))
+
+
+def test_layers_start_in_order_and_times_are_measured() -> None:
+    said: list[str] = []
+    backend = ScriptedBackend(plan(), drives(5.0), {"open": 3.0, "close": 4.0})
+    found, kept = run(Engine(backend.plan, backend, said.append).run())
+    assert backend.calls == ["open", *ORDER, "begin", "close"]
+    phases = ["setting up", *(f"waiting for {layer}" for layer in ORDER), "running", "taking down"]
+    assert (said, kept) == (phases, [])
+    assert (found.outcome, found.reason, found.setup_s, found.execution_s) == ("passed", "it drove", 5.0, 5.0)
+    assert (found.cid, found.backend, found.seed, found.last_lines) == (131, "scripted", 7, ())
+    assert [(row["name"], row["layer"], row["exit_code"]) for row in found.services] == [
+        ("camera", "environment", None),
+        ("track", "evaluation", 0),
+        ("app", "application", None),
+    ]
+
+
+def test_a_kept_test_is_explained() -> None:
+    backend = ScriptedBackend(plan(), drives())
+    assert run(Engine(backend.plan, backend, lambda _: None).run(keep=True))[1] == ["look inside"]
+
+
+CASES: dict[str, tuple[list[tuple[float, Event]], str, str]] = {
+    "passes": ([(1.0, PASSED), (1.0, ENDED)], "passed", "it drove"),
+    "fails": ([(1.0, FAILED), (1.0, ENDED)], "failed", "hit wall left"),
+    "application ends with 0": (
+        [(2.0, Exited("app", 0))],
+        "failed",
+        "application service 'app' ended with exit code 0 after 2.0 s, before the test was decided",
+    ),
+    "application crashes": (
+        [(2.0, Exited("app", 3))],
+        "failed",
+        "application service 'app' ended with exit code 3 after 2.0 s, before the test was decided",
+    ),
+    "application is killed": (
+        [(2.0, Exited("app", -9))],
+        "failed",
+        "application service 'app' was killed by SIGKILL after 2.0 s, before the test was decided",
+    ),
+    "application runs out of memory": (
+        [(2.0, Exited("app", 137, out_of_memory=True))],
+        "failed",
+        "application service 'app' ran out of memory after 2.0 s, before the test was decided",
+    ),
+    "application ends after the verdict": (
+        [(1.0, PASSED), (1.5, Exited("app", 3)), (2.0, ENDED)],
+        "passed",
+        "it drove",
+    ),
+    "camera crashes": (
+        [(2.0, Exited("camera", 1))],
+        "error",
+        "service 'camera' of layer environment ended with exit code 1 after 2.0 s",
+    ),
+    "camera is killed": (
+        [(2.0, Exited("camera", 143))],
+        "error",
+        "service 'camera' of layer environment was killed by SIGTERM after 2.0 s",
+    ),
+    "camera crashes after the verdict": (
+        [(1.0, PASSED), (2.0, Exited("camera", 1)), (3.0, ENDED)],
+        "error",
+        "service 'camera' of layer environment ended with exit code 1 after 2.0 s",
+    ),
+    "recording runs out": ([(0.5, Exited("camera", 0)), (1.0, PASSED), (1.0, ENDED)], "passed", "it drove"),
+    "evaluator crashes after its verdict": (
+        [(1.0, PASSED), (1.0, Exited("track", 2))],
+        "error",
+        "service 'track' of layer evaluation ended with exit code 2 after 1.0 s",
+    ),
+    "evaluator crashes after a verdict of failed": (
+        [(1.0, FAILED), (1.0, Exited("track", 2))],
+        "error",
+        "service 'track' of layer evaluation ended with exit code 2 after 1.0 s",
+    ),
+    "no verdict": ([(1.0, ENDED)], "error", "evaluator 'track' ended without a verdict after 1.0 s"),
+    "two verdicts": (
+        [(1.0, PASSED), (1.0, PASSED), (1.0, ENDED)],
+        "error",
+        "evaluator 'track' gave 2 verdicts, expected one",
+    ),
+    "malformed verdict": (
+        [(1.0, Malformed("track", "a check has no name"))],
+        "error",
+        "the verdict of evaluator 'track' is malformed: a check has no name",
+    ),
+    "timeout": ([], "error", "evaluator 'track' gave no verdict within the timeout of 10 s"),
+    "verdict without an end": (
+        [(1.0, PASSED)],
+        "error",
+        "evaluator 'track' gave no verdict within the timeout of 10 s",
+    ),
+    "backend is gone": ([(1.0, Lost("the Docker engine went away: EOF"))], "error", "the Docker engine went away: EOF"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_happens_after_the_begin(case: str) -> None:
+    events, expected, reason = CASES[case]
+    found = begun(*events)
+    assert (found.outcome, found.reason) == (expected, reason)
+
+
+SET_UP: dict[str, tuple[dict[str, Events], str]] = {
+    "camera ends early": (
+        {"environment": [(1.0, Exited("camera", 0))]},
+        "service 'camera' of layer environment ended with exit code 0 during set-up, before it was ready",
+    ),
+    "camera crashes": (
+        {"environment": [(1.0, Exited("camera", 1))]},
+        "service 'camera' of layer environment ended with exit code 1 during set-up",
+    ),
+    "camera crashes when it is ready": (
+        {**READY, "evaluation": [(0.5, Exited("camera", 1)), (1.0, Ready("track"))]},
+        "service 'camera' of layer environment ended with exit code 1 during set-up",
+    ),
+    "a program is missing": (
+        {"environment": [(0.0, Unstartable("camera", "x: No such file or directory"))]},
+        "service 'camera' could not be started: x: No such file or directory",
+    ),
+    "an early verdict": (
+        {**READY, "evaluation": [(0.5, PASSED)]},
+        "evaluator 'track' gave a verdict before the test began",
+    ),
+    "never ready": ({"environment": []}, f"service 'camera' was not ready within {READY_PATIENCE_S:g} s"),
+}
+
+
+@pytest.mark.parametrize("case", SET_UP)
+def test_what_happens_during_set_up(case: str) -> None:
+    stages, reason = SET_UP[case]
+    backend = ScriptedBackend(plan(), stages)
+    found = outcome(backend)
+    assert (found.outcome, found.reason) == ("error", reason)
+    assert (found.setup_s, found.execution_s, backend.calls[-1]) == (None, None, "close")
+    assert "begin" not in backend.calls
+
+
+def test_an_application_that_ends_during_set_up_fails() -> None:
+    found = outcome(ScriptedBackend(plan(), {**READY, "application": [(0.0, Exited("app", 3))], "begin": []}))
+    ended = "application service 'app' ended with exit code 3 after 0.0 s, before the test was decided"
+    assert (found.outcome, found.reason) == ("failed", ended)
+
+
+def test_a_service_with_a_longer_set_up_is_waited_for() -> None:
+    late = READY_PATIENCE_S + 5.0
+    stages = {**drives(), "environment": [(late, Ready("camera"))]}
+    tested = plan()
+    camera, track = tested.services
+    patient = replace(tested, services=(replace(camera, setup_s=10.0), track))
+    assert outcome(ScriptedBackend(patient, stages)).outcome == "passed"
+    assert (
+        outcome(ScriptedBackend(tested, stages)).reason
+        == f"service 'camera' was not ready within {READY_PATIENCE_S:g} s"
+    )
+
+
+def test_the_less_patient_of_two_services_is_named() -> None:
+    tested = plan(evaluators=("track", "signal"))
+    camera, track, signal = tested.services
+    tested = replace(tested, services=(camera, replace(track, setup_s=10.0), signal))
+    assert "service 'signal'" in outcome(ScriptedBackend(tested, {"environment": READY["environment"]})).reason
+
+
+@pytest.mark.parametrize("problem", [BackendError("no subnet is free"), OSError(28, "full"), ValueError("odd")])
+def test_a_backend_that_does_not_open_is_closed(problem: Exception) -> None:
+    backend = ScriptedBackend(plan(), problem=problem)
+    if isinstance(problem, BackendError):
+        found = outcome(backend)
+        assert (found.outcome, found.reason) == ("error", "no subnet is free")
+    else:
+        with pytest.raises(type(problem)):
+            outcome(backend)
+    assert backend.calls[-1] == "close"
+
+
+def test_several_evaluators_end_and_the_worst_verdict_counts() -> None:
+    tested = plan(evaluators=("track", "signal", "objects"))
+    stages: dict[str, Events] = {
+        "environment": READY["environment"],
+        "evaluation": [(1.0, Ready(name)) for name in ("track", "signal", "objects")],
+        "begin": [
+            (1.0, PASSED),
+            (1.0, ENDED),
+            (2.0, Verdict("signal", False, "far off", ({"name": "mean"},))),
+            (2.0, Exited("signal", 0)),
+            (3.0, Verdict("objects", True, "found all", ({"name": "recall"},))),
+            (3.0, Exited("objects", 0)),
+        ],
+    }
+    found = outcome(ScriptedBackend(tested, stages, tails={"signal": ["it is far", "off"]}))
+    assert (found.outcome, found.reason, found.last_lines) == ("failed", "far off", ("it is far", "off"))
+    assert ([check["name"] for check in found.checks], found.execution_s) == (["mean", "recall"], 3.0)
+
+
+def test_the_last_lines_are_those_of_the_service_that_decided() -> None:
+    stages = {**READY, "begin": [(2.0, Exited("app", 7))]}
+    found = outcome(ScriptedBackend(plan(), stages, tails={"app": ["cone lost"], "camera": ["picture 3"]}))
+    assert found.last_lines == ("cone lost",)
+
+
+def test_losses_and_notes_count_until_teardown_has_ended_and_nothing_else_does() -> None:
+    late: Events = [
+        (0.0, event) for event in (Overrun("camera", 30), Noted("a file is missing"), FAILED, Exited("app", 1))
+    ]
+    stages = {**drives(), "close": late}
+    stages["begin"] = [(0.5, Overrun("camera", 7)), (0.6, Overrun("track", 1)), *stages["begin"]]
+    found = outcome(ScriptedBackend(plan(), stages))
+    assert (found.outcome, found.notes) == (
+        "passed",
+        (
+            "a file is missing",
+            "service 'camera' lost 30 messages, as its receive buffer was full: it worked without them",
+            "service 'track' lost 1 message, as its receive buffer was full: its verdict does not consider them",
+        ),
+    )
+
+
+def cancelled(backend: ScriptedBackend, *seconds: float) -> tuple[Outcome, float]:
+    """The outcome of a test that is cancelled at these times, and when it had ended."""
+
+    async def scene() -> tuple[Outcome, float]:
+        loop = asyncio.get_running_loop()
+        task = asyncio.ensure_future(Engine(backend.plan, backend, lambda _: None).run())
+        for when in seconds:
+            loop.call_later(when, task.cancel)
+        return (await task)[0], loop.time()
+
+    return run(scene())
+
+
+@pytest.mark.parametrize("when", [0.5, 1.5, 4.0], ids=["open", "ready", "running"])
+def test_an_interrupt_is_an_error_after_teardown(when: float) -> None:
+    backend = ScriptedBackend(plan(), drives(), {"open": 1.0, "close": 3.0})
+    found, ended = cancelled(backend, when)
+    assert (found.outcome, found.reason, ended) == ("error", "the run was interrupted", when + 3.0)
+
+
+def test_interrupts_during_teardown_keep_verdict_and_teardown() -> None:
+    backend = ScriptedBackend(plan(), drives(5.0), {"close": 3.0})
+    found, ended = cancelled(backend, 8.0, 8.5, 9.0)
+    assert (found.outcome, found.reason, ended) == ("passed", "it drove", 10.0)
+
+
+def test_an_error_of_teardown_is_a_note_and_no_verdict() -> None:
+    backend = ScriptedBackend(plan(), drives(), close_problem=ValueError("odd"))
+    assert outcome(backend).notes == ("not all of the test was taken down: ValueError: odd",)
+    assert outcome(ScriptedBackend(plan(), drives(), close_problem=ValueError("odd"))).outcome == "passed"
+
+
+def clocked(*events: tuple[float, Event], wall_s: float = 60.0) -> ScriptedBackend:
+    """A test in lockstep, which begins at 2 s."""
+    return ScriptedBackend(plan(lockstep=wall_s), {**READY, "begin": events})
+
+
+def test_lockstep_has_the_time_of_its_clock() -> None:
+    found = outcome(clocked((0.1, Time(0.0, False)), (30.0, PASSED), (30.0, ENDED), (31.0, Time(120.0, True))))
+    assert (found.outcome, found.sim_s, found.execution_s) == ("passed", 120.0, 30.0)
+
+
+@pytest.mark.parametrize(
+    ("more", "ended"), [([], 32.0 + LAST_TIME_PATIENCE_S), ([(30.5, Exited("dodo-clock", 0))], 32.5)]
+)
+def test_the_last_time_is_not_waited_for_without_end(more: list[tuple[float, Event]], ended: float) -> None:
+    backend = clocked((0.1, Time(9.0, False)), (30.0, PASSED), (30.0, ENDED), *more)
+    found, end = cancelled(backend)
+    assert (found.outcome, found.sim_s, end) == ("passed", 9.0, ended)
+
+
+def test_the_begin_is_announced_until_the_clock_answers() -> None:
+    backend = clocked(
+        (3.5 * BEGIN_PATIENCE_S, Time(0.0, False)), (30.0, PASSED), (30.0, ENDED), (30.0, Time(1.0, True))
+    )
+    assert outcome(backend).outcome == "passed"
+    assert backend.calls.count("begin") == 4
+
+
+@pytest.mark.parametrize(
+    ("times", "reached"),
+    [([], ""), ([(0.1, Time(0.5, False)), (3.0, Time(12.0, False))], " and reached 12.0 s of test time")],
+)
+def test_lockstep_has_a_limit_of_wall_time(times: list[tuple[float, Event]], reached: str) -> None:
+    found = outcome(clocked(*times))
+    assert (found.outcome, found.reason) == ("error", f"the test took more than 60 s of wall time{reached}")
+
+
+STOPS: list[tuple[str, str, str, Callable[[Outcome], bool]]] = [
+    ("unanswered", "failed", "'app' has not answered picture 3", lambda o: o.last_lines == ("app says",)),
+    ("stuck", "error", "service 'camera' is stuck", lambda o: o.last_lines == ("clock says",)),
+    ("timedout", "error", "evaluator 'track' gave no verdict within the timeout of 10 s", lambda o: not o.last_lines),
+]
+
+
+@pytest.mark.parametrize(("kind", "expected", "reason", "has_lines"), STOPS, ids=[stop[0] for stop in STOPS])
+def test_a_clock_that_stops(kind: str, expected: str, reason: str, has_lines: Callable[[Outcome], bool]) -> None:
+    backend = clocked((0.1, Time(0.0, False)), (5.0, Stopped(kind, reason)))
+    backend.tails = {"app": ["app says"], "dodo-clock": ["clock says"]}
+    found = outcome(backend)
+    assert (found.outcome, found.reason) == (expected, reason)
+    assert has_lines(found)

@@ -1,0 +1,96 @@
+"""How long tests took, over runs: what is kept, what is damaged, and what cannot be written."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.run import history
+from dodo_dsl.run.history import History
+from dodo_dsl.run.outcomes import error_outcome
+from tests.run.scripted import plan
+
+LINE = {
+    "when": 1, "spec": "s", "test": "t", "level": "sil", "backend": "process", "clock": "realtime",
+    "outcome": "passed", "setup_s": 1.0, "execution_s": 2.0,
+}  # fmt: skip
+
+
+def took(setup_s: float, execution_s: float, slug: str = "a") -> tuple[str, Outcome]:
+    """A test of a name that passed."""
+    outcome = error_outcome(plan(slug), "process", "it drove")
+    return slug, replace(outcome, outcome="passed", setup_s=setup_s, execution_s=execution_s)
+
+
+def test_what_was_added_is_kept_once_it_is_saved(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "history.jsonl"
+    added = History(path, lambda: 4711.5)
+    added.add([took(1.0, 2.0), ("b", error_outcome(plan("b"), "process", "it broke"))])
+    assert not path.exists()
+    added.save()
+    added.add([took(3.0, 4.0)])
+    added.save()
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [(line["test"], line["when"], line["setup_s"]) for line in lines] == [("a", 4711, 1.0), ("a", 4711, 3.0)]
+    found = History(path)
+    assert found.seconds("a/a.dodo.yml", "a", "process", "realtime") == 5.0
+    assert found.seconds("b/b.dodo.yml", "b", "process", "realtime") is None
+    assert found.seconds("a/a.dodo.yml", "a", "docker", "realtime") is None
+    assert found.seconds("a/a.dodo.yml", "a", "process", "lockstep") is None
+
+
+def test_the_forecast_is_the_median_of_the_latest_runs(tmp_path: Path) -> None:
+    found = History(tmp_path / "none")
+    found.add([took(0.0, seconds) for seconds in (900.0, 1.0, 2.0, 30.0, 4.0, 5.0)])
+    assert found.seconds("a/a.dodo.yml", "a", "process", "realtime") == 4.0
+
+
+def test_times_are_apart_by_clock() -> None:
+    found = History(Path("/nonexistent"))
+    name, outcome = took(1.0, 2.0)
+    found.add([(name, outcome), (name, replace(outcome, clock="lockstep")), (name, replace(outcome, backend="docker"))])
+    assert found.times([("a/a.dodo.yml", "a")], "process") == {"a": [(1.0, 2.0)], "a (lockstep)": [(1.0, 2.0)]}
+    assert found.times([], "process") == {}
+
+
+@pytest.mark.parametrize("change", [{"spec": ["s"]}, {"setup_s": math.inf}, {"setup_s": math.nan}, {"execution_s": -1}])
+def test_lines_that_no_run_wrote_are_skipped(tmp_path: Path, change: dict[str, object]) -> None:
+    path = tmp_path / "history.jsonl"
+    lines = (json.dumps(LINE), json.dumps({**LINE, **change}), "[" * 100_000, '{"when": 1, "spec"', "3", "null")
+    path.write_text("".join(f"{line}\n" for line in lines))
+    assert History(path).times([("s", "t")], "process") == {"t": [(1.0, 2.0)]}
+
+
+def test_a_long_history_with_bytes_that_are_not_utf_8_is_shortened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(history, "_MAX_BYTES", 10_000)
+    path = tmp_path / "history.jsonl"
+    path.write_bytes((json.dumps(LINE).encode() + b"\n") * 99 + b"\xff\xfe\n")
+    found = History(path)
+    found.add([took(1.0, 2.0)])
+    found.save()
+    assert len(path.read_bytes().splitlines()) == 51
+    assert len(History(path).runs) == 50
+    assert [entry.name for entry in tmp_path.iterdir()] == ["history.jsonl"]
+
+
+def test_a_place_that_cannot_be_written_keeps_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    found = History(tmp_path / "file" / "history.jsonl")
+    found.add([took(1.0, 2.0)])
+    found.save()
+    assert len(found.runs) == 1
+
+
+def test_a_user_without_a_home_folder_has_no_history(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "DODO_HISTORY", "XDG_STATE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
+    found = History()
+    found.add([took(1.0, 2.0)])
+    found.save()
+    assert History().runs == []

@@ -1,0 +1,137 @@
+"""Lines for the runner are taken only when they are well-formed and a report can show them."""
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.run.protocol import Malformed, Overrun, Ready, Stopped, Time, Verdict
+from dodo_dsl.run.service_protocol import read_line
+
+CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
+
+
+def line(**changes: object) -> bytes:
+    return json.dumps({"dodo": "verdict", "outcome": "passed", "reason": "done", "checks": [CHECK], **changes}).encode()
+
+
+def test_a_complete_verdict_is_taken_from_an_evaluator() -> None:
+    assert read_line("track", True, line()) == Verdict("track", True, "done", (CHECK,))
+    assert read_line("track", True, line(outcome="failed")) == Verdict("track", False, "done", (CHECK,))
+    assert read_line("track", False, line()) is None
+    assert read_line("camera", False, b'{"dodo": "ready"}\n') == Ready("camera")
+
+
+def test_losses_are_taken_from_every_service() -> None:
+    assert read_line("recorder", False, b'{"dodo": "lost", "messages": 12}\n') == Overrun("recorder", 12)
+    for count in (b"0", b"-1", b"true", b"1.5", b'"12"', b"null", b"1" * 30):
+        assert read_line("track", True, b'{"dodo": "lost", "messages": ' + count + b"}") is None
+
+
+MALFORMED = {
+    "no value": (line(checks=[{k: v for k, v in CHECK.items() if k != "value"}]), "check 'time' has no key 'value'"),
+    "no unit": (line(checks=[{k: v for k, v in CHECK.items() if k != "unit"}]), "check 'time' has no key 'unit'"),
+    "no limit": (line(checks=[{k: v for k, v in CHECK.items() if k != "limit"}]), "check 'time' has no key 'limit'"),
+    "no name": (line(checks=[{"value": 1}]), "a check has no name"),
+    "no checks": (line(checks=None), "its checks are not a list"),
+    "unknown key": (line(checks=[{**CHECK, "more": 1}]), "check 'time' has an unknown key 'more'"),
+    "infinite": (line(checks=[{**CHECK, "value": float("inf")}]), "the value of check 'time' is not a finite number"),
+    "huge": (line(checks=[{**CHECK, "value": int("1" * 400)}]), "the value of check 'time' is not a finite number"),
+    "unit": (line(checks=[{**CHECK, "unit": 3}]), "the unit of check 'time' is not a string"),
+    "ok": (line(checks=[{**CHECK, "ok": 1}]), "check 'time': 'ok' is neither true nor false"),
+    "limit": (
+        line(checks=[{**CHECK, "limit": {"most": 1}}]),
+        "the limit of check 'time' is not an object of numbers 'min' and 'max'",
+    ),
+    "surrogate": (line(reason="\ud800"), "its reason is not a string of 1 to 2000 characters of UTF-8"),
+    "empty reason": (line(reason=""), "its reason is not a string of 1 to 2000 characters of UTF-8"),
+    "long reason": (line(reason="x" * 5000), "its reason is not a string of 1 to 2000 characters of UTF-8"),
+    "outcome": (line(outcome="maybe"), 'its outcome is "maybe", expected passed or failed'),
+    "deep": (b'{"dodo": "verdict", "checks": ' + b"[" * 30_000, "its JSON cannot be read"),
+    "unfinished": (line()[:-5], "its JSON cannot be read"),
+}
+
+
+@pytest.mark.parametrize("case", MALFORMED)
+def test_other_verdicts_are_malformed(case: str) -> None:
+    text, problem = MALFORMED[case]
+    assert read_line("track", True, text) == Malformed("track", problem)
+    assert read_line("camera", False, text) is None
+
+
+CLOCKED = {
+    '{"dodo": "time", "s": 1.5}': Time(1.5, False),
+    '{"dodo": "time", "s": 2, "last": true}': Time(2.0, True),
+    '{"dodo": "time", "s": 2, "last": 1}': Time(2.0, False),
+    '{"dodo": "time", "s": null}': None,
+    '{"dodo": "time"}': None,
+    '{"dodo": "unanswered", "reason": "no answer"}': Stopped("unanswered", "no answer"),
+    '{"dodo": "stuck", "reason": "x"}': Stopped("stuck", "x"),
+    '{"dodo": "timedout", "reason": ""}': Stopped("timedout", ""),
+    '{"dodo": "stuck", "reason": 3}': None,
+    '{"dodo": "stuck"}': None,
+    '{"dodo": ["stuck"], "reason": "x"}': None,
+}
+
+
+@pytest.mark.parametrize("text", CLOCKED)
+def test_only_the_clock_reports_time(text: str) -> None:
+    assert read_line(CLOCK, False, text.encode()) == CLOCKED[text]
+    assert read_line("track", True, text.encode()) is None
+
+
+@pytest.mark.parametrize(
+    "text", [b"", b"ready", b"{}", b'{"dodo": 3}', b'["dodo"]', b'  {"ready": "dodo"}', b'{"dodo"']
+)
+def test_other_lines_are_log(text: bytes) -> None:
+    assert read_line("track", True, text) is None
+
+
+NAMES = st.text(st.characters(blacklist_categories=("Cs",)), min_size=1, max_size=20)
+FINITE = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**9), 10**9)
+CHECKS = st.fixed_dictionaries(
+    {
+        "name": NAMES,
+        "value": st.none() | FINITE,
+        "limit": st.dictionaries(st.sampled_from(["min", "max"]), FINITE),
+        "unit": st.just("") | NAMES,
+        "ok": st.booleans(),
+    }
+)
+
+
+@given(st.booleans(), NAMES, st.lists(CHECKS, max_size=4), st.booleans())
+def test_every_well_formed_verdict_is_taken(
+    passed: bool, reason: str, checks: list[dict[str, Any]], ascii_: bool
+) -> None:
+    document = {"dodo": "verdict", "outcome": "passed" if passed else "failed", "reason": reason, "checks": checks}
+    text = json.dumps(document, ensure_ascii=ascii_).encode()
+    assert read_line("track", True, b" " + text + b"\r\n") == Verdict("track", passed, reason, tuple(checks))
+
+
+@given(st.binary(max_size=200) | st.text(max_size=100).map(lambda t: ('{"dodo": ' + t).encode("utf-8", "replace")))
+def test_any_line_is_read(raw: bytes) -> None:
+    for is_evaluator in (True, False):
+        read_line(CLOCK, is_evaluator, raw)
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from([*CHECK, "min", "max"]), inner, max_size=6)
+    ),
+    max_leaves=8,
+)
+KINDS = st.sampled_from(["verdict", "ready", "lost", "time", "stuck"]) | VALUES
+
+
+@given(
+    st.fixed_dictionaries(
+        {"dodo": KINDS}, optional=dict.fromkeys(("outcome", "reason", "checks", "messages", "s"), VALUES)
+    )
+)
+def test_any_message_is_read(message: dict[str, Any]) -> None:
+    read_line(CLOCK, True, json.dumps(message).encode())
