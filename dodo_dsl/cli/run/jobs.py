@@ -14,6 +14,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import runs
 from dodo_dsl.run.backends import Job
+from dodo_dsl.run.rigs.attendance import is_real
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.settings import Settings
 
@@ -44,7 +45,7 @@ def _compiled(folder: Path, settings: Settings) -> Plan:
     plan = _load_plan(folder, settings)
     if settings.clock not in (None, plan.clock):
         raise Usage(f"this test is compiled for clock {plan.clock}; compile it again for another")
-    if settings.isolation == "network" and rigs.is_real(plan):
+    if settings.isolation == "network" and is_real(plan):
         raise Usage(f"rig '{plan.rig}' is reached through the host, not with --isolation network")
     return plan
 
