@@ -9,11 +9,11 @@ from collections.abc import AsyncIterator
 
 from google.protobuf.message import Message
 
+from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 ALIVE_S = 1.0
-_PORT = 12175
 
 _log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ def _frame(message: Message) -> bytes:
 def send_on_host(cid: int, frame: bytes) -> None:
     """Sends a datagram to a session on this machine's own network; raises OSError."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(frame, (f"225.0.0.{cid}", _PORT))
+        sender.sendto(frame, group(cid))
 
 
 @contextlib.asynccontextmanager

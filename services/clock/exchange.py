@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
-from dodo_dsl.opendlv.bus.session import Address, Session
+from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.datagrams import STEP, STEP_DONE, Pieces, Said, cut, frames

@@ -16,6 +16,7 @@ import pytest
 import yaml
 
 from dodo_dsl import __version__
+from dodo_dsl.opendlv.bus.address import group
 
 ROOT = Path(__file__).parents[2]
 HOSTILE = Path(__file__).parent / "hostile"
@@ -235,7 +236,7 @@ def test_host_isolation_leases_and_refuses_foreign_traffic(tmp_path: Path) -> No
     assert process.returncode == 0, out
     (test,) = results(tmp_path / "report").values()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        stranger.connect((f"225.0.0.{test['cid']}", 12175))
+        stranger.connect(group(test["cid"]))
         port = stranger.getsockname()[1]
         second = start(tmp_path, *words)
         while second.poll() is None:

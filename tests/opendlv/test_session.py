@@ -10,8 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.bus import session as sessions
+from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.opendlv.bus.envelope import Envelope, decode_frame, encode_frame
-from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES, PORT, Session, SessionError
+from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES, Session, SessionError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from tests.opendlv.conftest import Peer
 
@@ -49,11 +50,11 @@ def test_what_libcluon_sends_is_received(cid: int, peer: Peer) -> None:
 
 
 def test_frames_are_those_of_libcluon_byte_for_byte(cid: int, peer: Peer) -> None:
-    group = f"225.0.0.{cid}"
+    bus = group(cid)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind((group, PORT))
-        listener.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + bytes(4))
+        listener.bind(bus)
+        listener.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(bus[0]) + bytes(4))
         listener.settimeout(10.0)
         for id_, payload, sent, sampled, stamp in [
             (1090, "0d000080be", 1_715_000_000_123_456, 1_715_000_000_000_000, 0),
@@ -100,7 +101,7 @@ def test_own_messages_are_dropped_and_others_kept_in_order(cid: int) -> None:
 def test_garbage_is_counted(cid: int) -> None:
     with Session(cid) as session, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         for data in (b"", b"hello", b"\x0d\xa4\x05\x00\x00\xff", b"\x0d\xa4\x02\x00\x00\x08\x02"):
-            stranger.sendto(data, (f"225.0.0.{cid}", PORT))
+            stranger.sendto(data, group(cid))
         envelope = session.receive(5.0)
         assert envelope is not None and envelope.data_type == 1
         assert session.garbage == 3
@@ -108,7 +109,7 @@ def test_garbage_is_counted(cid: int) -> None:
 
 def test_messages_without_room_in_the_buffer_are_counted(cid: int, monkeypatch: pytest.MonkeyPatch) -> None:
     with Session(cid) as sender:
-        monkeypatch.setattr(sessions, "RECEIVE_BUFFER_BYTES", 8192)
+        monkeypatch.setattr(sessions, "RECEIVE_BUFFER", 8192)
         with Session(cid) as session:
             for stamp in range(200):
                 sender.send(STEERING(), sender_stamp=stamp)

@@ -13,12 +13,11 @@ from typing import Self
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.bus import kernel_filter
+from dodo_dsl.opendlv.bus.address import RECEIVE_BUFFER, Address, group
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, decode_frame, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
-PORT = 12175
 MAX_DATAGRAM_BYTES = 65_507
-RECEIVE_BUFFER_BYTES = 26_214_400
 CIDS = range(1, 255)
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
@@ -29,8 +28,6 @@ _SO_RXQ_OVFL = 40
 _TIMESPEC = struct.Struct("@qq")
 _COUNT = struct.Struct("@I")
 _ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
-
-Address = tuple[str, int]
 
 
 class SessionError(OSError):
@@ -56,13 +53,13 @@ class Session:
         self._only: frozenset[int] | None = None
         self.source: Address = ("", 0)
         """Host and port from which the last datagram came."""
-        group = (f"225.0.0.{cid}", PORT)
+        bus = group(cid)
         try:
-            self._receiver = _receiver(group)
-            self._sender = _sender(group, self._receiver)
+            self._receiver = _receiver(bus)
+            self._sender = _sender(bus, self._receiver)
         except OSError as error:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
-            raise SessionError(f"the bus {group[0]}:{PORT} cannot be joined: {error.strerror}{hint}") from None
+            raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
         self._own_address = self._sender.getsockname()
         self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
         self._view = memoryview(self._buffer)
@@ -126,7 +123,7 @@ class Session:
     def deafen(self) -> None:
         """Hear nothing from now on, so that this process is not woken for it; sending goes on."""
         if self.is_member:
-            membership = _membership(f"225.0.0.{self.cid}")
+            membership = _membership(group(self.cid)[0])
             self._receiver.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
             self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
             self.is_member = False
@@ -196,13 +193,13 @@ def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
     return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
 
 
-def _sender(group: tuple[str, int], receiver: socket.socket) -> socket.socket:
+def _sender(bus: Address, receiver: socket.socket) -> socket.socket:
     """Connected, so that the address its datagrams carry is known; time to live 1, loop on."""
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        sender.connect(group)
+        sender.connect(bus)
     except OSError:
         receiver.close()
         sender.close()
@@ -210,15 +207,15 @@ def _sender(group: tuple[str, int], receiver: socket.socket) -> socket.socket:
     return sender
 
 
-def _receiver(group: tuple[str, int]) -> socket.socket:
+def _receiver(bus: Address) -> socket.socket:
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         receiver.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         receiver.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
-        receiver.bind(group)
-        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(group[0]))
+        receiver.bind(bus)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
         receiver.setblocking(False)
     except OSError:
         receiver.close()
@@ -226,5 +223,5 @@ def _receiver(group: tuple[str, int]) -> socket.socket:
     return receiver
 
 
-def _membership(group: str) -> bytes:
-    return socket.inet_aton(group) + socket.inet_aton("0.0.0.0")  # noqa: S104
+def _membership(host: str) -> bytes:
+    return socket.inet_aton(host) + socket.inet_aton("0.0.0.0")  # noqa: S104

@@ -9,11 +9,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from dodo_dsl.opendlv.bus.address import RECEIVE_BUFFER, group
 from dodo_dsl.run.capabilities.finding import Finding, State
 from dodo_dsl.run.process import host_isolation
 
-_PORT = 12175
-_RECEIVE_BUFFER = 26_214_400
 _RECEIVE_S = 1.0
 _FREE_BYTES = 2 << 30
 _SEGMENTS = 64
@@ -32,16 +31,16 @@ def namespaces() -> Iterator[Finding]:
 
 def multicast() -> Iterator[Finding]:
     """Whether a datagram to a multicast group is received."""
-    group, mark = "225.0.0.254", os.urandom(16)
-    membership = socket.inet_aton(group) + struct.pack("=I", socket.INADDR_ANY)
+    bus, mark = group(254), os.urandom(16)
+    membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
             receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            receiver.bind((group, _PORT))
+            receiver.bind(bus)
             receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
             receiver.settimeout(_RECEIVE_S)
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-                sender.sendto(mark, (group, _PORT))
+                sender.sendto(mark, bus)
             deadline = time.monotonic() + _RECEIVE_S
             while receiver.recv(65_535) != mark:
                 if time.monotonic() > deadline:
@@ -58,9 +57,9 @@ def multicast() -> Iterator[Finding]:
 def receive_buffer() -> Iterator[Finding]:
     """Whether sockets may buffer as much as OpenDLV requests."""
     limit = _number("/proc/sys/net/core/rmem_max")
-    if limit < _RECEIVE_BUFFER:
-        advice = f"sudo sysctl -w net.core.rmem_max={_RECEIVE_BUFFER}"
-        text = f"sockets may hold {limit:,} bytes, OpenDLV requests {_RECEIVE_BUFFER:,}: bursts of messages may be lost"
+    if limit < RECEIVE_BUFFER:
+        advice = f"sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}"
+        text = f"sockets may hold {limit:,} bytes, OpenDLV requests {RECEIVE_BUFFER:,}: bursts of messages may be lost"
         yield Finding("receive buffer", "warning", text, advice)
     else:
         yield Finding("receive buffer", "ok", f"sockets may hold {limit:,} bytes")

@@ -3,10 +3,10 @@
 import asyncio
 from typing import Any
 
+from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.run.announce import begin_frame, send_on_host
 from dodo_dsl.run.protocol import BackendError
 
-_PORT = 12175
 # dd makes one datagram of it: bash itself would write one a line, and a frame may hold a line feed
 _SEND = 'printf "%b" "$1" | dd bs=65507 iflag=fullblock status=none > "/dev/udp/$2/$3"'
 
@@ -32,7 +32,8 @@ def _problem(sandbox: Any, cid: int, frame: bytes) -> str:
     from docker.errors import DockerException
 
     escaped = "".join(f"\\x{byte:02x}" for byte in frame)
-    words = ["bash", "-c", _SEND, "send", escaped, f"225.0.0.{cid}", str(_PORT)]
+    host, port = group(cid)
+    words = ["bash", "-c", _SEND, "send", escaped, host, str(port)]
     try:
         code, output = sandbox.exec_run(words)
     except (DockerException, OSError) as error:

@@ -11,6 +11,7 @@ import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
+from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
@@ -18,7 +19,6 @@ from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 
 PROBE_S = 0.3
-_PORT = 12175
 
 
 def namespaces_refusal() -> str:
@@ -81,12 +81,12 @@ async def host_slot(
 
 def listen(cid: int, seconds: float = PROBE_S) -> str:
     """The address of the first sender on a CID's group within ``seconds``; empty when nobody sends."""
-    group = f"225.0.0.{cid}"
+    bus = group(cid)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            receiver.bind((group, _PORT))
-            membership = socket.inet_aton(group) + struct.pack("=I", socket.INADDR_ANY)
+            receiver.bind(bus)
+            membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
             receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
         except OSError as error:
             raise BackendError(

@@ -21,12 +21,12 @@ import subprocess
 import sys
 from typing import Any
 
+from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
 
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
-_PORT = 12175
 
 
 class Sandbox:
@@ -111,7 +111,7 @@ class Sandbox:
 
     def _do_send(self, _descriptors: list[int], cid: int, data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
-            sender.sendto(bytes.fromhex(data), (f"225.0.0.{cid}", _PORT))
+            sender.sendto(bytes.fromhex(data), group(cid))
 
     def _do_keep(self, descriptors: list[int]) -> None:
         """Stays when the runner ends, and writes the services' output into their logs in its place."""

@@ -6,8 +6,9 @@ import time
 
 from google.protobuf.message import Message
 
+from dodo_dsl.opendlv.bus.address import RECEIVE_BUFFER, Address, group
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, decode_frame, encode_frame
-from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES, PORT, RECEIVE_BUFFER_BYTES, Address
+from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 _log = logging.getLogger(__name__)
@@ -17,13 +18,13 @@ class Channel:
     """Sends messages in OpenDLV's frames to one address, or to all on the bus, and takes what comes back."""
 
     def __init__(self, cid: int, messages: MessageSet) -> None:
-        self._group: Address = (f"225.0.0.{cid}", PORT)
+        self._group = group(cid)
         self._messages = messages
         self._has_failed = False
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
         self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         self._socket.bind(("", 0))
         self._socket.setblocking(False)
 

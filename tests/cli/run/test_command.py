@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dodo_dsl.opendlv.bus.address import group
 from tests.run.desk import ROOT, Desk, gone, marks, processes_with, wait_for
 from tests.run.helpers import FAIL, PASS, READY, WAIT
 
@@ -136,7 +137,7 @@ def test_tampered_compiled_tests_are_refused(desk: Desk, change: dict[str, objec
 def test_foreign_traffic_is_refused_with_its_sender(desk: Desk) -> None:
     plan = replace(desk.bench.plan(), cid=231)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        stranger.connect(("225.0.0.231", 12175))
+        stranger.connect(group(231))
         port = stranger.getsockname()[1]
         process = desk.start(plan, "--isolation", "host")
         while process.poll() is None:

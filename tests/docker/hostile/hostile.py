@@ -12,6 +12,7 @@ from pathlib import Path
 
 import sysv_ipc
 
+from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
@@ -31,7 +32,7 @@ def flood() -> None:
     junk = encode_frame(Envelope(5000, os.urandom(20_000), 0, 0, 0, 0))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for turn in itertools.count():
-            sender.sendto(junk if turn % 2 else os.urandom(100), (f"225.0.0.{CID}", 12175))
+            sender.sendto(junk if turn % 2 else os.urandom(100), group(CID))
             if turn % 200 == 0:
                 time.sleep(0.01)
 
@@ -46,7 +47,7 @@ def groups() -> None:
             for cid in range(1, 255):
                 if cid != CID:
                     for datagram in (steering, pedal, frame):
-                        sender.sendto(datagram, (f"225.0.0.{cid}", 12175))
+                        sender.sendto(datagram, group(cid))
             time.sleep(0.05)
 
 

@@ -16,8 +16,8 @@ from tests.run.helpers import READY, Bench
 CROWD, LAST = 400, 4711
 SLOW_RECORDER = f"""
 import pathlib, sys, time
-from dodo_dsl.opendlv import session
-session.RECEIVE_BUFFER_BYTES = 8192
+from dodo_dsl.opendlv.bus import session
+session.RECEIVE_BUFFER = 8192
 from services.base import run
 from services.rec_recorder import model, service
 write = model.Recording.write

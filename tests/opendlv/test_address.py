@@ -1,0 +1,17 @@
+import subprocess
+import sys
+
+from dodo_dsl.opendlv.bus.address import group
+
+LOADED = "import sys; import dodo_dsl.opendlv.bus.address; print(*(m for m in sys.modules if m.startswith('dodo_dsl')))"
+
+
+def test_the_group_and_port_of_libcluon() -> None:
+    assert group(111) == ("225.0.0.111", 12175)
+
+
+def test_sandboxes_load_it_without_anything_else() -> None:
+    loaded = subprocess.run([sys.executable, "-S", "-c", LOADED], capture_output=True, text=True, check=True).stdout
+    assert set(loaded.split()) == {
+        "dodo_dsl", "dodo_dsl.opendlv", "dodo_dsl.opendlv.bus", "dodo_dsl.opendlv.bus.address",
+    }  # fmt: skip
