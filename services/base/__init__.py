@@ -1,6 +1,7 @@
 """What all services share: flags from the manifest, the loop with its injected clock, readiness, verdicts."""
 
 from services.base.clock import Clock, Inbox, RealTimeClock
+from services.base.evaluator import Evaluator, Span, UnjudgeableError
 from services.base.flags import Flags, FlagsError
 from services.base.process import run
 from services.base.service import Context, Handler, Output, Service, period_of
@@ -10,6 +11,7 @@ __all__ = [
     "Check",
     "Clock",
     "Context",
+    "Evaluator",
     "Flags",
     "FlagsError",
     "Handler",
@@ -17,6 +19,8 @@ __all__ = [
     "Output",
     "RealTimeClock",
     "Service",
+    "Span",
+    "UnjudgeableError",
     "Verdict",
     "period_of",
     "run",

@@ -1,79 +1,62 @@
-"""The judge on the bus."""
+"""The evaluator of a closed loop on the bus."""
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from google.protobuf.message import Message
-
-from services.base import Context, Flags, Handler, Output, Service
+from services.base import Context, Flags, Handler, UnjudgeableError
 from services.collision.geometry import Box, Pose, heading_of
-from services.collision.model import REQUESTS, Judge, UnjudgeableError
+from services.collision.model import REQUESTS, TrackEvaluator
 from services.collision.obstacles import load, pick
 from services.collision.track import Track
 
-PERIOD = 10_000  # us
 SILENCE, GAPS = 2.0, 3.0
-"""s without a frame, and how often the longest time between two of them, after which whoever sent them hangs."""
+"""s without a frame, and how often the longest time between two of them, after which their sender hangs."""
 
 
-class Collision(Service):
+class Collision(TrackEvaluator):
     """Takes the vehicle's frames under the sender stamp ``frame-id`` and the application's requests of any."""
-
-    period = PERIOD
 
     def __init__(self, context: Context, wall: Callable[[], float] = time.monotonic) -> None:
         """``wall`` in s: on a rig it is an error when the vehicle vanishes."""
-        self._wall = wall
-        self._on_rig = context.on_rig
-        self._seen: float | None = None
-        self._gap = math.inf
-        self._log = context.log
         flags = context.flags
-        self.judge = Judge(track(flags), Box(flags["length"], flags["width"]))
+        super().__init__(track(flags), Box(flags["length"], flags["width"]))
+        self._log = context.log
+        self._on_rig, self._wall = context.on_rig, wall
+        self._seen: float | None = None
+        self._gap: float | None = None
         self.rejected = 0
-        self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._look}
+        self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
         for name in REQUESTS:
             self.inputs[f"opendlv.proxy.{name}", None] = self._request(name)
 
-    def begin(self, now: int) -> None:
-        self.judge.begin(now)
+    def advance(self, now: int) -> None:
+        super().advance(now)
+        if self._on_rig and self._seen is not None and not self.is_overdue(now):
+            self._check_silence(self._wall() - self._seen)
 
-    def update(self, now: int) -> Iterable[Message | Output]:
-        self.judge.update(now)
-        self.verdict = self.judge.verdict
-        if self.verdict is None and self._on_rig and self._seen is not None:
-            self._miss(self._wall() - self._seen)
-        return ()
-
-    def _miss(self, silent: float) -> None:
+    def _check_silence(self, silent: float) -> None:
         """Raises UnjudgeableError when frames that came have stopped: the application is not to blame for that."""
-        if silent > max(SILENCE, GAPS * self._gap):
+        if self._gap is not None and silent > max(SILENCE, GAPS * self._gap):
             raise UnjudgeableError(f"no Frame of the vehicle has come for {silent:.0f} s, and they came before")
 
-    def end_of_input(self, now: int) -> None:
-        self.judge.end(now)
-        self.verdict = self.judge.verdict
-
     def _request(self, name: str) -> Handler:
-        return lambda _message, _sample_time: self.judge.request(name)
+        return lambda _message, _sample_time: self.request(name)
 
-    def _look(self, frame: Any, sample_time: int) -> None:
+    def _take_frame(self, frame: Any, sample_time: int) -> None:
         now = self._wall()
         if self._seen is not None:
-            longest = 0.0 if math.isinf(self._gap) else self._gap
-            self._gap = max(longest, now - self._seen)
+            self._gap = max(self._gap or 0.0, now - self._seen)
         self._seen = now
         heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
         if heading is None or not math.isfinite(frame.x + frame.y):
             self.rejected += 1
             if self.rejected == 1:
-                self._log.warning("a Frame without a place or an attitude is ignored, as all such will be")
+                self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
             return
-        self.judge.look(Pose(frame.x, frame.y, heading), sample_time)
-        self.verdict = self.judge.verdict
+        self.look(Pose(frame.x, frame.y, heading), sample_time)
 
 
 def track(flags: Flags) -> Track:
@@ -99,6 +82,6 @@ def track(flags: Flags) -> Track:
     )
 
 
-def build(context: Context) -> Service:
+def build(context: Context) -> Collision:
     """The service from its flags."""
     return Collision(context)

@@ -45,7 +45,7 @@ def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
             return f"the vehicle stands on {kind} {name} from the start"
     near = nearest(track.walls, area)
     if near is not None and near[0] < track.min_margin:
-        limit = f"closer than the {track.min_margin:g} m that it is to keep"
+        limit = f"expected at least {track.min_margin:g} m"
         return f"the vehicle stands {near[0]:.3f} m from wall {near[1]} from the start, {limit}"
     return None
 

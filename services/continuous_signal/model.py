@@ -1,20 +1,16 @@
-"""The judge of an open loop: a signal of the application against its target."""
+"""The evaluator of an open loop: a signal of the application against its target."""
 
 from array import array
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from services.base import Verdict
+from services.base import Evaluator, Span, UnjudgeableError, Verdict
 from services.continuous_signal.measures import Limits, measure
 from services.continuous_signal.reason import verdict
-from services.continuous_signal.target import MICROSECONDS, Target, Times, Values, in_order
+from services.continuous_signal.target import Target, Times, Values, in_order
 
 MOST_SAMPLES = 10_000_000
-
-
-class UnjudgeableError(Exception):
-    """There is nothing to judge the application by: the test itself is at fault."""
 
 
 @dataclass
@@ -37,61 +33,43 @@ class Samples:
         return np.array(self._times, np.int64) - zero, np.array(self._values, np.float64)
 
 
-class Judge:
-    """Hears a signal, and the target where that is `None`, until `verdict` is there.
+class SignalEvaluator(Evaluator):
+    """Consumes a signal, and the target where that is ``None``.
 
-    Its time 0 is the begin of the test (the first of `begin` and `update`), or else the target's own start. Samples
-    may come in any order. They are kept until the verdict, up to MOST_SAMPLES of them, and the verdict then comes.
+    Samples count from the begin of the test, or else from the target's own start. They may come in any order and are
+    kept until the verdict, which comes at MOST_SAMPLES of them at the latest.
     """
 
     def __init__(self, signal: str, target: Target | None, limits: Limits, max_time: float, from_begin: bool) -> None:
-        self.verdict: Verdict | None = None
+        """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the begin."""
+        super().__init__(max_time)
         self._signal, self._target, self._limits = signal, target, limits
-        self._max_time = max_time
         self._from_begin = from_begin or target is None
         self._samples, self._targets = Samples(), Samples()
-        self._begun = False
-        self._zero: int | None = None
 
-    def begin(self, now: int) -> None:
-        """The test begins; only the first call counts."""
-        if not self._begun:
-            self._begun, self._zero = True, now
-
-    def hear(self, value: float, time: int) -> None:
-        """A sample of the signal; not a finite number is a fault of the application."""
+    def take(self, value: float, time: int) -> None:
+        """A sample of the signal; a value that is not finite is a fault of the application."""
         if self.verdict is None:
             self._samples.add(time, value)
 
-    def hear_target(self, value: float, time: int) -> None:
-        """A sample of the target; raises UnjudgeableError where it is no finite number."""
+    def take_target(self, value: float, time: int) -> None:
+        """A sample of the target; raises UnjudgeableError for a value that is not finite."""
         if not np.isfinite(value):
             raise UnjudgeableError(f"a sample of the target is {value}, expected a finite number")
         if self.verdict is None:
             self._targets.add(time, value)
 
-    def update(self, now: int) -> None:
-        """Look at the time; raises UnjudgeableError when it is over and there is no target."""
-        elapsed = self._elapsed(now)
-        if self.verdict is None and elapsed > self._max_time:
-            self._decide(f"within {self._max_time:.2f} s")
-        elif self.verdict is None and max(len(self._samples), len(self._targets)) >= MOST_SAMPLES:
-            self._decide(f"in {elapsed:.2f} s, until memory was full")
+    def advance(self, now: int) -> None:
+        is_full = max(len(self._samples), len(self._targets)) >= MOST_SAMPLES
+        if is_full and not self.is_overdue(now):
+            seconds = f"{self.elapsed(now):.2f} s, until memory was full"
+            self.conclude(Span(f"in {seconds}", f"for {seconds}"))
 
-    def end(self, now: int) -> None:
-        """Nothing more will come: give the verdict now; raises as `update` does."""
-        if self.verdict is None:
-            self._decide(f"before the input ended after {self._elapsed(now):.2f} s")
-
-    def _elapsed(self, now: int) -> float:
-        if self._zero is None:
-            self._zero = now
-        return (now - self._zero) / MICROSECONDS
-
-    def _decide(self, during: str) -> None:
-        begin = self._zero or 0
+    def decide(self, span: Span) -> Verdict:
+        begin = self.zero
         target = self._target or in_order(*self._targets.since(begin))
         if not len(target.times):
-            raise UnjudgeableError(f"no sample of the target came {during}")
+            raise UnjudgeableError(f"no sample of the target came {span.within}")
         times, values = self._samples.since(begin if self._from_begin else target.start)
-        self.verdict = verdict(self._signal, target, measure(target, times, values, self._limits), self._limits, during)
+        measures = measure(target, times, values, self._limits)
+        return verdict(self._signal, target, measures, self._limits, span.within)

@@ -1,63 +1,49 @@
-"""The judge of a signal on the bus."""
+"""The evaluator of a signal on the bus."""
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from google.protobuf.message import Message
-
 from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base import Context, Flags, Output, Service
+from services.base import Context, Flags
 from services.continuous_signal.csv_target import read_table
 from services.continuous_signal.measures import Limits
-from services.continuous_signal.model import Judge
+from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.recorded_target import read_recording
 from services.continuous_signal.signals import Signal, check
 from services.continuous_signal.target import MICROSECONDS, Target
 
 RECORDING = ".rec"
-NEEDED = ("max-mean", "max-std", "max-distance", "min-share")
+REQUIRED = ("max-mean", "max-std", "max-distance", "min-share")
 
 
-class ContinuousSignal(Service):
-    """Hears the signal, and its target where that comes live, under their sender stamps."""
+class ContinuousSignal(SignalEvaluator):
+    """Takes the signal, and its target where that comes live, under their sender stamps."""
 
     def __init__(self, context: Context) -> None:
+        """Raises ValueError for flags that leave something open."""
         flags = context.flags
         signal = check(Signal(flags["message"], flags["sender"], flags["field"]), context.messages)
         other = _target_signal(flags, signal)
         target = _target(flags, other, context.messages)
         if target is None and str(other) == str(signal):
             raise ValueError("there is no target: give --target, or --target-sender of one that comes live")
-        limits = _limits(flags)
-        self.judge = Judge(f"{signal.field} of {signal}", target, limits, flags["max-time"], flags["align"] == "begin")
-        self._signal, self._other = signal, other
-        self.inputs = {(signal.message, signal.sender): self._hear}
+        name, from_begin = f"{signal.field} of {signal}", flags["align"] == "begin"
+        super().__init__(name, target, _limits(flags), flags["max-time"], from_begin)
+        self._source, self._target_source = signal, other
+        self.inputs = {(signal.message, signal.sender): self._take}
         if target is None:
             check(other, context.messages)
-            self.inputs[other.message, other.sender] = self._hear_target
+            self.inputs[other.message, other.sender] = self._take_target
 
-    def begin(self, now: int) -> None:
-        self.judge.begin(now)
+    def _take(self, message: Any, sample_time: int) -> None:
+        self.take(self._source.value(message), sample_time)
 
-    def update(self, now: int) -> Iterable[Message | Output]:
-        self.judge.update(now)
-        self.verdict = self.judge.verdict
-        return ()
-
-    def end_of_input(self, now: int) -> None:
-        self.judge.end(now)
-        self.verdict = self.judge.verdict
-
-    def _hear(self, message: Any, sample_time: int) -> None:
-        self.judge.hear(self._signal.value(message), sample_time)
-
-    def _hear_target(self, message: Any, sample_time: int) -> None:
-        self.judge.hear_target(self._other.value(message), sample_time)
+    def _take_target(self, message: Any, sample_time: int) -> None:
+        self.take_target(self._target_source.value(message), sample_time)
 
 
-def build(context: Context) -> Service:
-    """The service from its flags; raises ValueError for what they leave open."""
+def build(context: Context) -> ContinuousSignal:
+    """The service from its flags; raises ValueError for flags that leave something open."""
     return ContinuousSignal(context)
 
 
@@ -81,8 +67,8 @@ def _target(flags: Flags, signal: Signal, messages: MessageSet) -> Target | None
 
 
 def _limits(flags: Flags) -> Limits:
-    if all(flags[name] is None for name in NEEDED):
-        raise ValueError(f"there is no limit to judge by: give one or more of --{', --'.join(NEEDED)}")
+    if all(flags[name] is None for name in REQUIRED):
+        raise ValueError(f"there is no limit to judge by: give one or more of --{', --'.join(REQUIRED)}")
     if flags["min-share"] is not None and flags["band"] is None:
         raise ValueError("--min-share needs --band, the distance that counts as inside")
     until = flags["until"]

@@ -1,8 +1,9 @@
-"""The judge of a perception: the application's boxes against the true ones, frame by frame."""
+"""The evaluator of a perception: the application's boxes against the true ones, frame by frame."""
 
 from collections.abc import Callable, Sequence
 
-from services.base import Verdict
+from services.base import Evaluator, Span, UnjudgeableError, Verdict
+from services.base.clock import MICROSECONDS
 from services.object_detection.boxes import Box, Thing
 from services.object_detection.counts import compare
 from services.object_detection.frames import Frame, Mark, Parts, Value
@@ -10,39 +11,27 @@ from services.object_detection.reason import verdict
 from services.object_detection.score import Limits, Rules, Score
 from services.object_detection.truth import Truth
 
-MICROSECONDS = 1_000_000
 
+class DetectionEvaluator(Evaluator):
+    """Consumes detections, and the truth where ``truth`` is None, in test time (microseconds).
 
-class UnjudgeableError(Exception):
-    """There is nothing to judge the application by: the test itself is at fault."""
-
-
-class Judge:
-    """Hears detections, and the truth where `truth` is None, in test time (microseconds) until `verdict` is there.
-
-    Time 0 is the first of `begin` and `update`; what came before that, and before `begin`, is forgotten. A frame is
-    forgotten as soon as it is judged, but for its sample time.
+    What came before time zero, and before ``begin``, is forgotten. A frame is forgotten as soon as it is judged, but
+    for its sample time.
     """
 
     def __init__(self, truth: Truth | None, rules: Rules, limits: Limits) -> None:
-        self.verdict: Verdict | None = None
+        super().__init__(rules.max_time, rules.max_delay)
         self._truth, self._rules, self._limits = truth, rules, limits
         self._score = Score()
         self._frames: dict[int, Frame] = {}
         self._judged: set[int] = set()
         self._passed_over: set[int] = set()
         self._pictures = set(truth.pictures) if truth else set[int]()
-        self._now = 0
-        self._zero: int | None = None
-        self._over: int | None = None
         self._last = -1
-        self._begun = self._heard_truth = False
+        self._has_truth = False
 
-    def begin(self, now: int) -> None:
-        """The test begins; only the first call counts."""
-        if self._begun:
-            return
-        self._begun, self._zero, self._now = True, now, max(now, self._now)
+    def forget(self, now: int) -> None:
+        self.now = max(now, self.now or 0)
         self._score = Score()
         self._passed_over |= self._judged
         self._judged.clear()
@@ -52,12 +41,12 @@ class Judge:
 
     def detect(self, mark: Mark, number: int, value: Value) -> None:
         """The application said something of its detection `number` in a frame."""
-        self._hear(mark, number, value, lambda frame: frame.found)
+        self._take(mark, number, value, lambda frame: frame.found)
 
     def reveal(self, mark: Mark, number: int, value: Value) -> None:
         """The truth about object `number` in a frame."""
-        self._heard_truth = True
-        self._hear(mark, number, value, lambda frame: frame.true)
+        self._has_truth = True
+        self._take(mark, number, value, lambda frame: frame.true)
 
     def announce(self, mark: Mark, by_application: bool) -> None:
         """There is such a frame; by the application: it has answered it."""
@@ -66,31 +55,25 @@ class Judge:
             frame.answered |= by_application
             frame.told |= not by_application
 
-    def update(self, now: int) -> None:
-        """Judge the frames whose time is over, and give the verdict when the test's is; may raise UnjudgeableError."""
-        self._now = now
-        self._seconds(now)
-        if self.verdict is not None:
-            return
+    def advance(self, now: int) -> None:
         self._settle(lambda frame: now - frame.since >= self._rules.max_delay * MICROSECONDS)
-        if self._over is not None:
-            if now - self._over >= self._rules.max_delay * MICROSECONDS:
-                self._finish(f"before the input ended after {self._seconds(self._over):.2f} s")
-        elif self._seconds(now) > self._rules.max_time:
-            self._decide(f"within {self._rules.max_time:.2f} s")
 
-    def end(self, now: int) -> None:
-        """Nothing more will come but answers: the verdict follows after `max_delay`; may raise UnjudgeableError."""
-        if self._over is None and self.verdict is None:
-            self._over = now
-            self.update(now)
+    def decide(self, span: Span) -> Verdict:
+        """At the end of the input, all frames that are left count.
 
-    def _seconds(self, time: int) -> float:
-        if self._zero is None:
-            self._zero = time
-        return (time - self._zero) / MICROSECONDS
+        Pictures of a file that the application never answered count up to the last that it did, or all at the end.
+        """
+        if span.is_complete:
+            self._settle(lambda frame: True)
+        if self._truth is None and not self._has_truth:
+            raise UnjudgeableError(f"no true box came {span.within}")
+        for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
+            if self._truth and (span.is_complete or key < self._last):
+                tallies = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
+                self._score.add(tallies, f"of picture {key}", False)
+        return verdict(self._score, self._limits, span.within)
 
-    def _hear(self, mark: Mark, number: int, value: Value, side: Callable[[Frame], Parts]) -> None:
+    def _take(self, mark: Mark, number: int, value: Value, side: Callable[[Frame], Parts]) -> None:
         frame = self._frame(mark)
         if frame is not None:
             parts = side(frame)
@@ -104,10 +87,10 @@ class Judge:
         frame = self._frames.get(mark.time)
         if frame is not None or mark.time in self._judged or mark.time in self._passed_over:
             return frame
-        if self._zero is None or self._seconds(self._now) < self._rules.start:
+        if self.now is None or self.elapsed(self.now) < self._rules.start:
             self._pass_over(mark)
             return None
-        return self._frames.setdefault(mark.time, Frame(mark, self._now))
+        return self._frames.setdefault(mark.time, Frame(mark, self.now))
 
     def _pass_over(self, mark: Mark) -> None:
         self._passed_over.add(mark.time)
@@ -127,7 +110,7 @@ class Judge:
             self._score.without_truth += 1
             return
         tallies = compare(frame.found.things(), true, self._rules.iou, self._rules.labels)
-        self._score.add(tallies, f"at {self._seconds(frame.since):.2f} s", frame.answered)
+        self._score.add(tallies, f"at {self.elapsed(frame.since):.2f} s", frame.answered)
 
     def _true(self, frame: Frame) -> Sequence[Thing] | None:
         """What is in a frame; each picture of a file is there for one frame, unless there is one for all."""
@@ -140,18 +123,3 @@ class Judge:
             self._pictures.remove(key)
             self._last = max(self._last, key)
         return self._truth.pictures[key]
-
-    def _finish(self, during: str) -> None:
-        """All has been heard: the frames that are left count as they are."""
-        self._settle(lambda frame: True)
-        self._decide(during, all_pictures=True)
-
-    def _decide(self, during: str, all_pictures: bool = False) -> None:
-        """Judge also the pictures that the application never spoke of, up to the last of which it did, or all."""
-        if self._truth is None and not self._heard_truth:
-            raise UnjudgeableError(f"no true box came {during}")
-        for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
-            if self._truth and (all_pictures or key < self._last):
-                tallies = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
-                self._score.add(tallies, f"of picture {key}", False)
-        self.verdict = verdict(self._score, self._limits, during)

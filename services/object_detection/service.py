@@ -1,23 +1,21 @@
-"""The judge of a perception on the bus."""
+"""The evaluator of a perception on the bus."""
 
 import difflib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from google.protobuf.message import Message
-
-from services.base import Context, Flags, Handler, Output, Service
+from services.base import Context, Flags, Handler
 from services.object_detection.boxes import Box
 from services.object_detection.frames import Kind, Mark, Value
-from services.object_detection.model import Judge
+from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import MEASURES, Limits, Rules
 from services.object_detection.truth import Truth, TruthError, load
 
 LOGIC = "opendlv.logic.perception.Detection"
 ANNOUNCEMENT = "opendlv.proxy.ImageReadingShm"
 
-Hear = Callable[[Mark, int, Value], None]
+Take = Callable[[Mark, int, Value], None]
 
 VALUES: dict[str, Callable[[Any], Value]] = {
     "BoundingBox": lambda message: Box(message.x, message.y, message.width, message.height),
@@ -26,48 +24,37 @@ VALUES: dict[str, Callable[[Any], Value]] = {
 }
 
 
-class ObjectDetection(Service):
-    """Hears detections, truth and announcements of frames, each under its sender stamp."""
+class ObjectDetection(DetectionEvaluator):
+    """Takes detections, truth and announcements of frames, each under its sender stamp."""
 
     def __init__(self, context: Context) -> None:
+        """Raises ValueError for flags that leave something open."""
         flags = context.flags
         truth = _truth(flags)
-        self.judge = Judge(truth, _rules(flags), _limits(flags))
+        super().__init__(truth, _rules(flags), _limits(flags))
         self._sender = flags["sender"]
-        self.inputs: dict[tuple[str, int | None], Handler] = _handlers(flags["sender"], self.judge.detect)
+        self.inputs: dict[tuple[str, int | None], Handler] = _handlers(flags["sender"], self.detect)
         if truth is None:
-            self.inputs |= _handlers(flags["truth-sender"], self.judge.reveal)
+            self.inputs |= _handlers(flags["truth-sender"], self.reveal)
         if flags["frame-sender"] is not None:
-            self.inputs[ANNOUNCEMENT, flags["frame-sender"]] = self._announced
+            self.inputs[ANNOUNCEMENT, flags["frame-sender"]] = self._take_announcement
 
-    def begin(self, now: int) -> None:
-        self.judge.begin(now)
-
-    def update(self, now: int) -> Iterable[Message | Output]:
-        self.judge.update(now)
-        self.verdict = self.judge.verdict
-        return ()
-
-    def end_of_input(self, now: int) -> None:
-        self.judge.end(now)
-        self.verdict = self.judge.verdict
-
-    def _announced(self, message: Any, sample_time: int) -> None:
+    def _take_announcement(self, message: Any, sample_time: int) -> None:
         by_application = (ANNOUNCEMENT, self._sender) in self.inputs
-        self.judge.announce(Mark(sample_time, message.sampleId), by_application)
+        self.announce(Mark(sample_time, message.sampleId), by_application)
 
 
-def build(context: Context) -> Service:
-    """The service from its flags; raises ValueError for what they leave open."""
+def build(context: Context) -> ObjectDetection:
+    """The service from its flags; raises ValueError for flags that leave something open."""
     return ObjectDetection(context)
 
 
-def _handlers(sender: int, hear: Hear) -> dict[tuple[str, int | None], Handler]:
-    return {(LOGIC + name, sender): _handler(value, hear) for name, value in VALUES.items()}
+def _handlers(sender: int, take: Take) -> dict[tuple[str, int | None], Handler]:
+    return {(LOGIC + name, sender): _handler(value, take) for name, value in VALUES.items()}
 
 
-def _handler(value: Callable[[Any], Value], hear: Hear) -> Handler:
-    return lambda message, time: hear(Mark(time, message.sampleId), message.detectionId, value(message))
+def _handler(value: Callable[[Any], Value], take: Take) -> Handler:
+    return lambda message, time: take(Mark(time, message.sampleId), message.detectionId, value(message))
 
 
 def _truth(flags: Flags) -> Truth | None:

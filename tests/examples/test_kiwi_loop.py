@@ -1,4 +1,4 @@
-"""The example application in a closed loop with the camera, the car and the judge: test time only, no sockets."""
+"""The example application in a closed loop with the camera, the car and the evaluator: test time only, no sockets."""
 
 import importlib.util
 import math
@@ -12,8 +12,9 @@ import pytest
 
 from services.base import Verdict
 from services.collision.geometry import Box, Pose
-from services.collision.model import Judge, Track
+from services.collision.model import TrackEvaluator
 from services.collision.obstacles import load, pick
+from services.collision.track import Track
 from services.dynamic_model.model import Vehicle
 from services.integrator.model import Integrator, Twist
 from services.integrator.model import Pose as Attitude
@@ -57,13 +58,13 @@ class Loop:
     def run(self) -> Verdict:
         obstacles = load(MAPS / self.map)
         walls = pick(obstacles, ["left", "right"], "walls", MAPS)
-        judge = Judge(Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), Box(0.36, 0.16))
+        evaluator = TrackEvaluator(Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), Box(0.36, 0.16))
         heading = math.radians(90 + self.yaw)
         car, body = Vehicle(100), Integrator(Attitude((self.right, 0.0, 0.0), quaternion(0, 0, heading)))
         driver, answers = steering.Driver(self.reverse), []
         now = 0
-        judge.begin(now)
-        while judge.verdict is None:
+        evaluator.begin(now)
+        while evaluator.verdict is None:
             for due, (angle, pedal) in answers:
                 if due == now:
                     car.steer(angle)
@@ -71,14 +72,14 @@ class Loop:
             motion = car.update(now)
             body.feed(Twist((motion.vx, motion.vy, 0.0), (0.0, 0.0, motion.yaw_rate)), now)
             pose = plane(body.update(now))
-            judge.look(pose, now)
-            judge.update(now)
+            evaluator.look(pose, now)
+            evaluator.update(now)
             if now % FRAME == 0:
                 answers.append((now + self.delay + STEP, self.answer(driver, pose)))
                 for name in ("GroundSteeringRequest", "PedalPositionRequest"):
-                    judge.request(name)
+                    evaluator.request(name)
             now += STEP
-        return judge.verdict
+        return evaluator.verdict
 
     def answer(self, driver: Any, pose: Pose) -> tuple[float, float]:
         eye = CameraPose.at(pose.x, pose.y, 0.095, 0.0, 0.0, pose.heading)

@@ -8,9 +8,9 @@ import shapely.affinity
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.base import Verdict
+from services.base import UnjudgeableError, Verdict
 from services.collision.geometry import Box, Pose
-from services.collision.model import REQUESTS, Judge, UnjudgeableError
+from services.collision.model import REQUESTS, TrackEvaluator
 from services.collision.track import Track
 
 SECOND = 1_000_000
@@ -28,9 +28,9 @@ LANE = Track(
 )
 
 
-def judge(track: Track = LANE, requests: Iterable[str] = REQUESTS) -> Judge:
+def judge(track: Track = LANE, requests: Iterable[str] = REQUESTS) -> TrackEvaluator:
     """A judge whose test has begun and who has heard the application."""
-    it = Judge(track, Box(0.36, 0.16))
+    it = TrackEvaluator(track, Box(0.36, 0.16))
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     for name in requests:
@@ -38,22 +38,22 @@ def judge(track: Track = LANE, requests: Iterable[str] = REQUESTS) -> Judge:
     return it
 
 
-def drive(it: Judge, *poses: tuple[float, float, float, float]) -> None:
+def drive(it: TrackEvaluator, *poses: tuple[float, float, float, float]) -> None:
     """Show poses, each a time in seconds from the begin, x, y and a heading in degrees."""
     for time, x, y, heading in poses:
         it.look(Pose(x, y, math.radians(heading)), BEGIN + round(time * SECOND))
 
 
-def decided(it: Judge) -> Verdict:
+def decided(it: TrackEvaluator) -> Verdict:
     assert it.verdict is not None
     return it.verdict
 
 
-def values(it: Judge) -> dict[str, float | None]:
+def values(it: TrackEvaluator) -> dict[str, float | None]:
     return {check.name: check.value for check in decided(it).checks}
 
 
-def oks(it: Judge) -> dict[str, bool]:
+def oks(it: TrackEvaluator) -> dict[str, bool]:
     return {check.name: check.ok for check in decided(it).checks}
 
 
@@ -111,7 +111,7 @@ def test_a_fast_vehicle_does_not_jump_over_the_goal() -> None:
 def test_the_first_verdict_stands() -> None:
     it = judge()
     drive(it, (0, 0, 0, 0), (1, 3, 0, 0), (2, 3, 1, 0))
-    it.end(BEGIN + 2 * SECOND)
+    it.end_of_input(BEGIN + 2 * SECOND)
     it.update(BEGIN + 100 * SECOND)
     assert decided(it).outcome == "passed"
 
@@ -167,7 +167,7 @@ def test_without_a_pose_there_is_no_verdict() -> None:
     with pytest.raises(UnjudgeableError, match=r"^no opendlv.sim.Frame of the vehicle came within 40.00 s$"):
         it.update(BEGIN + 41 * SECOND)
     with pytest.raises(UnjudgeableError, match=r"before the input ended after 2.00 s$"):
-        it.end(BEGIN + 2 * SECOND)
+        it.end_of_input(BEGIN + 2 * SECOND)
     assert it.verdict is None
 
 
@@ -184,7 +184,7 @@ def test_the_end_of_the_input_brings_the_verdict() -> None:
     it = judge()
     drive(it, (0, 0, 0, 0), (2, 1, 0, 0))
     it.update(BEGIN + 2 * SECOND)
-    it.end(BEGIN + 2 * SECOND)
+    it.end_of_input(BEGIN + 2 * SECOND)
     assert decided(it).reason == (
         "did not reach finish before the input ended after 2.00 s: "
         "the vehicle is at x = 1.00 m, y = 0.00 m, 1.82 m from it"
@@ -193,7 +193,7 @@ def test_the_end_of_the_input_brings_the_verdict() -> None:
 
 def test_without_a_goal_staying_clear_is_enough() -> None:
     track = Track(LANE.walls, {}, 2.0)
-    for last in (lambda it: it.update(BEGIN + 3 * SECOND), lambda it: it.end(BEGIN + SECOND)):
+    for last in (lambda it: it.update(BEGIN + 3 * SECOND), lambda it: it.end_of_input(BEGIN + SECOND)):
         it = judge(track)
         drive(it, (0, 0, 0, 0), (1, 1, 0, 0))
         it.update(BEGIN + SECOND)
@@ -206,7 +206,7 @@ def test_without_a_goal_staying_clear_is_enough() -> None:
 def test_without_a_goal_a_silent_application_fails() -> None:
     it = judge(Track(LANE.walls, {}, 2.0), requests=[])
     drive(it, (0, 0, 0, 0))
-    it.end(BEGIN + 2 * SECOND)
+    it.end_of_input(BEGIN + 2 * SECOND)
     assert decided(it).reason.startswith("the application sent no GroundSteeringRequest and no PedalPosition")
 
 
@@ -247,7 +247,7 @@ def test_gates_and_goal_in_one_frame_count_in_the_order_of_the_way() -> None:
     it = judge(LAP)
     drive(it, (0, 3.5, 0, 0), (1, 0, 0, 0))
     assert it.verdict is None
-    it.end(BEGIN + 2 * SECOND)
+    it.end_of_input(BEGIN + 2 * SECOND)
     assert decided(it).reason.startswith("crossed 1 of 2 gates before the input ended after 2.00 s: ")
     backwards = judge(replace(LAP, gates=LAP.gates[::-1]))
     drive(backwards, (0, 3.5, 0, 0), (1, 0, 0, 0))
@@ -259,7 +259,7 @@ def test_gates_and_goal_in_one_frame_count_in_the_order_of_the_way() -> None:
 def test_with_all_gates_crossed_the_goal_is_what_was_missed() -> None:
     it = judge(LAP)
     drive(it, (0, 0, 0, 0), (2, 2.5, 0, 0))
-    it.end(BEGIN + 2 * SECOND)
+    it.end_of_input(BEGIN + 2 * SECOND)
     assert decided(it).reason.startswith("did not reach finish before the input ended after 2.00 s: ")
     assert oks(it)["gates"]
 
@@ -284,7 +284,7 @@ def test_a_margin_not_kept_is_a_failure() -> None:
     drive(it, (2, 1.0, 0.0751, 0))
     assert (decided(it).outcome, decided(it).reason) == (
         "failed",
-        "came within 0.045 m of wall left after 2.00 s at x = 1.00 m, y = 0.08 m: it is to keep 0.05 m away",
+        "came within 0.045 m of wall left after 2.00 s at x = 1.00 m, y = 0.08 m, expected at least 0.05 m",
     )
     (check,) = [check for check in decided(it).checks if check.name == "wall-margin"]
     assert (check.value, check.limit, check.ok) == (pytest.approx(0.0449), {"min": 0.05}, False)
@@ -306,15 +306,13 @@ def test_a_hit_is_said_rather_than_the_margin_and_the_margin_rather_than_the_goa
 
 
 def test_a_start_within_the_margin_is_the_fault_of_the_test() -> None:
-    sentence = (
-        "the vehicle stands 0.045 m from wall left from the start, closer than the 0.05 m that it is to keep, at x"
-    )
+    sentence = "the vehicle stands 0.045 m from wall left from the start, expected at least 0.05 m, at x"
     with pytest.raises(UnjudgeableError, match=sentence):
         drive(judge(replace(LANE, min_margin=0.05)), (0, 0.0, 0.0751, 0))
 
 
 def test_time_zero_is_the_first_request_when_it_comes_before_the_begin() -> None:
-    it = Judge(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, Box(0.36, 0.16))
     it.update(BEGIN)
     it.look(Pose(0, 0, 0), BEGIN)
     it.update(BEGIN + 5 * SECOND)
@@ -325,7 +323,7 @@ def test_time_zero_is_the_first_request_when_it_comes_before_the_begin() -> None
 
 
 def test_time_zero_is_the_update_after_a_request_when_none_was_before() -> None:
-    it = Judge(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, Box(0.36, 0.16))
     it.request(REQUESTS[0])
     it.look(Pose(0, 0, 0), BEGIN)
     it.update(BEGIN + SECOND)
@@ -334,7 +332,7 @@ def test_time_zero_is_the_update_after_a_request_when_none_was_before() -> None:
 
 
 def test_time_zero_is_the_first_update_when_neither_comes() -> None:
-    it = Judge(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, Box(0.36, 0.16))
     it.update(BEGIN)
     it.look(Pose(0, 0, 0), BEGIN + 2 * SECOND)
     it.look(Pose(3, 0, 0), BEGIN + 4 * SECOND)
@@ -342,7 +340,7 @@ def test_time_zero_is_the_first_update_when_neither_comes() -> None:
 
 
 def test_the_begin_forgets_what_was_before() -> None:
-    it = Judge(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, Box(0.36, 0.16))
     it.update(BEGIN - 9 * SECOND)
     drive(it, (-9, 2, 0.1, 0), (-5, 0, 0, 0))
     it.begin(BEGIN)
@@ -363,7 +361,7 @@ def test_no_vehicle_passes_that_was_seen_on_a_wall(poses: list[tuple[float, floa
     it = judge()
     shown = [(0.0, 0.0, 0.0, 0.0), *((index + 1.0, *pose) for index, pose in enumerate(poses))]
     drive(it, *shown)
-    it.end(BEGIN + 2 * SECOND)
+    it.end_of_input(BEGIN + 2 * SECOND)
     touching = []
     for _, x, y, heading in shown:
         shape = shapely.affinity.rotate(shapely.box(-0.18, -0.08, 0.18, 0.08), heading, origin=(0, 0))

@@ -11,8 +11,7 @@ import pytest
 
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base import Context, Flags
-from services.collision.model import UnjudgeableError
+from services.base import Context, Flags, UnjudgeableError
 from services.collision.service import Collision
 from tests.services.process import PATIENCE, launch, running, say
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.base import Verdict
+from services.base import UnjudgeableError, Verdict
 from services.continuous_signal import model
 from services.continuous_signal.measures import Limits, measure
-from services.continuous_signal.model import Judge, UnjudgeableError
+from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.target import Target
 
 SECOND = 1_000_000
@@ -19,20 +19,20 @@ SIGNAL = "groundSteering of opendlv.proxy.GroundSteeringRequest/0"
 samples = st.lists(st.tuples(st.integers(-2 * SECOND, 12 * SECOND), st.floats(-5, 5)), max_size=40)
 
 
-def judge(limits: Limits, target: Target | None = RAMP, from_begin: bool = True) -> Judge:
-    it = Judge(SIGNAL, target, limits, 60.0, from_begin)
+def judge(limits: Limits, target: Target | None = RAMP, from_begin: bool = True) -> SignalEvaluator:
+    it = SignalEvaluator(SIGNAL, target, limits, 60.0, from_begin)
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     return it
 
 
-def hear(it: Judge, *heard: tuple[float, float]) -> None:
+def hear(it: SignalEvaluator, *heard: tuple[float, float]) -> None:
     for time, value in heard:
-        it.hear(value, BEGIN + round(time * SECOND))
+        it.take(value, BEGIN + round(time * SECOND))
 
 
-def decided(it: Judge, seconds: float = 10.0) -> Verdict:
-    it.end(BEGIN + round(seconds * SECOND))
+def decided(it: SignalEvaluator, seconds: float = 10.0) -> Verdict:
+    it.end_of_input(BEGIN + round(seconds * SECOND))
     assert it.verdict is not None
     return it.verdict
 
@@ -178,9 +178,9 @@ def test_the_order_of_samples_does_not_matter(heard: list[tuple[int, float]], ra
 def test_sample_times_meet_those_of_the_target() -> None:
     target = Target(RAMP.times, RAMP.values, start=500 * SECOND)
     it = judge(Limits(mean=0.0, start=SECOND), target, from_begin=False)
-    it.hear(9.0, 500 * SECOND)
-    it.hear(0.3, 503 * SECOND)
-    it.hear(9.0, BEGIN + 3 * SECOND)
+    it.take(9.0, 500 * SECOND)
+    it.take(0.3, 503 * SECOND)
+    it.take(9.0, BEGIN + 3 * SECOND)
     assert values(decided(it)) | {"samples": 1, "outside": 1, "mean": 0.0} == values(decided(it))
 
 
@@ -188,7 +188,7 @@ def test_a_live_target_is_interpolated_when_all_is_there() -> None:
     it = judge(Limits(mean=0.0, distance=0.0), target=None)
     hear(it, (1, 0.125), (4, 0.5), (9, 9.0))
     for time, value in ((8, 1.0), (0, 0.0), (2, 0.25)):
-        it.hear_target(value, BEGIN + time * SECOND)
+        it.take_target(value, BEGIN + time * SECOND)
     assert values(decided(it)) | {"samples": 2, "outside": 1, "distance": 0.0} == values(decided(it))
 
 
@@ -196,9 +196,9 @@ def test_without_a_live_target_there_is_no_verdict() -> None:
     it = judge(Limits(mean=0.0), target=None)
     hear(it, (1, 0.1))
     with pytest.raises(UnjudgeableError, match=r"^no sample of the target came before the input ended after 3.00 s$"):
-        it.end(BEGIN + 3 * SECOND)
+        it.end_of_input(BEGIN + 3 * SECOND)
     with pytest.raises(UnjudgeableError, match=r"^a sample of the target is nan, expected a finite number$"):
-        it.hear_target(math.nan, BEGIN)
+        it.take_target(math.nan, BEGIN)
 
 
 def test_the_time_is_over() -> None:
@@ -220,7 +220,7 @@ def test_the_first_verdict_and_the_first_begin_stand() -> None:
 
 
 def test_time_0_is_the_first_update_when_nobody_says_begin() -> None:
-    it = Judge(SIGNAL, RAMP, Limits(mean=0.0, samples=1), 60.0, True)
+    it = SignalEvaluator(SIGNAL, RAMP, Limits(mean=0.0, samples=1), 60.0, True)
     it.update(BEGIN)
     hear(it, (5, 0.5))
     assert decided(it).outcome == "passed"

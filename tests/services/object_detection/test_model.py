@@ -1,9 +1,9 @@
 import pytest
 
-from services.base import Verdict
+from services.base import UnjudgeableError, Verdict
 from services.object_detection.boxes import Box, Thing
 from services.object_detection.frames import Kind, Mark
-from services.object_detection.model import Judge, UnjudgeableError
+from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import Limits, Rules
 from services.object_detection.truth import Truth
 
@@ -15,16 +15,16 @@ BOARD = Truth("one", {0: (YELLOW, BLUE)})
 FILM = Truth("sample-time", {number * SECOND: (YELLOW, BLUE) for number in range(1, 6)})
 
 
-def judge(truth: Truth | None = BOARD, limits: Limits | None = None, **rules: float | list[str]) -> Judge:
+def judge(truth: Truth | None = BOARD, limits: Limits | None = None, **rules: float | list[str]) -> DetectionEvaluator:
     """A judge whose test has begun; ``rules`` replace the usual ones."""
     usual = {"iou": 0.5, "labels": [], "max_delay": 1.0, "max_time": 60.0}
-    it = Judge(truth, Rules(**{**usual, **rules}), limits or Limits(recall=0.9))  # type: ignore[arg-type]
+    it = DetectionEvaluator(truth, Rules(**{**usual, **rules}), limits or Limits(recall=0.9))  # type: ignore[arg-type]
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     return it
 
 
-def detect(it: Judge, frame: float, *things: Thing) -> None:
+def detect(it: DetectionEvaluator, frame: float, *things: Thing) -> None:
     """All detections of the frame whose sample time is so many seconds."""
     mark = Mark(round(frame * SECOND), round(frame))
     for number, (label, box) in enumerate(things):
@@ -32,20 +32,20 @@ def detect(it: Judge, frame: float, *things: Thing) -> None:
         it.detect(mark, number, box)
 
 
-def reveal(it: Judge, frame: float, *things: Thing) -> None:
+def reveal(it: DetectionEvaluator, frame: float, *things: Thing) -> None:
     mark = Mark(round(frame * SECOND), round(frame))
     for number, (label, box) in enumerate(things):
         it.reveal(mark, number, box)
         it.reveal(mark, number, label)
 
 
-def at(it: Judge, seconds: float) -> None:
+def at(it: DetectionEvaluator, seconds: float) -> None:
     it.update(BEGIN + round(seconds * SECOND))
 
 
-def decided(it: Judge, seconds: float = 10.0) -> Verdict:
+def decided(it: DetectionEvaluator, seconds: float = 10.0) -> Verdict:
     """The verdict when the input has ended after so many seconds."""
-    it.end(BEGIN + round(seconds * SECOND))
+    it.end_of_input(BEGIN + round(seconds * SECOND))
     at(it, seconds + 1)
     assert it.verdict is not None
     return it.verdict
@@ -226,7 +226,7 @@ def test_a_frame_that_is_young_when_the_time_is_over_does_not_count() -> None:
 
 def test_answers_may_come_for_a_while_after_the_end() -> None:
     it = judge()
-    it.end(BEGIN + 5 * SECOND)
+    it.end_of_input(BEGIN + 5 * SECOND)
     detect(it, 1, YELLOW, BLUE)
     at(it, 5.99)
     assert it.verdict is None
@@ -237,12 +237,12 @@ def test_answers_may_come_for_a_while_after_the_end() -> None:
 def test_without_a_delay_the_end_is_the_verdict() -> None:
     it = judge(max_delay=0.0)
     detect(it, 1, YELLOW, BLUE)
-    it.end(BEGIN + SECOND)
+    it.end_of_input(BEGIN + SECOND)
     assert it.verdict is not None and it.verdict.outcome == "passed"
 
 
 def test_the_begin_forgets_what_was_before() -> None:
-    it = Judge(FILM, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
+    it = DetectionEvaluator(FILM, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
     it.update(BEGIN - 9 * SECOND)
     detect(it, 1)
     detect(it, 2, YELLOW)
@@ -309,7 +309,7 @@ def test_the_first_verdict_stands() -> None:
 
 
 def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
-    it = Judge(BOARD, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
+    it = DetectionEvaluator(BOARD, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
     it.update(BEGIN + 5 * SECOND)
     it.begin(BEGIN)
     detect(it, 1, YELLOW)
@@ -321,7 +321,7 @@ def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
 
 @pytest.mark.parametrize("begun", [True, False])
 def test_a_frame_from_before_the_judge_knows_the_time_does_not_begin_the_test(begun: bool) -> None:
-    it = Judge(None, Rules(0.5, [], 1.0, 60.0), Limits(recall=0.9))
+    it = DetectionEvaluator(None, Rules(0.5, [], 1.0, 60.0), Limits(recall=0.9))
     reveal(it, 1, YELLOW)
     if begun:
         it.begin(BEGIN)

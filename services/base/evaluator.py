@@ -1,0 +1,106 @@
+"""The base of all evaluators: when a test is over, and the one verdict that follows."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from services.base.clock import MICROSECONDS
+from services.base.service import Output, Service
+from services.base.verdict import Verdict
+
+
+class UnjudgeableError(Exception):
+    """There is nothing to judge the application by: the test itself is at fault."""
+
+
+class Span(NamedTuple):
+    """The time that was observed, as it reads in a reason."""
+
+    within: str
+    """What happened ``within 40.00 s``, or ``before the input ended after 12.50 s``."""
+    throughout: str
+    """What stayed so ``for 40.00 s``, or ``until the input ended after 12.50 s``."""
+    is_complete: bool = False
+    """Whether the input ended, rather than the time of the test."""
+
+
+class Evaluator(Service):
+    """Judges in test time (microseconds) and gives its verdict at the latest when time or input are over.
+
+    Time zero is the first of ``begin``, ``update`` and whatever else looks at ``elapsed``; ``begin`` counts once and
+    overrides the others. Subclasses take their messages in ``inputs`` and decide in ``decide``, or before by setting
+    ``verdict``; each of them may raise UnjudgeableError.
+    """
+
+    def __init__(self, max_time: float, max_delay: float = 0.0) -> None:
+        """``max_time`` in s after time zero; ``max_delay`` in s in which answers may follow the end of the input."""
+        self.now: int | None = None
+        """The time of the last update."""
+        self._max_time, self._max_delay = max_time, max_delay
+        self._zero: int | None = None
+        self._ended: int | None = None
+        self._has_begun = False
+
+    @property
+    def zero(self) -> int:
+        """Time zero; 0 while it is not known."""
+        return self._zero or 0
+
+    def begin(self, now: int) -> None:
+        if not self._has_begun:
+            self._has_begun, self._zero = True, now
+            self.forget(now)
+
+    def update(self, now: int) -> Iterable[Message | Output | Envelope]:
+        self.now = now
+        self.elapsed(now)
+        if self.verdict is None:
+            self.advance(now)
+            self._check_time(now)
+        return ()
+
+    def end_of_input(self, now: int) -> None:
+        if self._ended is None and self.verdict is None:
+            self._ended = self.now = now
+            self.elapsed(now)
+            self._check_time(now)
+
+    def elapsed(self, time: int) -> float:
+        """Seconds since time zero, which is now if it was not known before; negative before it."""
+        if self._zero is None:
+            self._zero = time
+        return (time - self._zero) / MICROSECONDS
+
+    def is_overdue(self, time: int) -> bool:
+        """Whether a time is past ``max_time``."""
+        return self.elapsed(time) > self._max_time
+
+    def conclude(self, span: Span) -> None:
+        """Give the verdict, unless there is one."""
+        if self.verdict is None:
+            self.verdict = self.decide(span)
+
+    def time_is_over(self) -> None:
+        """``max_time`` has passed: give the verdict."""
+        seconds = f"{self._max_time:.2f} s"
+        self.conclude(Span(f"within {seconds}", f"for {seconds}"))
+
+    def forget(self, now: int) -> None:
+        """The test begins: what was measured before it does not count."""
+
+    def advance(self, now: int) -> None:
+        """An update before the verdict."""
+
+    def decide(self, span: Span) -> Verdict:
+        """The verdict on what was observed in a span."""
+        raise NotImplementedError
+
+    def _check_time(self, now: int) -> None:
+        if self._ended is None:
+            if self.is_overdue(now):
+                self.time_is_over()
+        elif now - self._ended >= self._max_delay * MICROSECONDS:
+            over = f"the input ended after {self.elapsed(self._ended):.2f} s"
+            self.conclude(Span(f"before {over}", f"until {over}", is_complete=True))

@@ -1,0 +1,81 @@
+import pytest
+
+from services.base import Evaluator, Span, Verdict
+
+SECOND = 1_000_000
+BEGIN = 7_000 * SECOND
+
+
+class Spans(Evaluator):
+    """Passes, and keeps the spans on which it had to decide."""
+
+    def __init__(self, max_time: float = 10.0, max_delay: float = 0.0) -> None:
+        super().__init__(max_time, max_delay)
+        self.spans: list[Span] = []
+        self.begun: list[int] = []
+        self.advanced: list[int] = []
+
+    def forget(self, now: int) -> None:
+        self.begun.append(now)
+
+    def advance(self, now: int) -> None:
+        self.advanced.append(now)
+
+    def decide(self, span: Span) -> Verdict:
+        self.spans.append(span)
+        return Verdict("passed", span.within)
+
+
+def test_the_time_of_a_test_is_limited() -> None:
+    evaluator = Spans()
+    evaluator.begin(BEGIN)
+    evaluator.update(BEGIN + 10 * SECOND)
+    assert evaluator.verdict is None
+    evaluator.update(BEGIN + 10 * SECOND + 1)
+    assert evaluator.verdict == Verdict("passed", "within 10.00 s")
+    assert evaluator.spans == [Span("within 10.00 s", "for 10.00 s", False)]
+
+
+def test_the_end_of_the_input_is_the_end() -> None:
+    evaluator = Spans()
+    evaluator.begin(BEGIN)
+    evaluator.end_of_input(BEGIN + 12_340_000)
+    over = "the input ended after 12.34 s"
+    assert evaluator.spans == [Span(f"before {over}", f"until {over}", True)]
+
+
+def test_answers_may_follow_the_input() -> None:
+    evaluator = Spans(max_time=6, max_delay=2)
+    evaluator.begin(BEGIN)
+    evaluator.end_of_input(BEGIN + 5 * SECOND)
+    evaluator.end_of_input(BEGIN + 6 * SECOND)
+    evaluator.update(BEGIN + 7 * SECOND - 1)
+    assert evaluator.verdict is None
+    evaluator.update(BEGIN + 7 * SECOND)
+    assert evaluator.spans == [Span("before the input ended after 5.00 s", "until the input ended after 5.00 s", True)]
+
+
+def test_there_is_one_verdict() -> None:
+    evaluator = Spans()
+    evaluator.begin(BEGIN)
+    evaluator.verdict = early = Verdict("failed", "hit a wall")
+    evaluator.update(BEGIN + 11 * SECOND)
+    evaluator.end_of_input(BEGIN + 11 * SECOND)
+    evaluator.time_is_over()
+    assert evaluator.verdict is early and not evaluator.spans and not evaluator.advanced
+
+
+@pytest.mark.parametrize("early", [[], [BEGIN - 9 * SECOND]])
+def test_the_first_begin_is_time_zero_whatever_came_before(early: list[int]) -> None:
+    evaluator = Spans()
+    for now in early:
+        evaluator.update(now)
+    evaluator.begin(BEGIN)
+    evaluator.begin(BEGIN + 5 * SECOND)
+    assert (evaluator.begun, evaluator.elapsed(BEGIN + SECOND), evaluator.zero) == ([BEGIN], 1.0, BEGIN)
+
+
+def test_without_a_begin_the_first_update_is_time_zero() -> None:
+    evaluator = Spans()
+    evaluator.update(BEGIN)
+    assert (evaluator.elapsed(BEGIN - SECOND), evaluator.begun, evaluator.now) == (-1.0, [], BEGIN)
