@@ -18,39 +18,39 @@ _log = logging.getLogger(__name__)
 
 
 class Inbox(Protocol):
-    """What others sent. A clock takes every envelope and hands on those that the service is to see."""
+    """Messages for the service. A clock takes every envelope and passes on those that the service is to handle."""
 
     def receive(self, timeout: float) -> Envelope | None:
-        """The next envelope that comes within so many seconds."""
+        """The next envelope within ``timeout`` seconds."""
         ...
 
     def handle(self, envelope: Envelope) -> None:
-        """Let the service have it."""
+        """Let the service handle it."""
         ...
 
     @property
     def observes(self) -> bool:
-        """Whether the service looks at all that is on the bus."""
+        """Whether the service observes everything on the bus."""
         ...
 
     @property
-    def hears(self) -> frozenset[int]:
-        """Ids of the messages that it is to see at least."""
+    def consumes(self) -> frozenset[int]:
+        """Ids of the messages that the service handles."""
         ...
 
-    def overhear(self, envelope: Envelope) -> None:
-        """It is on the bus, but the service is not to act upon it."""
+    def observe(self, envelope: Envelope) -> None:
+        """It is on the bus, but the service must not act upon it."""
         ...
 
 
 class Clock(Protocol):
-    """Test time, in microseconds since the epoch. ``relays`` says that it hands on what was on the bus before."""
+    """Test time, in microseconds since the epoch. ``relays``: messages come from the clock, not from the bus."""
 
     relays: bool
 
     @property
-    def is_showing(self) -> bool:
-        """Whether there is a picture that nobody was told of yet."""
+    def has_new_picture(self) -> bool:
+        """Whether there is a picture that is not announced yet."""
         ...
 
     def now(self) -> int:
@@ -65,11 +65,11 @@ class Clock(Protocol):
         ...
 
     def sent(self, frame: bytes) -> None:
-        """The service has sent this."""
+        """The service has sent this frame."""
         ...
 
     def expect(self, time: int) -> None:
-        """The service will show something at this time (us) and nothing before it; 0 when it does not know."""
+        """The service will show its next picture at this time (us) and none before; 0 when it does not know."""
         ...
 
     def memory(self, name: str, size: int) -> SharedMemory:
@@ -77,19 +77,19 @@ class Clock(Protocol):
         ...
 
     def close(self, stopped: Callable[[], bool]) -> None:
-        """The service ends; what pictures it leaves behind can be looked at until ``stopped``."""
+        """The service ends; its last pictures can be read until ``stopped``."""
         ...
 
 
 class RealTimeClock:
-    """Test time is the wall clock's at the start, and goes on evenly whatever that is set to afterwards.
+    """Test time is the wall clock's at the start, and goes on evenly even if that is set.
 
     Steps are the scheduled instants, not the moments at which the processor got to them: a service that is late
-    catches up with the same times that it would have had, and skips steps only when it is more than 1 s late.
+    catches up with the times that it would have had, and skips steps only when it is more than 1 s late.
     """
 
     relays = False
-    is_showing = False
+    has_new_picture = False
 
     def __init__(self) -> None:
         self._offset = time.time_ns() // 1000 - time.monotonic_ns() // 1000
@@ -109,19 +109,19 @@ class RealTimeClock:
             number += self._skipped(start + round(number * period), period)
 
     def sent(self, frame: bytes) -> None:
-        """Time goes on by itself."""
+        """Nothing to do: time goes on by itself."""
 
     def expect(self, time: int) -> None:
-        """Time goes on evenly, whatever comes."""
+        """Nothing to do: time goes on evenly."""
 
     def memory(self, name: str, size: int) -> SharedMemory:
         return SharedMemory.create(name, size)
 
     def close(self, stopped: Callable[[], bool]) -> None:
-        """Nobody waits."""
+        """Nothing to do: nobody waits."""
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
-        """Deliver until the instant has come, and then what else is there already."""
+        """Deliver messages until the instant, and then those that are there already."""
         while (left := due - self.now()) > 0 and not stopped():
             _deliver(inbox, min(left / MICROSECONDS, _SLICE))
         for _ in range(_MAX_DRAINED):
@@ -133,7 +133,7 @@ class RealTimeClock:
         if late <= LATEST:
             return 0
         steps = int(late // period)
-        _log.warning("%.1f s late: %d steps are skipped", late / MICROSECONDS, steps)
+        _log.warning("%.1f s late, skipped %d steps", late / MICROSECONDS, steps)
         return steps
 
 

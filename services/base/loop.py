@@ -14,7 +14,7 @@ from services.base.clock import Clock
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
-TELL_PERIOD = 1_000_000
+REPORT_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
 
@@ -23,8 +23,8 @@ _log = logging.getLogger(__name__)
 class Loop:
     """Runs a service on a session by a clock; ``sender_stamp`` is that of outputs without one.
 
-    ``name`` stands in the EndOfInput of a source. A line ``{"dodo": "lost", "messages": N}`` on stdout says how many
-    messages were lost so far, once a second at most. Raises what the model raises, and SessionError.
+    ``name`` is the source in its EndOfInput. A line ``{"dodo": "lost", "messages": N}`` on stdout reports how
+    many messages were lost so far, once a second at most. Raises what the model raises, and SessionError.
     """
 
     name: str
@@ -33,8 +33,8 @@ class Loop:
     clock: Clock
     sender_stamp: int
     _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
-    _told: int = 0
-    _tell_after: int = 0
+    _reported: int = 0
+    _report_after: int = 0
 
     def __post_init__(self) -> None:
         ids = self.session.messages.id
@@ -53,14 +53,14 @@ class Loop:
             if service.period is not None:
                 for output in service.update(now):
                     self._send(output, now)
-            if now >= self._tell_after:
-                self._tell_losses(now)
-            if service.finished and not self.clock.is_showing:
+            if now >= self._report_after:
+                self._report_losses(now)
+            if service.finished and not self.clock.has_new_picture:
                 break
         if service.finished and service.verdict is None:
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close(stopped)
-        self._tell_losses(self.clock.now())
+        self._report_losses(self.clock.now())
         if self.session.lost:
             _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
         if self.session.garbage:
@@ -72,21 +72,21 @@ class Loop:
 
     @property
     def observes(self) -> bool:
-        """For the clock: whether the service looks at all that is on the bus."""
+        """For the clock: whether the service observes everything on the bus."""
         return self.service.observe is not None
 
     @property
-    def hears(self) -> frozenset[int]:
-        """For the clock: ids of the messages that change something here."""
+    def consumes(self) -> frozenset[int]:
+        """For the clock: ids of the messages that are handled here."""
         return frozenset([*self._handlers, self._begin, self._end])
 
-    def overhear(self, envelope: Envelope) -> None:
-        """For the clock: an envelope that the service may only look at."""
+    def observe(self, envelope: Envelope) -> None:
+        """For the clock: an envelope that the service may only observe."""
         if self.service.observe is not None:
             self.service.observe(envelope)
 
     def handle(self, envelope: Envelope) -> None:
-        """For the clock: let the service have an envelope; what cannot be decoded is logged and left."""
+        """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored."""
         if not self.clock.relays and self.service.observe is not None:
             self.service.observe(envelope)
         if envelope.data_type == self._begin:
@@ -102,10 +102,10 @@ class Loop:
                     return
                 handler(message, envelope.sample_time)
 
-    def _tell_losses(self, now: int) -> None:
-        if self.session.lost > self._told:
-            self._told, self._tell_after = self.session.lost, now + TELL_PERIOD
-            print(json.dumps({"dodo": "lost", "messages": self._told}), flush=True)
+    def _report_losses(self, now: int) -> None:
+        if self.session.lost > self._reported:
+            self._reported, self._report_after = self.session.lost, now + REPORT_PERIOD
+            print(json.dumps({"dodo": "lost", "messages": self._reported}), flush=True)
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         if isinstance(output, Envelope):

@@ -7,19 +7,19 @@ from services.base import Context, Service, run
 from services.base.clock import MICROSECONDS
 from services.base.lockstep.channel import Channel
 from services.base.service import period_of
-from services.clock.answers import Answers, kinds
+from services.clock.answers import Answers, filters
 from services.clock.participants import Patience, Roles
-from services.clock.service import HEARD, ClockService
+from services.clock.service import CONSUMED, ClockService
 
 
 def build(context: Context) -> Service:
     flags = context.flags
     ids = {name: context.messages.id(name) for name in context.messages.names()}
-    done = kinds([flags["done"]] if flags["done"] else [], ids)
-    answers = Answers(kinds(flags["answers"], ids), kinds(flags["hears"], ids), done[0] if done else None)
+    done = filters([flags["done"]] if flags["done"] else [], ids)
+    answers = Answers(filters(flags["answers"], ids), filters(flags["hears"], ids), done[0] if done else None)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"
-    context.session.hear_only([*(kind.data_type for kind in answers.kinds), *(ids[name] for name in HEARD)])
+    context.session.hear_only([*(each.data_type for each in answers.filters), *(ids[name] for name in CONSUMED)])
     channel = Channel(context.session.cid, context.messages)
     context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)

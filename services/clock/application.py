@@ -1,70 +1,70 @@
-"""The application under test as the clock sees it: it is shown pictures, and answers."""
+"""The application under test as the clock sees it: it gets pictures and answers them."""
 
 import time
 from collections.abc import Iterable, Sequence
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
-from services.base.lockstep.datagrams import Said
+from services.base.lockstep.datagrams import EncodedEnvelope
 from services.clock.answers import Answers
-from services.clock.exchange import Done, Order
-from services.clock.participants import SLICE_S, Patience, Stopped, Talk, Unanswered
+from services.clock.exchange import Command, StepResult
+from services.clock.participants import SLICE_S, ApplicationSilent, IsStopped, Patience, ServiceLink
 
 _AGAIN_S = 0.5
 
 
-class Audience:
-    """Shows it pictures and waits for its answers; ``frames`` counts what it was shown."""
+class Application:
+    """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
-    def __init__(self, answers: Answers, patience: Patience, talk: Talk, stopped: Stopped) -> None:
+    def __init__(self, answers: Answers, patience: Patience, link: ServiceLink, stopped: IsStopped) -> None:
         self.answers = answers
         self.frames = 0
         self.waited_first, self.waited = 0.0, 0.0
         """Wall time in s for the first answer, and for all others."""
-        self._patience, self._talk, self._stopped = patience, talk, stopped
+        self._patience, self._link, self._stopped = patience, link, stopped
         self._began = 0.0
-        self._first: list[Said] = []
+        self._first: list[EncodedEnvelope] = []
         self._reading: set[str] = set()
-        """Cameras whose readers do not wait for the next picture yet, where nothing else tells of an answer."""
+        """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
 
-    def listens(self, now: int) -> None:
-        """One that sees no pictures answers what the services are about to say in the step of this time (us)."""
-        self._talk.drain()
+    def expect_at(self, now: int) -> None:
+        """Without cameras, the application answers the services' messages in the step of this time (us)."""
+        self._link.drain()
         self.answers.expect([now])
         self.answers.seen()
 
-    def missed(self, said: Iterable[Said]) -> None:
-        """The services have said this; until the first picture is shown it may be too early."""
+    def remember(self, messages: Iterable[EncodedEnvelope]) -> None:
+        """Services have sent this; before the first picture the application may not be there yet."""
         if not self.frames:
-            self._first.extend(said)
+            self._first.extend(messages)
 
-    def show(self, shown: Sequence[Done], now: int) -> None:
-        """Readers are told of new pictures as soon as they wait for them; raises Unanswered."""
+    def show(self, shown: Sequence[StepResult], now: int) -> None:
+        """Announce new pictures as soon as readers wait for them; raises ApplicationSilent."""
         self.frames += 1
         self._began = time.monotonic()
         again = self._began + _AGAIN_S
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
         for camera in shown:
-            self._talk.ask([Order(camera.service, now, (), show=True)])
-            while self._talk.answer(camera.service) is None:
+            self._link.send([Command(camera.service, now, (), show=True)])
+            while self._link.result(camera.service) is None:
                 if self._stopped():
                     return
                 if self._left <= 0:
-                    self._talk.forget()
-                    raise Unanswered(self._sentence(f"nobody waited for a picture of '{camera.service}'"))
-                self._talk.pump(SLICE_S)
-                again = self._say_again(again)
+                    self._link.clear()
+                    raise ApplicationSilent(self._sentence(f"nobody waited for a picture of '{camera.service}'"))
+                self._link.pump(SLICE_S)
+                again = self._repeat_first(again)
             self.answers.seen()
-        if not self.answers.asked:
+        if not self.answers.is_expected:
             self._reading = {camera.service for camera in shown}
-            self._talk.ask([Order(camera.service, now, (), show=True) for camera in shown])
+            self._link.send([Command(camera.service, now, (), show=True) for camera in shown])
 
     def await_answer(self) -> None:
-        """To what was shown; raises Unanswered."""
+        """Wait for the answer to what was shown; raises ApplicationSilent."""
         while not (self._stopped() or self._is_answered):
             if self._left <= 0:
-                raise Unanswered(self._sentence(self._missing))
-            self._talk.pump(self._left)
+                raise ApplicationSilent(self._sentence(self._missing))
+            self._link.pump(self._left)
         spent = time.monotonic() - self._began
         if self.frames == 1:
             self.waited_first += spent
@@ -72,7 +72,7 @@ class Audience:
             self.waited += spent
 
     def collect(self) -> list[Envelope]:
-        """What it said since the last time, for the services."""
+        """The application's messages since the last time, for the services."""
         return self.answers.collect()
 
     @property
@@ -83,24 +83,24 @@ class Audience:
     def _left(self) -> float:
         return self._began + self._limit - time.monotonic()
 
-    def _say_again(self, again: float) -> float:
-        """One that starts late hears what was said before its first picture, as it would in real time."""
+    def _repeat_first(self, again: float) -> float:
+        """An application that starts late gets what was sent before its first picture, as in real time."""
         if self.frames > 1 or time.monotonic() < again:
             return again
-        self._talk.tell(self._first)
+        self._link.repeat_on_bus(self._first)
         return time.monotonic() + _AGAIN_S
 
     @property
     def _is_answered(self) -> bool:
-        """Whether all answers came; where none are known, whether the readers wait for the next picture."""
-        if self.answers.asked:
-            return self.answers.complete
-        self._reading = {name for name in self._reading if self._talk.answer(name) is None}
+        """Whether all answers came; where none are declared, whether the readers wait for the next picture."""
+        if self.answers.is_expected:
+            return self.answers.is_complete
+        self._reading = {name for name in self._reading if self._link.result(name) is None}
         return not self._reading
 
     @property
     def _missing(self) -> str:
-        if self.answers.asked:
+        if self.answers.is_expected:
             return " and ".join(name.rpartition(".")[2] for name in self.answers.missing) + " missing"
         return f"nobody waited for the next picture of '{min(self._reading)}'"
 

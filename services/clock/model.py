@@ -1,4 +1,4 @@
-"""The order of a step: the action layer advances, the environment senses, the application answers, evaluators look."""
+"""The order of a step: the action layer advances, the environment senses, the application answers, evaluators judge."""
 
 import time
 from collections import defaultdict
@@ -7,11 +7,19 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
-from services.base.lockstep.datagrams import Said, say
+from services.base.lockstep.datagrams import EncodedEnvelope, encode
 from services.base.lockstep.lockstep_clock import EPOCH
-from services.clock.application import Audience
-from services.clock.exchange import Done, Order
-from services.clock.participants import SLICE_S, Roles, Stopped, Stuck, Talk, TimedOut, Unanswered
+from services.clock.application import Application
+from services.clock.exchange import Command, StepResult
+from services.clock.participants import (
+    SLICE_S,
+    ApplicationSilent,
+    IsStopped,
+    Roles,
+    ServiceLink,
+    ServiceSilent,
+    TimeOver,
+)
 
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""
@@ -24,16 +32,16 @@ class Stepper:
     roles: Roles
     period: Fraction | int
     timeout: int
-    audience: Audience
-    talk: Talk
-    stopped: Stopped
+    application: Application
+    link: ServiceLink
+    stopped: IsStopped
     now: int = EPOCH
     reached: int = EPOCH
-    """The last step that the evaluators looked at."""
-    _looking: list[str] = field(default_factory=list)
-    _looked_at: int = EPOCH
-    _backlog: dict[str, list[Said]] = field(default_factory=dict)
-    _hears: dict[str, frozenset[int]] = field(default_factory=dict)
+    """The last step that the evaluators have finished."""
+    _judging: list[str] = field(default_factory=list)
+    _judging_at: int = EPOCH
+    _backlog: dict[str, list[EncodedEnvelope]] = field(default_factory=dict)
+    _consumed: dict[str, frozenset[int]] = field(default_factory=dict)
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
     _exact: Fraction = Fraction(EPOCH)
@@ -45,110 +53,110 @@ class Stepper:
 
     @property
     def spent(self) -> dict[str, float]:
-        """Wall time in s by whom it was waited for."""
-        application = {"the first answer": self.audience.waited_first, "the application": self.audience.waited}
+        """Wall time in s spent waiting, by participant."""
+        application = {"the first answer": self.application.waited_first, "the application": self.application.waited}
         return {**self._spent, **application}
 
-    def meet(self) -> None:
-        """Find all services and what they hear, before time begins; raises Stuck."""
-        dones = self._go(self.roles.all, EPOCH - 1)
-        self._memories = sum(done.memories for done in dones)
-        self._hears = {done.service: done.hears for done in dones if done.hears}
+    def connect(self) -> None:
+        """Find all services and what they consume, before time begins; raises ServiceSilent."""
+        results = self._go(self.roles.all, EPOCH - 1)
+        self._memories = sum(result.memories for result in results)
+        self._consumed = {result.service: result.consumes for result in results if result.consumes}
 
     def run(self, begin: Envelope) -> None:
-        """Until all evaluators have ended; raises Unanswered, Stuck and TimedOut."""
-        self._spread([say(begin)], "")
+        """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
+        self._deliver([encode(begin)], "")
         while not self.stopped():
             if not self._memories:
-                self.audience.listens(self.now)
+                self.application.expect_at(self.now)
             shown = [
-                done
+                result
                 for name in (*self.roles.advance, *self.roles.sense)
-                for done in self._go((name,), self.now)
-                if done.pictures
+                for result in self._go((name,), self.now)
+                if result.pictures
             ]
-            if self._judged():
+            if self._is_over():
                 return
-            is_asked = bool(shown) or not self._memories
-            if is_asked:
-                self.audience.show(shown, self.now)
-            self._look()
-            if is_asked and not self._is_answered():
+            awaits_answer = bool(shown) or not self._memories
+            if awaits_answer:
+                self.application.show(shown, self.now)
+            self._judge()
+            if awaits_answer and not self._is_answered():
                 return
-            if self.now - EPOCH >= self.timeout and not self._judged():
-                raise TimedOut
-            self._spread([say(envelope) for envelope in self.audience.collect()], "")
+            if self.now - EPOCH >= self.timeout and not self._is_over():
+                raise TimeOver
+            self._deliver([encode(envelope) for envelope in self.application.collect()], "")
             self._go_on()
 
-    def _look(self) -> None:
-        """Watchers and judges look at this step, while others go on already."""
-        self._looking = [name for name in (*self.roles.watch, *self.roles.judge) if name not in self._ended]
-        self._looked_at = self.now
-        self._ask(self._looking, self.now)
+    def _judge(self) -> None:
+        """Watchers and evaluators begin this step, while others go on already."""
+        self._judging = [name for name in (*self.roles.watch, *self.roles.judge) if name not in self._ended]
+        self._judging_at = self.now
+        self._send(self._judging, self.now)
 
     def _is_answered(self) -> bool:
-        """Waits for the answer; one that does not come is no matter when the test is over. Raises Unanswered."""
+        """Wait for the answer; a missing one does not matter when the test is over. Raises ApplicationSilent."""
         try:
-            self.audience.await_answer()
-        except Unanswered:
-            if not self._judged():
+            self.application.await_answer()
+        except ApplicationSilent:
+            if not self._is_over():
                 raise
             return False
         return True
 
-    def _judged(self) -> bool:
-        """Whether all evaluators have ended with the last step that they looked at; waits for them."""
-        looking, self._looking = self._looking, []
-        if looking:
-            self._await(looking)
-            self.reached = self._looked_at
+    def _is_over(self) -> bool:
+        """Whether all evaluators have ended with the last step that they were given; waits for them."""
+        judging, self._judging = self._judging, []
+        if judging:
+            self._await(judging)
+            self.reached = self._judging_at
         return set(self.roles.judge) <= self._ended
 
-    def _go(self, names: Sequence[str], until: int) -> list[Done]:
-        """All of them go on to a time; raises Stuck."""
-        wanted = [name for name in names if name not in self._ended]
-        self._ask(wanted, until)
-        return self._await(wanted)
+    def _go(self, names: Sequence[str], until: int) -> list[StepResult]:
+        """Let services go on to a time (us); raises ServiceSilent."""
+        running = [name for name in names if name not in self._ended]
+        self._send(running, until)
+        return self._await(running)
 
-    def _ask(self, names: Sequence[str], until: int) -> None:
-        self.talk.ask([Order(name, until, self._heard(name)) for name in names])
+    def _send(self, names: Sequence[str], until: int) -> None:
+        self.link.send([Command(name, until, self._undelivered(name)) for name in names])
 
-    def _await(self, names: Sequence[str]) -> list[Done]:
-        dones: list[Done] = []
+    def _await(self, names: Sequence[str]) -> list[StepResult]:
+        results: list[StepResult] = []
         began = time.monotonic()
         for name in names:
-            while (done := self.talk.answer(name)) is None:
+            while (result := self.link.result(name)) is None:
                 if self.stopped():
-                    return dones
+                    return results
                 if time.monotonic() - began > SERVICE_PATIENCE:
-                    raise Stuck(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
-                self.talk.pump(SLICE_S, bus=False)
-            self._take(done)
-            dones.append(done)
+                    raise ServiceSilent(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
+                self.link.pump(SLICE_S, bus=False)
+            self._take(result)
+            results.append(result)
         self._spent[" and ".join(names)] += time.monotonic() - began
-        return dones
+        return results
 
-    def _take(self, done: Done) -> None:
-        self.audience.missed(done.sent)
-        self._spread(done.sent, done.service)
-        self._next[done.service] = done.next
-        if done.ended:
-            self._ended.add(done.service)
+    def _take(self, result: StepResult) -> None:
+        self.application.remember(result.sent)
+        self._deliver(result.sent, result.service)
+        self._next[result.service] = result.next
+        if result.ended:
+            self._ended.add(result.service)
 
-    def _heard(self, name: str) -> tuple[Said, ...]:
-        """What a service has not heard yet."""
-        heard, self._backlog[name] = self._backlog[name], []
-        return tuple(heard)
+    def _undelivered(self, name: str) -> tuple[EncodedEnvelope, ...]:
+        """Messages that a service has not got yet."""
+        messages, self._backlog[name] = self._backlog[name], []
+        return tuple(messages)
 
-    def _spread(self, said: Sequence[Said], sender: str) -> None:
-        """What one said, others will hear with their next step."""
+    def _deliver(self, messages: Sequence[EncodedEnvelope], sender: str) -> None:
+        """Give messages of one service to the others with their next step."""
         for name, backlog in self._backlog.items():
             if name != sender and name not in self._ended:
-                hears = self._hears.get(name)
-                backlog.extend(s for s in said if hears is None or s.envelope.data_type in hears)
+                consumed = self._consumed.get(name)
+                backlog.extend(m for m in messages if consumed is None or m.envelope.data_type in consumed)
 
     def _go_on(self) -> None:
-        """To the time of the next step: a period on, or when a source says that it goes on."""
-        told = [time for name, time in self._next.items() if time > self.now and name not in self._ended]
-        self._exact = Fraction(min(told)) if told else self._exact + self.period
+        """To the time of the next step: a period later, or the earliest that a source announced."""
+        announced = [time for name, time in self._next.items() if time > self.now and name not in self._ended]
+        self._exact = Fraction(min(announced)) if announced else self._exact + self.period
         self.now = round(self._exact)

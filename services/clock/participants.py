@@ -1,46 +1,58 @@
-"""What the clock's parts have in common: who takes part in a test, how they are talked to, and how a test can end."""
+"""What the clock's modules share: the participants of a test, the link to them, and how a test can end."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from services.base.lockstep.datagrams import Said
-from services.clock.exchange import Done, Order
+from services.base.lockstep.datagrams import EncodedEnvelope
+from services.clock.exchange import Command, StepResult
 
 SLICE_S = 0.05
-"""The clock looks this often whether it is to stop."""
+"""How often the clock checks whether it has to stop."""
 
 
-class Unanswered(Exception):
-    """The application did not answer in time; one sentence."""
+class Ended(Exception):
+    """The test cannot go on; one sentence. ``kind`` names the reason in the protocol."""
+
+    kind = ""
 
 
-class Stuck(Exception):
-    """A service of the test does not answer the clock; one sentence."""
+class ApplicationSilent(Ended):
+    """The application did not answer in time."""
+
+    kind = "unanswered"
 
 
-class TimedOut(Exception):
+class ServiceSilent(Ended):
+    """A service of the test does not answer the clock."""
+
+    kind = "stuck"
+
+
+class TimeOver(Ended):
     """The test time is over."""
 
+    kind = "timedout"
 
-class Talk(Protocol):
-    """How orders get to the services, as Exchange has it."""
 
-    def ask(self, orders: Iterable[Order]) -> None: ...
-    def answer(self, service: str) -> Done | None: ...
-    def forget(self) -> None: ...
+class ServiceLink(Protocol):
+    """Commands to the services and their results, as Exchange implements it."""
+
+    def send(self, commands: Iterable[Command]) -> None: ...
+    def result(self, service: str) -> StepResult | None: ...
+    def clear(self) -> None: ...
     def pump(self, timeout: float, bus: bool = True) -> None: ...
-    def tell(self, said: Iterable[Said]) -> None: ...
+    def repeat_on_bus(self, messages: Iterable[EncodedEnvelope]) -> None: ...
     def drain(self) -> None: ...
 
 
-Stopped = Callable[[], bool]
+IsStopped = Callable[[], bool]
 """Whether the clock was told to stop."""
 
 
 @dataclass(frozen=True)
 class Roles:
-    """The services of a test: ``advance`` and ``sense`` go one after the other, ``judge`` and ``watch`` beside them."""
+    """The services of a test: ``advance`` and ``sense`` step in order, ``judge`` and ``watch`` beside them."""
 
     advance: tuple[str, ...]
     sense: tuple[str, ...]

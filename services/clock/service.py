@@ -1,4 +1,4 @@
-"""The clock on the bus: it waits for the test's begin, steps it to its end, and tells the runner how far it got."""
+"""The clock on the bus: it waits for the test's begin, steps it to its end, and reports its progress to the runner."""
 
 import json
 import logging
@@ -12,15 +12,15 @@ from services.base.lockstep.channel import Channel
 from services.base.lockstep.lockstep_clock import EPOCH
 from services.base.service import Service
 from services.clock.answers import Answers
-from services.clock.application import Audience
+from services.clock.application import Application
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
-from services.clock.participants import Patience, Roles, Stuck, TimedOut, Unanswered
+from services.clock.participants import Ended, Patience, Roles
 
-_TELL_S = 1.0
+_REPORT_S = 1.0
 _SLICE = 0.05
-HEARD = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone")
-"""What the clock hears beside the application's answers."""
+CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone")
+"""What the clock consumes beside the application's answers."""
 
 _log = logging.getLogger(__name__)
 
@@ -41,9 +41,9 @@ class ClockService(Service):
         self._session = session
         self._begin_id = session.messages.id("dodo.TestBegin")
         exchange = Exchange(session, channel, answers.take)
-        self._audience = Audience(answers, patience, exchange, self._over)
-        self._stepper = Stepper(roles, period, timeout, self._audience, exchange, self._over)
-        self._told = 0.0
+        self._application = Application(answers, patience, exchange, self._over)
+        self._stepper = Stepper(roles, period, timeout, self._application, exchange, self._over)
+        self._reported = 0.0
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
 
@@ -52,22 +52,22 @@ class ClockService(Service):
         begin = self._await_begin()
         if begin is None:
             return
-        self._tell_time()
+        self._report_time()
         kind, reason = "", ""
         try:
-            self._stepper.meet()
+            self._stepper.connect()
             self._stepper.run(begin._replace(sample_time=EPOCH, received=0))
-        except (Unanswered, Stuck, TimedOut) as problem:
-            kind, reason = type(problem).__name__.lower(), str(problem)
+        except Ended as problem:
+            kind, reason = problem.kind, str(problem)
         spent = sorted(self._stepper.spent.items(), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
-        self._tell_time(last=True)
+        self._report_time(last=True)
         if kind:
-            self._say(kind, reason=reason)
+            self._report(kind, reason=reason)
 
     def _over(self) -> bool:
-        if time.monotonic() - self._told > _TELL_S:
-            self._tell_time()
+        if time.monotonic() - self._reported > _REPORT_S:
+            self._report_time()
         return self._stopped()
 
     def _await_begin(self) -> Envelope | None:
@@ -77,11 +77,13 @@ class ClockService(Service):
                 return envelope
         return None
 
-    def _tell_time(self, last: bool = False) -> None:
-        self._told = time.monotonic()
+    def _report_time(self, last: bool = False) -> None:
+        self._reported = time.monotonic()
         seconds = (self._stepper.reached - EPOCH) / 1e6
-        self._say("time", s=seconds, frames=self._audience.frames, surplus=self._audience.answers.surplus, last=last)
+        self._report(
+            "time", s=seconds, frames=self._application.frames, surplus=self._application.answers.surplus, last=last
+        )
 
     @staticmethod
-    def _say(kind: str, **facts: object) -> None:
+    def _report(kind: str, **facts: object) -> None:
         print(json.dumps({"dodo": kind, **facts}), flush=True)

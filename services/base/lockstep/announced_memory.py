@@ -1,4 +1,4 @@
-"""Shared memory in lockstep: a picture is told of when the clock says so, and when its readers wait for it."""
+"""Shared memory in lockstep: a picture is announced when the clock says so and all its readers wait."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -8,12 +8,12 @@ from dodo_dsl.opendlv.memory.posix_segment import PosixSegment
 from dodo_dsl.opendlv.memory.shared_memory import LOCK_PATIENCE, SharedMemory
 from dodo_dsl.opendlv.memory.sysv_segment import Segment
 
-_LOOK = 0.0002
-_LONGEST_LOOK = 0.002
+_POLL_S = 0.0002
+_LONGEST_POLL_S = 0.002
 
 
 class AnnouncedMemory(SharedMemory):
-    """Shared memory whose next picture waits aside until it is announced, so that nobody reads it in place of the last.
+    """Shared memory that holds back the next picture until it is announced, so that nobody reads it too early.
 
     ``sampled`` is when that picture was sampled, in microseconds since the epoch.
     """
@@ -27,18 +27,18 @@ class AnnouncedMemory(SharedMemory):
 
     @contextmanager
     def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
-        """Nobody else sees the next picture."""
+        """No lock is needed: nobody else sees the next picture."""
         yield
 
     def stamp(self, time_us: int) -> None:
         self.sampled = time_us
 
     def notify_all(self) -> None:
-        """There is a new picture; its readers will be told by ``announce``."""
+        """There is a new picture; ``announce`` will notify its readers."""
         self.is_new = True
 
     def announce(self) -> None:
-        """Show the picture and tell the readers."""
+        """Show the picture and notify the readers."""
         self.is_new = False
         with super().lock():
             self._shown[:] = self.buffer
@@ -50,7 +50,7 @@ class AnnouncedMemory(SharedMemory):
         super().close()
 
 
-class Screen:
+class Announcer:
     """All the memories of a service; ``readers`` are expected to wait for pictures of all of them together."""
 
     def __init__(self, readers: int) -> None:
@@ -59,7 +59,7 @@ class Screen:
 
     @property
     def new(self) -> list[AnnouncedMemory]:
-        """Those that hold a picture of which nobody was told."""
+        """Those that hold a picture that is not announced yet."""
         return [memory for memory in self.memories if memory.is_new]
 
     @property
@@ -68,19 +68,19 @@ class Screen:
         return max((memory.sampled for memory in self.memories), default=0)
 
     def await_readers(self, stopped: Callable[[], bool]) -> bool:
-        """Until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``.
+        """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``.
 
-        The kernel wakes nobody when a process begins to wait, so this looks, less and less often.
+        The kernel gives no notice when a process begins to wait, so this polls, less and less often.
         """
-        look = _LOOK
+        pause = _POLL_S
         while sum(memory.readers_waiting() for memory in self.memories) < self._readers:
             if stopped():
                 return False
-            time.sleep(look)
-            look = min(look * 1.2, _LONGEST_LOOK)
+            time.sleep(pause)
+            pause = min(pause * 1.2, _LONGEST_POLL_S)
         return True
 
     def announce(self) -> None:
-        """Tell of all that is new."""
+        """Announce all new pictures."""
         for memory in self.new:
             memory.announce()

@@ -1,4 +1,4 @@
-"""A socket beside the bus, over which the clock of a lockstep test and one service talk without waking others."""
+"""A socket beside the bus, between the clock of a lockstep test and one service, which wakes no others."""
 
 import logging
 import socket
@@ -15,7 +15,7 @@ _log = logging.getLogger(__name__)
 
 
 class Channel:
-    """Sends messages in OpenDLV's frames to one address, or to all on the bus, and takes what comes back."""
+    """Sends messages in OpenDLV's frames to one address, or to all on the bus, and receives the replies."""
 
     def __init__(self, cid: int, messages: MessageSet) -> None:
         self._group = group(cid)
@@ -29,9 +29,9 @@ class Channel:
         self._socket.setblocking(False)
 
     def send(self, message: Message, to: Address | None) -> None:
-        """To an address, or with None to all on the bus; what cannot be sent now is lost, and will be repeated.
+        """Send to an address, or with None to all on the bus; what cannot be sent now is lost, and will be repeated.
 
-        An error that will not pass by itself is logged once.
+        A lasting error is logged once.
         """
         now = time.time_ns() // 1000
         frame = encode_frame(Envelope(self._messages.id(message), self._messages.encode(message), now, 0, now, 0))
@@ -45,14 +45,14 @@ class Channel:
                 _log.warning("a message to %s:%d cannot be sent: %s", *(to or self._group), error)
 
     def receive(self) -> tuple[Envelope, Address] | None:
-        """What has come, and from whom; None when there is nothing. What is no frame is left out."""
+        """The next envelope with its sender's address; None when there is none. Invalid datagrams are skipped."""
         while True:
             try:
                 data, address = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
                 return decode_frame(data), address
             except FrameError:
                 continue
-            except OSError:  # nothing there, or word that somebody has gone
+            except OSError:  # nothing there, or a peer has gone
                 return None
 
     def fileno(self) -> int:
@@ -60,5 +60,5 @@ class Channel:
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Let go of the socket."""
+        """Close the socket."""
         self._socket.close()

@@ -1,4 +1,4 @@
-"""A service's side of the talk with the clock: orders that come once, and answers that are repeated on demand."""
+"""A service's link to the clock: steps that come once, and answers that are repeated on demand."""
 
 import select
 from collections.abc import Callable
@@ -11,13 +11,13 @@ from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.lockstep.channel import Channel
-from services.base.lockstep.datagrams import STEP, STEP_DONE, Pieces, Said, frames
+from services.base.lockstep.datagrams import STEP, STEP_DONE, Reassembly, decode
 
 Reply = list[Message]
 SLICE_MS = 100
 _BURST = 2
 _MEANWHILE = 0.003
-"""For so many seconds after a message one who looks at the bus lets others come, and is woken once for them all."""
+"""Seconds that an observer of the bus waits after a message, so that it wakes once for several."""
 
 
 class Step(NamedTuple):
@@ -26,25 +26,25 @@ class Step(NamedTuple):
     number: int
     time: int
     show: bool
-    heard: list[Said]
+    messages: list[Envelope]
 
 
-class Ear:
-    """Hears the clock: on the bus at first, and from then on over a channel of its own.
+class ClockClient:
+    """Receives steps: on the bus at first, and from then on over a channel of its own.
 
-    A service that does not look at the bus leaves it then, so that it is not woken for what does not concern it.
+    A service that does not observe the bus leaves it then, so that messages for others do not wake it.
     """
 
     def __init__(self, session: Session, name: str) -> None:
         self._session, self._name = session, name
         self._channel = Channel(session.cid, session.messages)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
-        self._not_heard = {self._step_id, self._done_id, session.messages.id("dodo.TestBegin")}
+        self._ignored = {self._step_id, self._done_id, session.messages.id("dodo.TestBegin")}
         self._clock: Address | None = None
-        self._is_met = False
-        """Whether the clock knows the channel, so that there is no need of the bus."""
+        self._has_clock = False
+        """Whether the clock knows the channel, so that the bus is not needed."""
         self._number = -1
-        self._pieces = Pieces()
+        self._reassembly = Reassembly()
         self._last: Reply = []
         self._on_the_bus = False
         self._acknowledged = False
@@ -52,22 +52,22 @@ class Ear:
         self._poll.register(self._channel, select.POLLIN)
         self._poll.register(session, select.POLLIN)
 
-    def listen(self, observes: bool, overhear: Callable[[Envelope], None]) -> Step | None:
-        """The next new step, or None when a while has passed; everything that was on the bus before it is overheard."""
-        came = self._channel.receive()
-        if came is not None:
-            self._is_met = True
+    def next_step(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None:
+        """The next new step, or None after a while; ``observe`` takes everything that was on the bus before it."""
+        received = self._channel.receive()
+        if received is not None:
+            self._has_clock = True
             if observes:
-                self._drain(overhear)
-            return self._taken(*came)
-        if not self._is_met:
+                self._drain(observe)
+            return self._accept(*received)
+        if not self._has_clock:
             envelope = self._session.receive(0.0)
             if envelope is not None:
                 if envelope.data_type == self._step_id:
-                    return self._taken(envelope, self._session.source)
-                self._overheard(envelope, overhear)
+                    return self._accept(envelope, self._session.source)
+                self._observe(envelope, observe)
                 return None
-        elif observes and self._drain(overhear):
+        elif observes and self._drain(observe):
             select.select([self._channel], [], [], _MEANWHILE)
             return None
         elif not observes:
@@ -75,11 +75,11 @@ class Ear:
         self._poll.poll(SLICE_MS)
         return None
 
-    def _drain(self, overhear: Callable[[Envelope], None]) -> int:
-        """Take all that is on the bus; says how much that was."""
+    def _drain(self, observe: Callable[[Envelope], None]) -> int:
+        """Take all that is on the bus; returns how many messages that was."""
         taken = 0
         while (envelope := self._session.receive(0.0)) is not None:
-            self._overheard(envelope, overhear)
+            self._observe(envelope, observe)
             taken += 1
         return taken
 
@@ -90,39 +90,39 @@ class Ear:
 
     def repeat(self) -> None:
         """Send the last answer again."""
-        for message in self._turned():
+        for message in self._rotated():
             if self._on_the_bus:
                 self._session.send(message)
             else:
                 self._channel.send(message, self._clock)
 
-    def _turned(self) -> Reply:
-        """The last answer's pieces, beginning with others each time, as a receive buffer may hold but a few."""
-        pieces, self._last = self._last, [*self._last[_BURST:], *self._last[:_BURST]]
-        return pieces
+    def _rotated(self) -> Reply:
+        """The last answer's parts, beginning with others each time, as a receive buffer may hold only a few."""
+        parts, self._last = self._last, [*self._last[_BURST:], *self._last[:_BURST]]
+        return parts
 
     def is_acknowledged(self) -> bool:
-        """Whether the clock says within a while that it has the last answer; repeats that where it asks."""
+        """Whether the clock acknowledges the last answer within a while; repeats that on demand."""
         self._poll.poll(SLICE_MS)
-        while (came := self._channel.receive()) is not None:
-            self._taken(*came)
+        while (received := self._channel.receive()) is not None:
+            self._accept(*received)
         return self._acknowledged
 
     def close(self) -> None:
-        """Let go of the channel."""
+        """Close the channel."""
         self._channel.close()
 
-    def _overheard(self, envelope: Envelope, overhear: Callable[[Envelope], None]) -> None:
-        if envelope.data_type not in self._not_heard:
-            overhear(envelope)
+    def _observe(self, envelope: Envelope, observe: Callable[[Envelope], None]) -> None:
+        if envelope.data_type not in self._ignored:
+            observe(envelope)
 
     def _leave_the_bus(self) -> None:
         if self._session.is_member:
             self._session.deafen()
             self._poll.unregister(self._session)
 
-    def _taken(self, envelope: Envelope, address: Address) -> Step | None:
-        """The step when this is the rest of a new one for this service; one that was answered is answered again."""
+    def _accept(self, envelope: Envelope, address: Address) -> Step | None:
+        """The step that this completes, if it is a new one for this service; an answered one is answered again."""
         try:
             step: Any = self._session.messages.decode(envelope.data_type, envelope.payload)
             if envelope.data_type != self._step_id or step.service != self._name or step.number < self._number:
@@ -133,10 +133,10 @@ class Ear:
                 if step.parts and not step.part:
                     self.repeat()
                 return None
-            data = self._pieces.take(step.number, step.part, step.parts, step.frames)
+            data = self._reassembly.take(step.number, step.part, step.parts, step.frames)
             if data is None:
                 return None
             self._number, self._last = step.number, []
-            return Step(step.number, step.time, step.show, list(frames(data)))
+            return Step(step.number, step.time, step.show, [encoded.envelope for encoded in decode(data)])
         except (FrameError, MessageError, KeyError):
-            return None  # not from our clock
+            return None  # not from this test's clock

@@ -1,4 +1,4 @@
-"""What the clock and the services tell each other in lockstep, cut into datagrams and put together again."""
+"""What clock and services exchange in lockstep, split into datagrams and reassembled."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -10,51 +10,51 @@ STEP, STEP_DONE = "dodo.Step", "dodo.StepDone"
 PART_BYTES = 60_000
 
 
-class Said(NamedTuple):
-    """An envelope with its frame, so that it is encoded once however many hear it."""
+class EncodedEnvelope(NamedTuple):
+    """An envelope with its frame, so that it is encoded once for all receivers."""
 
     envelope: Envelope
     frame: bytes
 
 
-def say(envelope: Envelope) -> Said:
+def encode(envelope: Envelope) -> EncodedEnvelope:
     """The envelope, encoded; raises FrameError."""
-    return Said(envelope, encode_frame(envelope))
+    return EncodedEnvelope(envelope, encode_frame(envelope))
 
 
-def cut(frames: Iterable[bytes]) -> list[bytes]:
-    """Frames one after the other, in pieces that datagrams can hold; one empty piece for none."""
+def split(frames: Iterable[bytes]) -> list[bytes]:
+    """Frames one after the other, in parts that datagrams can hold; one empty part for none."""
     data = b"".join(frames)
     return [data[start : start + PART_BYTES] for start in range(0, len(data), PART_BYTES)] or [b""]
 
 
-def frames(data: bytes) -> Iterator[Said]:
-    """The envelopes in such pieces put together; raises FrameError."""
+def decode(data: bytes) -> Iterator[EncodedEnvelope]:
+    """The envelopes in reassembled data; raises FrameError."""
     offset = 0
     while offset < len(data):
         end = offset + HEADER_BYTES + body_length(data[offset : offset + HEADER_BYTES])
         if end > len(data):
             raise FrameError(f"a step's frame has {len(data) - offset} bytes of {end - offset}")
         frame = data[offset:end]
-        yield Said(decode_frame(frame), frame)
+        yield EncodedEnvelope(decode_frame(frame), frame)
         offset = end
 
 
 @dataclass
-class Pieces:
-    """Pieces of one message as they come, in any order and more than once."""
+class Reassembly:
+    """Reassembly of one message as they come, in any order and more than once."""
 
     number: int = -1
     parts: int = 1
-    pieces: dict[int, bytes] = field(default_factory=dict)
+    received: dict[int, bytes] = field(default_factory=dict)
 
     def take(self, number: int, part: int, parts: int, data: bytes) -> bytes | None:
-        """All of the message when this piece was the last that was missing, else None."""
+        """The whole message when this was the last missing part, else None."""
         if number != self.number:
-            self.number, self.parts, self.pieces = number, max(1, parts), {}
-        if part in self.pieces or part >= self.parts:
+            self.number, self.parts, self.received = number, max(1, parts), {}
+        if part in self.received or part >= self.parts:
             return None
-        self.pieces[part] = data
-        if len(self.pieces) < self.parts:
+        self.received[part] = data
+        if len(self.received) < self.parts:
             return None
-        return b"".join(self.pieces[i] for i in range(self.parts))
+        return b"".join(self.received[i] for i in range(self.parts))

@@ -1,23 +1,22 @@
-"""The clock of a service in lockstep: the time of the test goes on when the clock service says so, and no further.
+"""The clock of a service in lockstep: the clock service alone advances the time of the test.
 
-What a service hears comes inside the step message and nowhere else, and what it says goes back inside the answer, so
-that no lost or late datagram can change a result (``docs/lockstep.md``).
+What a service consumes comes inside the step message and nowhere else, and what it produces goes back inside the
+answer, so that no lost or late datagram can change a result (``docs/lockstep.md``).
 """
 
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
-from typing import NamedTuple
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from services.base.clock import Inbox
-from services.base.lockstep.announced_memory import AnnouncedMemory, Screen
-from services.base.lockstep.clock_client import Ear, Reply
-from services.base.lockstep.datagrams import STEP_DONE, cut
-from services.base.lockstep.observer import EPOCH, LONGEST, Observed
+from services.base.lockstep.announced_memory import AnnouncedMemory, Announcer
+from services.base.lockstep.clock_client import ClockClient, Reply, Step
+from services.base.lockstep.datagrams import STEP_DONE, split
+from services.base.lockstep.observer import EPOCH, LONGEST, Observer
 
 __all__ = ["EPOCH", "LockstepClock"]
 
@@ -25,138 +24,129 @@ _GOODBYES = 10
 _LINGER_S = 0.05
 
 
-class Order(NamedTuple):
-    """What the clock wants: go on to ``time``, knowing what was ``heard``; ``show`` the pictures that are new."""
-
-    number: int
-    time: int
-    show: bool
-    heard: list[Envelope]
-
-
 class LockstepClock:
-    """Test time as the clock service deals it out; ``name`` is the service's name in the test."""
+    """Test time in the clock service's steps; ``name`` is the service's name in the test."""
 
     relays = True
 
     def __init__(self, session: Session, name: str, readers: int) -> None:
         self._session, self._name = session, name
-        self._done = session.messages.type(STEP_DONE)
-        self._ear = Ear(session, name)
+        self._step_done = session.messages.type(STEP_DONE)
+        self._client = ClockClient(session, name)
         self._now = EPOCH - 1
         self._number = -1
         self._open = False
         self._sent: list[bytes] = []
-        self._screen = Screen(readers)
-        self._observed = Observed()
+        self._announcer = Announcer(readers)
+        self._observer = Observer()
         self._next = 0
-        self._hears = ""
+        self._consumed = ""
 
     def now(self) -> int:
         return self._now
 
     @property
-    def is_showing(self) -> bool:
-        return bool(self._screen.new)
+    def has_new_picture(self) -> bool:
+        return bool(self._announcer.new)
 
     def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
-        self._hears = "" if inbox.observes else ",".join(map(str, sorted(inbox.hears)))
+        self._consumed = "" if inbox.observes else ",".join(map(str, sorted(inbox.consumes)))
         yield from self._steps(period, inbox, stopped)
         if inbox.observes:
-            self._observed.rest(inbox)
+            self._observer.flush(inbox)
 
     def _steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         number, due = 0, EPOCH
-        while (order := self._next_order(inbox, stopped)) is not None:
+        while (step := self._next_step(inbox, stopped)) is not None:
             if inbox.observes:
-                self._observed.look(inbox, order.time, order.heard)
-            heard = in_order(order.heard)
-            while due <= order.time:
-                while heard and heard[0][0] <= due:
-                    inbox.handle(heard.popleft()[1])
+                self._observer.deliver(inbox, step.time, step.messages)
+            messages = in_order(step.messages)
+            while due <= step.time:
+                while messages and messages[0][0] <= due:
+                    inbox.handle(messages.popleft()[1])
                 if stopped():
                     return
                 self._now = due
                 yield due
                 number += 1
                 due = EPOCH + round(number * period)
-            self._now = order.time
-            for _, envelope in heard:
+            self._now = step.time
+            for _, envelope in messages:
                 inbox.handle(envelope)
-            if stopped() or (order.show and not self._screen.await_readers(stopped)):
+            if stopped() or (step.show and not self._announcer.await_readers(stopped)):
                 return
-            self._answer(order.show)
+            self._answer(step.show)
 
     def sent(self, frame: bytes) -> None:
-        """The service has sent this."""
+        """The service has sent this frame."""
         self._sent.append(frame)
 
     def expect(self, time: int) -> None:
-        """The test then goes on to this time in one step."""
+        """The test may go on to this time in one step."""
         self._next = time
 
     def memory(self, name: str, size: int) -> SharedMemory:
-        """New shared memory whose pictures are announced once, when their readers wait for them."""
+        """New shared memory whose pictures are announced once, when their readers wait."""
         memory = AnnouncedMemory.create(name, size)
-        self._screen.memories.append(memory)
+        self._announcer.memories.append(memory)
         return memory
 
     def close(self, stopped: Callable[[], bool]) -> None:
-        """The service ends: the step that it is in is answered, and its answer has arrived.
+        """The service ends: answer the open step, and wait until the clock has the answer.
 
         Its memories stay until the test is over, as removing them would show the last picture once more.
         """
         if self._open:
             self._open = False
-            self._ear.answer(self._reply(ended=True))
+            self._client.answer(self._reply(ended=True))
             for _ in range(_GOODBYES):
-                if self._ear.is_acknowledged():
+                if self._client.is_acknowledged():
                     break
-                self._ear.repeat()
-        self._ear.close()
-        while self._screen.memories and not stopped():
+                self._client.repeat()
+        self._client.close()
+        while self._announcer.memories and not stopped():
             time.sleep(_LINGER_S)
 
-    def _next_order(self, inbox: Inbox, stopped: Callable[[], bool]) -> Order | None:
+    def _next_step(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | None:
         """The next step that is for this service; None when it is to stop."""
         while not stopped():
-            step = self._ear.listen(inbox.observes, self._observed.overhear)
+            step = self._client.next_step(inbox.observes, self._observer.collect)
             if step is not None:
                 self._number, self._open = step.number, True
-                return Order(step.number, step.time, step.show, [said.envelope for said in step.heard])
+                return step
         return None
 
     def _answer(self, show: bool) -> None:
-        """A picture is announced behind the answer, so that all that its readers say stands behind that, too."""
+        """A picture is announced after the answer, so that its readers' messages come after that, too."""
         self._open = False
-        self._ear.answer(self._reply(ended=False), on_the_bus=show)
+        self._client.answer(self._reply(ended=False), on_the_bus=show)
         if show:
-            self._screen.announce()
+            self._announcer.announce()
 
     def _reply(self, ended: bool) -> Reply:
-        pieces = cut(self._sent)
+        parts = split(self._sent)
         self._sent = []
         facts = {
             "number": self._number,
             "service": self._name,
-            "parts": len(pieces),
-            "memories": len(self._screen.memories),
-            "pictures": len(self._screen.new),
-            "sampled": self._screen.sampled,
+            "parts": len(parts),
+            "memories": len(self._announcer.memories),
+            "pictures": len(self._announcer.new),
+            "sampled": self._announcer.sampled,
             "ended": ended,
             "next": self._next,
             "port": self._session.port,
-            "hears": self._hears,
+            "hears": self._consumed,
         }
-        self._hears = ""
-        return [self._done(part=part, frames=data, **facts) for part, data in enumerate(pieces)]
+        self._consumed = ""
+        return [self._step_done(part=part, frames=data, **facts) for part, data in enumerate(parts)]
 
 
-def in_order(heard: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:
-    """Messages by when they are due: at their sample time, or, if that is none of the test's, behind those before."""
+def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:
+    """Messages by when they are due: at their sample time, or after those before if that is not of the test."""
     due, timed = EPOCH, []
-    for envelope in heard:
+    for envelope in messages:
         if EPOCH <= envelope.sample_time <= EPOCH + LONGEST:
             due = envelope.sample_time
         timed.append((due, envelope))

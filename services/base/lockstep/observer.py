@@ -1,4 +1,4 @@
-"""What one who looks at everything sees in lockstep: each message once, and each in the step that it belongs to."""
+"""What a service that observes the bus gets in lockstep: each message once, in the step that it belongs to."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -10,55 +10,55 @@ EPOCH = 1_700_000_000_000_000
 """The time at which every test in lockstep begins, in microseconds since the epoch."""
 
 LONGEST = 2 * 86_400_000_000
-"""No test lasts longer, in microseconds."""
+"""Longest test, in microseconds."""
 
 _REMEMBERED = 50
 
 
-class Observed:
-    """Puts together what the clock tells of the test's services, which is complete, and what else is on the bus.
+class Observer:
+    """Merges the messages of the test's services, which the clock passes on completely, with the rest of the bus.
 
-    What services say is on the bus, too, sooner or later or not at all: it counts as the clock tells it. What the
-    application says counts as it is on the bus, and not as the clock hands it on.
+    Messages of services may be on the bus, too, early or late: those from the clock count. Messages of the application
+    count as they are on the bus, not as the clock passes them on.
     """
 
     def __init__(self) -> None:
-        self._overheard: list[Envelope] = []
+        self._collected: list[Envelope] = []
         self._first: set[Envelope] = set()
-        self._told: deque[set[Envelope]] = deque(maxlen=_REMEMBERED)
+        self._relayed: deque[set[Envelope]] = deque(maxlen=_REMEMBERED)
 
-    def overhear(self, envelope: Envelope) -> None:
-        """It was on the bus."""
-        self._overheard.append(envelope)
+    def collect(self, envelope: Envelope) -> None:
+        """An envelope that was on the bus."""
+        self._collected.append(envelope)
 
-    def look(self, inbox: Inbox, until: int, told: Iterable[Envelope]) -> None:
-        """Let the service look at all of a step, after what the application answered to the one before.
+    def deliver(self, inbox: Inbox, until: int, relayed: Iterable[Envelope]) -> None:
+        """Deliver all of a step (its end ``until`` in us), after the application's answer to the one before.
 
-        Its answers to this one, and what belongs to later ones, wait: whether they are there already is chance.
+        The answer to this one, and what belongs to later ones, waits: whether it is there already is chance.
         """
-        own = [envelope for envelope in told if not envelope.received]
+        own = [envelope for envelope in relayed if not envelope.received]
         keys = {_key(envelope) for envelope in own}
         if len(self._first) < len(keys) and until <= EPOCH:
-            self._first = keys  # the clock says these again to applications that start late
-        self._told.append(keys)
-        overheard, self._overheard = self._overheard, []
-        for envelope in overheard:
+            self._first = keys  # the clock repeats these for applications that start late
+        self._relayed.append(keys)
+        collected, self._collected = self._collected, []
+        for envelope in collected:
             if until <= envelope.sample_time <= EPOCH + LONGEST:
-                self._overheard.append(envelope)
+                self._collected.append(envelope)
             elif not self._is_known(_key(envelope)):
-                inbox.overhear(envelope)
+                inbox.observe(envelope)
         for envelope in own:
-            inbox.overhear(envelope)
+            inbox.observe(envelope)
 
-    def rest(self, inbox: Inbox) -> None:
-        """The test is over: let the service look at what waits for a step that will not come."""
-        for envelope in self._overheard:
+    def flush(self, inbox: Inbox) -> None:
+        """The test is over: deliver what waits for a step that will not come."""
+        for envelope in self._collected:
             if not self._is_known(_key(envelope)):
-                inbox.overhear(envelope)
-        self._overheard = []
+                inbox.observe(envelope)
+        self._collected = []
 
     def _is_known(self, key: Envelope) -> bool:
-        return key in self._first or any(key in keys for keys in self._told)
+        return key in self._first or any(key in keys for keys in self._relayed)
 
 
 def _key(envelope: Envelope) -> Envelope:

@@ -58,7 +58,7 @@ def test_a_very_late_service_skips_steps_and_says_so(caplog: pytest.LogCaptureFi
     with caplog.at_level(logging.WARNING):
         steps = Stage({}).run(20_000, 4, lambda step: 1_530_000 if step == 1 else 0)
     assert steps == [0, 20_000, 1_540_000, 1_560_000]
-    assert caplog.messages == ["1.5 s late: 75 steps are skipped"]
+    assert caplog.messages == ["1.5 s late, skipped 75 steps"]
 
 
 def test_a_flood_does_not_hold_up_the_steps() -> None:

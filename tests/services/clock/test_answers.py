@@ -3,11 +3,11 @@
 import pytest
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
-from services.clock.answers import Answers, Kind, kinds
+from services.clock.answers import Answers, MessageFilter, filters
 
 STEER, PEDAL, BOX, READY = 1090, 1086, 1134, 1054
 FRAME, NEXT, ELSEWHEN = 1_000_000, 1_100_000, 77
-WANTED = (Kind("steer", STEER), Kind("pedal", PEDAL))
+REQUIRED = (MessageFilter("steer", STEER), MessageFilter("pedal", PEDAL))
 
 
 def said(kind: int, time: int, payload: bytes = b"", stamp: int = 0) -> Envelope:
@@ -20,7 +20,7 @@ def show(answers: Answers, *times: int) -> None:
 
 
 def answering(*envelopes: Envelope, **about: object) -> Answers:
-    answers = Answers(WANTED, **about)  # type: ignore[arg-type]
+    answers = Answers(REQUIRED, **about)  # type: ignore[arg-type]
     show(answers, FRAME)
     for envelope in envelopes:
         answers.take(envelope)
@@ -29,16 +29,16 @@ def answering(*envelopes: Envelope, **about: object) -> Answers:
 
 def test_complete_when_each_came_once() -> None:
     answers = answering(said(STEER, FRAME))
-    assert not answers.complete
+    assert not answers.is_complete
     assert answers.missing == ["pedal"]
     answers.take(said(PEDAL, FRAME))
-    assert answers.complete
+    assert answers.is_complete
     assert [e.data_type for e in answers.collect()] == [STEER, PEDAL]
 
 
 def test_the_first_after_the_frame_counts_where_sample_times_are_not_copied() -> None:
     answers = answering(said(STEER, ELSEWHEN, b"first"), said(STEER, ELSEWHEN + 9, b"second"), said(PEDAL, ELSEWHEN))
-    assert answers.complete
+    assert answers.is_complete
     assert [(e.payload, e.sample_time) for e in answers.collect()] == [(b"first", FRAME), (b"", FRAME)]
     assert answers.surplus == 1
 
@@ -65,16 +65,16 @@ def test_an_answer_with_its_frames_sample_time_counts_however_early_it_is_heard(
 
 
 def test_each_of_two_cameras_may_be_answered() -> None:
-    answers = Answers(WANTED)
+    answers = Answers(REQUIRED)
     show(answers, FRAME, FRAME + 7)
     answers.take(said(STEER, FRAME))
     answers.take(said(PEDAL, FRAME + 7))
-    assert answers.complete
+    assert answers.is_complete
     assert answers.surplus == 0
 
 
 def test_nothing_counts_before_the_first_frame() -> None:
-    answers = Answers(WANTED, (Kind("box", BOX),))
+    answers = Answers(REQUIRED, (MessageFilter("box", BOX),))
     answers.take(said(STEER, ELSEWHEN))
     answers.take(said(BOX, ELSEWHEN))
     show(answers, FRAME)
@@ -83,20 +83,20 @@ def test_nothing_counts_before_the_first_frame() -> None:
 
 
 def test_done_ends_the_answer_whatever_came() -> None:
-    answers = answering(said(STEER, FRAME), done=Kind("ready", READY, 2))
+    answers = answering(said(STEER, FRAME), done=MessageFilter("ready", READY, 2))
     answers.take(said(READY, FRAME, stamp=1))
     assert answers.missing == ["ready"]
     answers.take(said(READY, FRAME, stamp=2))
-    assert answers.complete
+    assert answers.is_complete
     assert [e.data_type for e in answers.collect()] == [STEER]
     show(answers, NEXT)
     answers.take(said(READY, FRAME, stamp=2))
-    assert not answers.complete, "a late word about the frame before"
+    assert not answers.is_complete, "a late word about the frame before"
 
 
 def test_others_are_handed_on_all_of_them_in_an_order_of_their_own() -> None:
     boxes = [said(BOX, FRAME, b"1", 7), said(BOX, ELSEWHEN, b"2", 7), said(BOX, FRAME, b"3", 3)]
-    answers = answering(*boxes, said(4711, FRAME), heard=(Kind("box", BOX),))
+    answers = answering(*boxes, said(4711, FRAME), relayed=(MessageFilter("box", BOX),))
     assert [(e.payload, e.sample_time) for e in answers.collect()] == [(b"3", FRAME), (b"1", FRAME), (b"2", FRAME)]
     assert answers.collect() == []
 
@@ -110,7 +110,7 @@ def test_one_who_answers_twice_drives_as_one_who_answers_once() -> None:
 
 
 def test_names_with_and_without_a_stamp() -> None:
-    assert kinds(["a.B", "a.B/3"], {"a.B": 5}) == (Kind("a.B", 5), Kind("a.B/3", 5, 3))
+    assert filters(["a.B", "a.B/3"], {"a.B": 5}) == (MessageFilter("a.B", 5), MessageFilter("a.B/3", 5, 3))
     for wrong in ("a.C", "a.B/x"):
-        with pytest.raises(ValueError, match="is no message, expected a name such as"):
-            kinds([wrong], {"a.B": 5})
+        with pytest.raises(ValueError, match="is not a message, expected a name such as"):
+            filters([wrong], {"a.B": 5})

@@ -1,4 +1,4 @@
-"""A small test in lockstep, in threads: a mover, an eye that shows where it is, a judge, and an application."""
+"""A small test in lockstep, in threads: a mover, an eye that shows where it is, an evaluator, and an application."""
 
 import os
 import struct
@@ -16,8 +16,8 @@ from services.base import Service, Verdict
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
-from services.clock.answers import Answers, kinds
-from services.clock.application import Audience
+from services.clock.answers import Answers, filters
+from services.clock.application import Application
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
 from services.clock.participants import Patience, Roles
@@ -28,7 +28,7 @@ BOX = "opendlv.logic.perception.DetectionBoundingBox"
 
 
 class Mover(Service):
-    """Moves by what it was told last, 10 times a step."""
+    """Moves by the last request, 10 times a step."""
 
     period = STEP // 10
 
@@ -83,17 +83,17 @@ class Film(Service):
         return ()
 
 
-class Judge(Service):
-    """Remembers the way and what was said of pictures, and has seen enough after some seconds or at the end."""
+class ToyEvaluator(Service):
+    """Remembers the path and the boxes in pictures, and ends after some seconds or with the input."""
 
     period = STEP // 20
 
     def __init__(self, seconds: float) -> None:
         self.inputs = {
-            (PLACE, 0): lambda message, time: self.way.append((time - EPOCH, message.x)),
+            (PLACE, 0): lambda message, time: self.path.append((time - EPOCH, message.x)),
             (BOX, None): lambda message, time: self.boxes.append(((time - EPOCH) // STEP, message.x)),
         }
-        self.way: list[tuple[int, float]] = []
+        self.path: list[tuple[int, float]] = []
         self.boxes: list[tuple[int, float]] = []
         self._end = EPOCH + round(seconds * 1_000_000)
 
@@ -106,7 +106,7 @@ class Judge(Service):
 
 
 @dataclass
-class Application:
+class ToyApplication:
     """Steers by what it sees. ``copies`` its sample time, says it ``times`` often, ``pause`` waits before it does.
 
     ``boxes`` are said of each picture before that, each after another pause. ``delay`` is how many seconds pass from
@@ -179,25 +179,25 @@ DRIVE: dict[str, Maker] = {"mover": lambda s, _: Mover(s), "eye": lambda _, memo
 
 @dataclass
 class Toys:
-    """Runs the test: a mover goes on, others sense; ``judge`` looks."""
+    """Runs the test: a mover goes on, others sense; the ``evaluator`` looks."""
 
     cid: int
     seconds: float = 2.0
     patience: Patience = field(default_factory=lambda: Patience(5.0, 2.0))
     answers: tuple[str, ...] = (STEER,)
-    heard: tuple[str, ...] = ()
+    relayed: tuple[str, ...] = ()
     timeout: int = 60_000_000
     readers: int = 1
     cast: dict[str, Maker] = field(default_factory=lambda: DRIVE)
 
     def __post_init__(self) -> None:
-        self.judge = Judge(self.seconds)
+        self.evaluator = ToyEvaluator(self.seconds)
 
     def memory_name(self, service: str = "eye") -> str:
         return f"dodo-toy-{os.getpid()}-{self.cid}-{service}"
 
-    def application(self, service: str = "eye", **about: Any) -> Application:
-        return Application(self.cid, self.memory_name(service), **about)
+    def application(self, service: str = "eye", **about: Any) -> ToyApplication:
+        return ToyApplication(self.cid, self.memory_name(service), **about)
 
     def run(self, *applications: Runs) -> tuple[list[tuple[int, float]], Stepper]:
         """Raises what the Stepper raises."""
@@ -208,25 +208,25 @@ class Toys:
                 app.start()
             channel = Channel(self.cid, session.messages)
             ids = {name: session.messages.id(name) for name in session.messages.names()}
-            answers = Answers(kinds(self.answers, ids), kinds(self.heard, ids))
+            answers = Answers(filters(self.answers, ids), filters(self.relayed, ids))
             exchange = Exchange(session, channel, answers.take)
             advance = tuple(name for name in self.cast if name == "mover")
             roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
-            audience = Audience(answers, self.patience, exchange, stop.is_set)
-            stepper = Stepper(roles, STEP, self.timeout, audience, exchange, stop.is_set)
+            application = Application(answers, self.patience, exchange, stop.is_set)
+            stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
             try:
-                stepper.meet()
+                stepper.connect()
                 stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
             finally:
                 stop.set()
                 for app in apps:
                     app.join()
                 channel.close()
-        return self.judge.way, stepper
+        return self.evaluator.path, stepper
 
     @contextmanager
     def _services(self, stop: threading.Event) -> Iterator[None]:
-        makers: dict[str, Maker] = {**self.cast, "judge": lambda _session, _memory: self.judge}
+        makers: dict[str, Maker] = {**self.cast, "judge": lambda _session, _memory: self.evaluator}
         with ExitStack() as resources:
             loops = [self._loop(name, maker, resources) for name, maker in makers.items()]
             threads = [threading.Thread(target=loop.run, args=(stop.is_set,)) for loop in loops]

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
-from services.base.lockstep.datagrams import PART_BYTES, Pieces, cut, frames, say
+from services.base.lockstep.datagrams import PART_BYTES, Reassembly, decode, encode, split
 
 TIMES = st.integers(0, 2**31 * 1_000_000 - 1)
 ENVELOPES = st.builds(
@@ -18,31 +18,31 @@ ENVELOPES = st.builds(
 
 @given(st.lists(ENVELOPES, max_size=6), st.integers(0, 2**32), st.integers(1, 5))
 def test_pieces_in_any_order_and_more_than_once(envelopes: list[Envelope], seed: int, number: int) -> None:
-    pieces = cut(say(envelope).frame for envelope in envelopes)
+    pieces = split(encode(envelope).frame for envelope in envelopes)
     assert all(len(piece) <= PART_BYTES for piece in pieces)
     sent = list(enumerate(pieces)) * 2
     random.Random(seed).shuffle(sent)
-    collected = Pieces()
+    collected = Reassembly()
     collected.take(number - 1, 0, 2, b"of an older step")
     whole = [data for part, piece in sent if (data := collected.take(number, part, len(pieces), piece)) is not None]
     assert len(whole) == 1
-    assert [said.envelope for said in frames(whole[0])] == envelopes
+    assert [encoded.envelope for encoded in decode(whole[0])] == envelopes
 
 
 def test_a_frame_that_is_cut_off_is_refused() -> None:
-    data = say(Envelope(1090, b"12345", 0, 0, 0, 0)).frame
+    data = encode(Envelope(1090, b"12345", 0, 0, 0, 0)).frame
     with pytest.raises(FrameError, match=r"a step's frame has \d+ bytes of \d+"):
-        list(frames(data + data[:-3]))
+        list(decode(data + data[:-3]))
 
 
 @given(st.binary(max_size=200))
 def test_anything_else_is_refused(data: bytes) -> None:
     with contextlib.suppress(FrameError):
-        assert sum(len(said.frame) for said in frames(data)) == len(data)
+        assert sum(len(encoded.frame) for encoded in decode(data)) == len(data)
 
 
 def test_a_part_beyond_the_last_is_left() -> None:
-    pieces = Pieces()
+    pieces = Reassembly()
     assert pieces.take(1, 0, 2, b"a") is None
     assert pieces.take(1, 2, 2, b"c") is None
     assert pieces.take(1, 1, 2, b"b") == b"ab"

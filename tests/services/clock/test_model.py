@@ -13,8 +13,8 @@ from services.base.lockstep import channel, clock_client
 from services.base.lockstep.lockstep_clock import EPOCH
 from services.clock import exchange, model
 from services.clock.model import Stepper
-from services.clock.participants import Patience, Stuck, TimedOut, Unanswered
-from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Judge, Mover, Toys
+from services.clock.participants import ApplicationSilent, Patience, ServiceSilent, TimeOver
+from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Mover, ToyEvaluator, Toys
 
 Way = list[tuple[int, float]]
 
@@ -44,7 +44,7 @@ def test_the_way_is_as_computed_by_hand(toys: Toys) -> None:
     application = toys.application()
     way, stepper = toys.run(application)
     assert close(way, expected(21))
-    assert (stepper.audience.frames, stepper.audience.answers.surplus) == (21, 0)
+    assert (stepper.application.frames, stepper.application.answers.surplus) == (21, 0)
     assert application.seen[:2] == pytest.approx([0.01, 0.11], abs=0.05)
 
 
@@ -63,7 +63,7 @@ def test_manners_change_nothing(toys: Toys, manner: str) -> None:
     assert close(way, expected(21))
     assert len(application.seen) in (20, 21), "every picture once"
     most = 21 * (application.times - 1)
-    assert most - 2 <= stepper.audience.answers.surplus <= most
+    assert most - 2 <= stepper.application.answers.surplus <= most
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -92,7 +92,7 @@ def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch:
     monkeypatch.setattr(clock_client, "SLICE_MS", 10)
     way, stepper = toys.run(toys.application())
     assert close(way, expected(21))
-    assert stepper.audience.frames == 21
+    assert stepper.application.frames == 21
 
 
 def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,14 +106,14 @@ def test_an_application_without_an_answer_of_its_own_is_awaited_by_its_readers(t
     toys.answers = ()
     application = toys.application(pause=lambda _: 0.01)
     _, stepper = toys.run(application)
-    assert stepper.audience.frames == 21
+    assert stepper.application.frames == 21
     assert len(application.seen) == 21
 
 
 def test_all_that_such_an_application_says_of_a_picture_is_heard_with_the_next_step(toys: Toys) -> None:
-    toys.answers, toys.heard = (), (BOX,)
+    toys.answers, toys.relayed = (), (BOX,)
     toys.run(toys.application(boxes=2, pause=lambda frame: 0.02 * (frame % 3)))
-    steps = [step for step, _ in toys.judge.boxes]
+    steps = [step for step, _ in toys.evaluator.boxes]
     assert steps == [step for step in range(20) for _ in range(2)]
 
 
@@ -121,7 +121,7 @@ def test_an_application_without_a_camera_may_answer_at_once(toys: Toys) -> None:
     toys.cast = {"mover": lambda session, _: Mover(session)}
     way, stepper = toys.run(Filter(toys.cid))
     assert len(way) == 201
-    assert stepper.audience.frames == 21
+    assert stepper.application.frames == 21
 
 
 def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
@@ -130,7 +130,7 @@ def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
     slow = toys.application("other", times=0, boxes=1, pause=lambda _: 0.02)
     way, stepper = toys.run(toys.application(), slow)
     assert close(way, expected(21))
-    assert stepper.audience.answers.surplus == 0
+    assert stepper.application.answers.surplus == 0
     assert len(slow.seen) in (20, 21)
 
 
@@ -146,18 +146,18 @@ def test_a_slow_reader_beside_the_one_that_answers_sees_each_picture_once(toys: 
 @pytest.mark.parametrize("manner", [{}, {"pause": lambda _: 0.02}])
 def test_a_film_is_seen_to_its_last_picture_and_no_picture_twice(toys: Toys, manner: dict[str, Any]) -> None:
     toys.cast = {"film": lambda _, memory: Film(memory(), 5)}
-    toys.heard = (BOX,)
+    toys.relayed = (BOX,)
     application = toys.application("film", boxes=1, **manner)
     _, stepper = toys.run(application)
     assert application.seen == [1, 2, 3, 4, 5]
-    assert [number for _, number in toys.judge.boxes] == [1, 2, 3, 4, 5]
-    assert stepper.audience.frames == 5
+    assert [number for _, number in toys.evaluator.boxes] == [1, 2, 3, 4, 5]
+    assert stepper.application.frames == 5
 
 
 def test_the_test_time_is_limited(toys: Toys) -> None:
     toys.timeout = 5 * STEP
     application = toys.application()
-    with pytest.raises(TimedOut):
+    with pytest.raises(TimeOver):
         toys.run(application)
     assert len(application.seen) in (5, 6)
 
@@ -172,7 +172,7 @@ def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest
             return ()
 
     toys.cast = {**DRIVE, "mover": lambda session, _: Hangs(session)}
-    with pytest.raises(Stuck, match=r"^service 'mover' did not answer the clock within 0\.3 s$"):
+    with pytest.raises(ServiceSilent, match=r"^service 'mover' did not answer the clock within 0\.3 s$"):
         toys.run(toys.application())
 
 
@@ -192,21 +192,21 @@ def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: p
     monkeypatch.setattr(channel.Channel, "send", send)
     monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
     monkeypatch.setattr(exchange, "_SLICE", 0.01)
-    toys.judge = Judge(0.5)
+    toys.evaluator = ToyEvaluator(0.5)
     way, _ = toys.run(toys.application())
     assert close(way, expected(6))
 
 
 def test_silence_is_named_with_frame_and_message(toys: Toys) -> None:
     toys.patience = Patience(2.0, 0.2)
-    with pytest.raises(Unanswered) as caught:
+    with pytest.raises(ApplicationSilent) as caught:
         toys.run(toys.application(times=0))
     assert str(caught.value) == "the application did not answer frame 1 within 2 s (GroundSteeringRequest missing)"
 
 
 def test_an_end_in_the_middle_is_named(toys: Toys) -> None:
     toys.patience = Patience(2.0, 0.2)
-    with pytest.raises(Unanswered) as caught:
+    with pytest.raises(ApplicationSilent) as caught:
         toys.run(toys.application(most=7))
     assert (
         str(caught.value)
