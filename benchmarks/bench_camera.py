@@ -27,7 +27,7 @@ from services.virtual_camera.camera import Pinhole, Pose
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import Wishes, load_scene
+from services.virtual_camera.draw.scene import SceneOptions, load_scene
 from services.virtual_camera.image.lens import Distortion
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.sensor import Sensor
@@ -114,22 +114,22 @@ def beside(folder: Path, keep: Path | None) -> None:
             cv2.imwrite(str(keep / f"{number}-moderngl.png"), theirs(pose))
 
 
-CONDITIONS: dict[str, tuple[Wishes, dict[str, object]]] = {
-    "nothing": (Wishes(), {}),
-    "light": (Wishes(light=Light.asked(90, 30, 0.4)), {}),
-    "clutter of 40": (Wishes(clutter=40), {}),
-    "exposure": (Wishes(), {"sensor": Sensor(exposure=0.4)}),
-    "noise": (Wishes(), {"sensor": Sensor(noise=0.03)}),
-    "shutter 20 ms": (Wishes(), {"shutter": 0.02}),
-    "distortion": (Wishes(), {"distortion": Distortion(-0.25, 0.05)}),
-    "boxes": (Wishes(), {}),
+CONDITIONS: dict[str, tuple[SceneOptions, dict[str, object]]] = {
+    "nothing": (SceneOptions(), {}),
+    "light": (SceneOptions(light=Light.of_flags(90, 30, 0.4)), {}),
+    "clutter of 40": (SceneOptions(clutter=40), {}),
+    "exposure": (SceneOptions(), {"sensor": Sensor(exposure=0.4)}),
+    "noise": (SceneOptions(), {"sensor": Sensor(noise=0.03)}),
+    "shutter 20 ms": (SceneOptions(), {"shutter": 0.02}),
+    "distortion": (SceneOptions(), {"distortion": Distortion(-0.25, 0.05)}),
+    "boxes": (SceneOptions(), {}),
 }
 
 
 def condition(folder: Path, name: str) -> Callable[[Pose], object]:
-    wishes, parts = CONDITIONS[name]
+    options, parts = CONDITIONS[name]
     optics = Optics(Pinhole(*SIZE, FOVY), **parts)  # type: ignore[arg-type]
-    renderer = Renderer(load_scene(folder, wishes), optics.wide.width, optics.wide.height, optics.wide.fovy)
+    renderer = Renderer(load_scene(folder, options), optics.wide.width, optics.wide.height, optics.wide.fovy)
     truth = Truth(renderer, classes_of([], renderer.bodies.names), Limits()) if name == "boxes" else None
     out = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
 

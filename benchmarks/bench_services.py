@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
-from tests.services.gantry.fakerig import FakeRig
+from tests.services.gantry.fake_rig import FakeRig
 
 ROOT = Path(__file__).resolve().parents[1]
 CID = 126

@@ -13,7 +13,7 @@ from services.virtual_camera.camera import Pinhole, Pose
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import Wishes, load_scene
+from services.virtual_camera.draw.scene import SceneOptions, load_scene
 from services.virtual_camera.image.lens import Distortion
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.sensor import Sensor
@@ -25,15 +25,15 @@ SIZE, FOVY, COLUMNS = (288, 216), math.radians(48.8), 4
 LABEL = 24
 PLACE = Pose.at(0.0, 0.2, 0.095, yaw=math.pi / 2)
 MOTION = Motion(PLACE, np.array([0.0, 0.6, 0.0]), np.array([0.0, 0.0, 0.5]))
-SHEET: dict[str, tuple[Wishes, dict[str, object]]] = {
-    "normal": (Wishes(), {}),
-    "clutter=60": (Wishes(clutter=60, seed=1), {}),
-    "exposure=3": (Wishes(), {"sensor": Sensor(exposure=3.0)}),
-    "exposure=0.15": (Wishes(), {"sensor": Sensor(exposure=0.15)}),
-    "noise=0.06": (Wishes(), {"sensor": Sensor(noise=0.06)}),
-    "shutter=40ms": (Wishes(), {"shutter": 0.04}),
-    "k1=-0.4 k2=0.1, lines": (Wishes(lines=("left", "right")), {"distortion": Distortion(-0.4, 0.1)}),
-    "low light, boxes": (Wishes(light=Light.asked(-60, 20, 0.3)), {}),
+SHEET: dict[str, tuple[SceneOptions, dict[str, object]]] = {
+    "normal": (SceneOptions(), {}),
+    "clutter=60": (SceneOptions(clutter=60, seed=1), {}),
+    "exposure=3": (SceneOptions(), {"sensor": Sensor(exposure=3.0)}),
+    "exposure=0.15": (SceneOptions(), {"sensor": Sensor(exposure=0.15)}),
+    "noise=0.06": (SceneOptions(), {"sensor": Sensor(noise=0.06)}),
+    "shutter=40ms": (SceneOptions(), {"shutter": 0.04}),
+    "k1=-0.4 k2=0.1, lines": (SceneOptions(lines=("left", "right")), {"distortion": Distortion(-0.4, 0.1)}),
+    "low light, boxes": (SceneOptions(light=Light.of_flags(-60, 20, 0.3)), {}),
 }
 
 
@@ -45,9 +45,9 @@ def draw_boxes(picture: Image, renderer: Renderer) -> None:
 
 
 def tiles() -> Iterator[Image]:
-    for name, (wishes, parts) in SHEET.items():
+    for name, (options, parts) in SHEET.items():
         optics = Optics(Pinhole(*SIZE, FOVY), **parts)  # type: ignore[arg-type]
-        renderer = Renderer(load_scene(MAP, wishes), optics.wide.width, optics.wide.height, optics.wide.fovy)
+        renderer = Renderer(load_scene(MAP, options), optics.wide.width, optics.wide.height, optics.wide.fovy)
         picture = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
         optics.expose(renderer, MOTION, Pose.at(0, 0, 0), 1_000_000, picture)
         if "boxes" in name:

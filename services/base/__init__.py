@@ -1,4 +1,4 @@
-"""What all services share: flags from the manifest, the loop with its injected clock, readiness, verdicts."""
+"""Shared by all services: flags from the manifest, the loop with its injected clock, readiness, verdicts."""
 
 from services.base.clock import Clock, Inbox, RealTimeClock
 from services.base.evaluator import Evaluator, Span, UnjudgeableError

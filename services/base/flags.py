@@ -31,8 +31,8 @@ class FlagsError(ValueError):
 class Flags(Mapping[str, Any]):
     """Values by parameter name, defaults filled in; an optional parameter without default is None.
 
-    A ``number`` is a float, an ``integer`` an int, a ``list`` a list of strings, a ``boolean`` a bool, all else a
-    string; numbers are in the manifest's unit.
+    A ``number`` is a float, an ``integer`` an int, a ``list`` a list of strings, a ``boolean`` a bool, everything else
+    a string; numbers are in the manifest's unit.
     """
 
     values_by_name: Mapping[str, Any]
@@ -54,7 +54,7 @@ def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
     for word in argv:
         name, text = _split(word)
         if name not in known:
-            raise FlagsError(f"there is no flag '--{name}'{_near(name, known)}")
+            raise FlagsError(f"unknown flag '--{name}'{_near(name, known)}")
         if name in given:
             raise FlagsError(f"--{name} is given twice")
         given[name] = _value(name, known[name], text)
@@ -67,7 +67,7 @@ def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
 def _split(word: str) -> tuple[str, str | None]:
     match = _FLAG.fullmatch(word)
     if match is None:
-        raise FlagsError(f"'{word}' is no flag, expected --key=value")
+        raise FlagsError(f"'{word}' is not a flag, expected --key=value")
     return match["name"], match["value"]
 
 
@@ -78,7 +78,7 @@ def _default(about: About) -> Value:
 
 def _near(name: str, known: Mapping[str, object]) -> str:
     close = difflib.get_close_matches(name, [*known, "help"], n=1)
-    return f", did you mean '--{close[0]}'?" if close else "; --help shows all"
+    return f", did you mean '--{close[0]}'?" if close else "; --help lists all flags"
 
 
 def _value(name: str, about: About, text: str | None) -> Value:
@@ -91,7 +91,7 @@ def _value(name: str, about: About, text: str | None) -> Value:
     if value is None:
         raise FlagsError(f"--{name}={text} is not {_expected(about)}")
     if about.get("choices") and value not in about["choices"]:
-        raise FlagsError(f"--{name}={text} is none of {bounds(about)}")
+        raise FlagsError(f"--{name}={text} is not one of {bounds(about)}")
     if not _allowed(about, value):
         raise FlagsError(f"--{name}={text} is out of range, expected {bounds(about)}{unit(about)}")
     return value

@@ -1,4 +1,4 @@
-"""The manifest of a service as far as its own command line needs it; the compiler is what validates manifests."""
+"""The manifest of a service as far as its command line needs it; the compiler validates manifests."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 About = Mapping[str, Any]
-"""What a manifest says of one parameter."""
+"""A manifest's entry for one parameter."""
 
 COMMON: dict[str, About] = {
     "cid": {
@@ -23,15 +23,15 @@ COMMON: dict[str, About] = {
         "default": 0,
         "minimum": 0,
         "maximum": 4_294_967_295,
-        "help": "Sender stamp of what is sent, where no parameter says otherwise.",
+        "help": "Sender stamp of messages, where no parameter sets another.",
     },
     "log-id": {
         "type": "integer",
         "minimum": 0,
         "maximum": 4_294_967_295,
-        "help": "Sender stamp under which the log's lines are sent too, as LogMessage; without one they are not.",
+        "help": "Sender stamp under which log lines are also sent as LogMessage; by default they are not.",
     },
-    "verbose": {"type": "boolean", "default": False, "help": "Say more about what happens."},
+    "verbose": {"type": "boolean", "default": False, "help": "Log more."},
 }
 
 
@@ -47,12 +47,12 @@ def parameters(manifest: Mapping[str, Any]) -> dict[str, About]:
 
 
 def unit(about: About) -> str:
-    """`` Hz``, or nothing; shares, whose unit is 1, go without."""
+    """`` Hz``, or nothing; shares, whose unit is 1, have none."""
     return "" if about.get("unit") in (None, "", "1") else f" {about['unit']}"
 
 
 def bounds(about: About) -> str:
-    """What values are allowed: a range, choices, or nothing."""
+    """The allowed values: a range, choices, or nothing."""
     low, high = about.get("minimum"), about.get("maximum")
     if about.get("choices"):
         return ", ".join(about["choices"])
@@ -64,7 +64,7 @@ def bounds(about: About) -> str:
 
 
 def example(about: About) -> str:
-    """A value as one would write it on the flag."""
+    """An example value for a flag."""
     for value in (about.get("example"), about.get("default"), (about.get("choices") or [None])[0]):
         if isinstance(value, bool):
             return str(value).lower()

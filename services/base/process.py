@@ -24,9 +24,9 @@ DONE, BROKEN, USAGE = 0, 1, 2
 
 
 def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
-    """A service from its command line to its exit code: 0 done or told to stop, 1 broken, 2 wrong flags.
+    """A service from its command line to its exit code: 0 done or stopped by a signal, 1 broken, 2 wrong flags.
 
-    ``folder`` holds the manifest; ``build`` raises ValueError or OSError for flags that cannot be met.
+    ``folder`` holds the manifest; ``build`` raises ValueError or OSError for unusable flags.
     """
     words = sys.argv[1:] if argv is None else argv
     manifest = load_manifest(folder)
@@ -46,19 +46,19 @@ def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Cl
 
 
 class _Stop:
-    asked = False
+    requested = False
 
     def __call__(self) -> bool:
-        return self.asked
+        return self.requested
 
-    def ask(self, _number: int, _frame: FrameType | None) -> None:
-        self.asked = True
+    def request(self, _number: int, _frame: FrameType | None) -> None:
+        self.requested = True
 
 
 @contextmanager
 def _signals() -> Iterator[_Stop]:
     stop = _Stop()
-    old = {number: signal.signal(number, stop.ask) for number in (signal.SIGTERM, signal.SIGINT)}
+    old = {number: signal.signal(number, stop.request) for number in (signal.SIGTERM, signal.SIGINT)}
     try:
         yield stop
     finally:
@@ -71,7 +71,7 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
     ready = Path(os.environ.get("DODO_READY_FILE") or f"/tmp/dodo-ready-{role}")
     code = USAGE
     try:
-        ready.unlink(missing_ok=True)  # of one that was killed
+        ready.unlink(missing_ok=True)  # left by one that was killed
         with ExitStack() as resources:
             session = resources.enter_context(Session(flags["cid"], _messages()))
             resources.enter_context(published(session, flags["log-id"]))
@@ -98,7 +98,7 @@ def _messages() -> MessageSet:
 
 
 def _clock(session: Session, role: str) -> Clock:
-    """The test's clock, as ``DODO_CLOCK`` says."""
+    """The test's clock, by ``DODO_CLOCK``."""
     if os.environ.get("DODO_CLOCK") != "lockstep":
         return RealTimeClock()
     from services.base.lockstep.lockstep_clock import LockstepClock
@@ -108,7 +108,7 @@ def _clock(session: Session, role: str) -> Clock:
 
 @contextmanager
 def _readiness(file: Path) -> Iterator[None]:
-    """Say that the service is ready; the ready file is there as long as it is."""
+    """Report that the service is ready; the ready file exists as long as it is."""
     file.touch()
     try:
         print(READY, flush=True)

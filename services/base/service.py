@@ -1,4 +1,4 @@
-"""What a service is: a model with inputs and a period, built from flags."""
+"""The interface of services: a model with inputs and a period, built from flags."""
 
 import logging
 from collections.abc import Callable, Iterable, Mapping
@@ -34,8 +34,8 @@ class Service:
     """A model as the loop sees it; models override what they need.
 
     ``period`` is in microseconds of test time; None for a model that only messages drive, which is not updated.
-    ``inputs`` maps a message's name, and the sender stamp that counts (None for any), to what takes it; ``observe``
-    takes every envelope. Setting ``verdict`` (evaluators) or ``finished`` (sources, in ``update``) ends the service.
+    ``inputs`` maps a message's name and sender stamp (None for any) to its handler; ``observe`` gets every
+    envelope. Setting ``verdict`` (evaluators) or ``finished`` (sources, in ``update``) ends the service.
     Nothing in a model reads a clock, sleeps or touches the bus.
     """
 
@@ -45,22 +45,22 @@ class Service:
     verdict: Verdict | None = None
     finished: bool = False
     drive: Callable[[Callable[[], bool]], None] | None = None
-    """Instead of the loop: for the clock, which has nobody to step it. Takes whether it was told to stop."""
+    """Runs instead of the loop, for the clock service. Takes a function that says whether to stop."""
 
     def begin(self, now: int) -> None:
         """All services are ready: the test begins."""
 
     def update(self, now: int) -> Iterable[Message | Output | Envelope]:
-        """What there is to say at ``now``; it is sent with ``now`` as its sample time, an envelope as it is."""
+        """Messages to send at ``now``, which is their sample time; envelopes are sent unchanged."""
         return ()
 
     def end_of_input(self, now: int) -> None:
-        """A source has run out: evaluators decide with what they have."""
+        """A source has ended: evaluators decide."""
 
 
 @dataclass
 class Context:
-    """What a service is built from; shared memory made here is removed at the end."""
+    """What a service is built from; shared memory created here is removed at the end."""
 
     name: str
     flags: Flags
@@ -68,7 +68,7 @@ class Context:
     resources: ExitStack = field(default_factory=ExitStack)
     clock: Clock = field(default_factory=RealTimeClock)
     session: Session | None = None
-    """The bus itself; only for a service that drives itself."""
+    """The bus itself; only for a service with ``drive``."""
     on_rig: bool = False
     """Whether the test runs on a rig, where a service that vanishes may have been unplugged."""
 
@@ -86,5 +86,5 @@ Build = Callable[[Context], Service]
 
 
 def period_of(freq: float) -> Fraction:
-    """The period in microseconds of a rate in Hz, exactly: steps at 60 and at 30 Hz meet for ever."""
+    """The period in microseconds of a rate in Hz, exactly: steps at 60 and at 30 Hz stay aligned."""
     return max(Fraction(1), MICROSECONDS / Fraction(freq).limit_denominator(MICROSECONDS))

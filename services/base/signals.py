@@ -1,4 +1,4 @@
-"""Signals while a service is being built, which may take as long as hardware does."""
+"""Signals while a service is being built, which may wait for hardware."""
 
 import contextlib
 import signal
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """A signal ends the service at once with code 0, through all that is to be closed; only in the main thread."""
+    """A signal ends the service at once with code 0, and closes its resources; only in the main thread."""
 
     def leave(_number: int, _frame: object) -> None:
         raise SystemExit(0)

@@ -15,12 +15,12 @@ def help_text(manifest: Mapping[str, Any]) -> str:
     for name, about in known.items():
         lines += [f"  --{name}  ({_facts(about)})", f"      {about['help']}"]
     lines.append("  --help")
-    lines.append("      Say this.")
+    lines.append("      Show this help.")
     return "\n".join([*lines, "", f"example: {example_line(manifest)}"]) + "\n"
 
 
 def example_line(manifest: Mapping[str, Any]) -> str:
-    """A command that starts the service alone: with the manifest's example, or else what is required."""
+    """A command that starts the service alone: with the manifest's example, or else with required flags."""
     known = parameters(manifest)
     required = [f"--{name}={example(about)}" for name, about in known.items() if about.get("required")]
     words = [f"--cid={example(known['cid'])}", *manifest["example"]] if "example" in manifest else required

@@ -1,4 +1,4 @@
-"""What an evaluator found, and the one line that says so."""
+"""An evaluator's verdict, and the one line that reports it."""
 
 import json
 import math
@@ -18,7 +18,7 @@ class Check:
     ok: bool = True
 
     def as_json(self) -> dict[str, Any]:
-        """The check as it stands in the verdict line; numbers may come from numpy."""
+        """The check in the verdict line; numbers may come from numpy."""
         return {
             "name": self.name,
             "value": _number(self.value),
@@ -30,20 +30,20 @@ class Check:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Passed or failed, in one sentence, with what was measured; ``unheard`` when nothing of the application came."""
+    """Passed or failed, in one sentence, with checks; ``silent`` when nothing of the application came."""
 
     outcome: Literal["passed", "failed"]
     reason: str
     checks: tuple[Check, ...] = ()
-    unheard: bool = False
+    silent: bool = False
 
     def line(self, cid: int) -> str:
-        """The verdict line of design section 6, without its line break; ASCII, whatever the locale.
+        """The verdict line, without its line break; ASCII, whatever the locale.
 
-        An application that was not heard may well have talked on another bus, so the reason names the test's.
+        A silent application may have been on another bus, so the reason names the test's.
         """
         checks = [check.as_json() for check in self.checks]
-        reason = f"{self.reason}; the test is on CID {cid}" if self.unheard else self.reason
+        reason = f"{self.reason}; the test is on CID {cid}" if self.silent else self.reason
         message = {"dodo": "verdict", "outcome": self.outcome, "reason": reason, "checks": checks}
         return json.dumps(message, allow_nan=False)
 

@@ -1,4 +1,4 @@
-"""The beacon on the bus: poses along a way at a fixed rate."""
+"""The beacon on the bus: poses along a trajectory at a fixed rate."""
 
 import math
 from collections.abc import Iterator
@@ -8,18 +8,18 @@ from google.protobuf.message import Message
 
 from services.base import Context, Flags, Output, Service, period_of
 from services.beacon.table import read_points, read_table
-from services.beacon.way import Pose, Way, WayError, straight
+from services.beacon.trajectory import Pose, Trajectory, TrajectoryError, straight
 
 MICROSECONDS = 1_000_000
 
 
 class Beacon(Service):
-    """Stands at the start of its way until the test begins, and then moves along it."""
+    """Stands at the start of its trajectory until the test begins, and then moves along it."""
 
     def __init__(self, context: Context) -> None:
         flags = context.flags
         self.period = period_of(flags["freq"])
-        self.way = way_of(flags)
+        self.trajectory = trajectory_of(flags)
         self._hold: bool = flags["hold"]
         self._at_once: bool = flags["start"] == "at-once"
         self._started: int | None = None
@@ -35,9 +35,10 @@ class Beacon(Service):
     def update(self, now: int) -> Iterator[Output]:
         if self._at_once:
             self.begin(now)
-        pose = self.way.at(0.0) if self._started is None else self.way.at((now - self._started) / MICROSECONDS)
+        elapsed = 0 if self._started is None else now - self._started
         moving = self._started is not None
-        self.finished = moving and not self._hold and now - (self._started or 0) >= self.way.duration * MICROSECONDS
+        pose = self.trajectory.at(elapsed / MICROSECONDS)
+        self.finished = moving and not self._hold and elapsed >= self.trajectory.duration * MICROSECONDS
         half = pose.yaw / 2
         frame = self._frame(x=pose.x, y=pose.y, z=pose.z, qz=math.sin(half), qw=math.cos(half))
         yield Output(frame, self._frame_id)
@@ -50,16 +51,16 @@ class Beacon(Service):
         return state
 
 
-def way_of(flags: Flags) -> Way:
-    """The way that the flags tell; raises WayError."""
+def trajectory_of(flags: Flags) -> Trajectory:
+    """The trajectory that the flags describe; raises TrajectoryError."""
     named = [f"--{name}" for name in ("path", "points", "length") if flags[name]]
     if len(named) > 1:
-        raise WayError(f"{named[0]} and {named[1]} tell two ways, expected one of them")
+        raise TrajectoryError(f"{named[0]} and {named[1]} exclude each other: give one of them")
     height = flags["z"]
     if flags["path"]:
-        return Way(read_table(Path(flags["path"]), height), flags["speed"])
+        return Trajectory(read_table(Path(flags["path"]), height), flags["speed"])
     if flags["points"]:
-        return Way(read_points(flags["points"], height), flags["speed"])
+        return Trajectory(read_points(flags["points"], height), flags["speed"])
     yaw = math.radians(flags["yaw"])
     return straight(flags["x"], flags["y"], height, yaw, flags["length"], flags["speed"])
 

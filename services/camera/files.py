@@ -1,4 +1,4 @@
-"""Pictures that were taken before: of an image, a video or a recording, over and over."""
+"""Pictures from an image, a video or a recording, repeated."""
 
 import importlib
 from collections.abc import Iterator
@@ -16,17 +16,17 @@ IMAGE_READING = 1055
 
 
 class FileCamera:
-    """One picture of the file for each ``read``, in their order, and from the first again after the last."""
+    """One picture of the file for each ``read``, in order, and from the first again after the last."""
 
     def __init__(self, path: Path, width: int, height: int) -> None:
         """Pictures are scaled to ``width`` and ``height``; raises ValueError or OSError for a file without any."""
         if not path.is_file():
-            raise OSError(f"there is no file {path}")
+            raise OSError(f"there is no file '{path}'")
         self._path, self._size = path, (width, height)
         self._still = cv2.imread(str(path), cv2.IMREAD_COLOR) if cv2.haveImageReader(str(path)) else None
         first = next(self._begun(), None)
         if first is None:
-            raise ValueError(f"{path} holds no pictures, expected an image, a video or a recording")
+            raise ValueError(f"{path} has no pictures, expected an image, a video or a recording")
         self._left = chain([first], self._skipped()) if self._still is None else iter(())
 
     def read(self) -> Picture:
@@ -40,7 +40,7 @@ class FileCamera:
         return from_bgr(picture, *self._size)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._left = iter(())
 
     def _begun(self) -> Iterator[Image]:
@@ -70,7 +70,7 @@ def recorded(path: Path) -> Iterator[Image]:
         video = importlib.import_module("dodo_dsl.opendlv.video.decoder")
         reader = importlib.import_module("dodo_dsl.opendlv.recordings.recording")
     except ImportError as error:
-        raise ValueError(f"recordings cannot be shown here: {error}") from None
+        raise ValueError(f"recordings cannot be read here: {error}") from None
     from dodo_dsl.opendlv.messages.message_set import MessageSet
 
     messages, decoder, sender = MessageSet.standard(), None, None

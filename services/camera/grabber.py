@@ -1,4 +1,4 @@
-"""A camera that makes one wait is read in a thread, so that the service never waits for it."""
+"""Reads a camera in a thread, so that the service never waits for it."""
 
 import threading
 import time
@@ -19,12 +19,12 @@ class Camera(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Close the camera."""
         ...
 
 
 class Grabber:
-    """Keeps the newest picture of a camera; ``name`` is the camera's, for sentences."""
+    """Keeps the newest picture of a camera; ``name`` names it in errors."""
 
     def __init__(self, camera: Camera, name: str, silence: float = SILENCE) -> None:
         self._camera, self._name, self._silence = camera, name, silence
@@ -32,7 +32,7 @@ class Grabber:
         self._newest: Picture | None = None
         self._error: Exception | None = None
         self._closed = False
-        self._heard = time.monotonic()
+        self._last = time.monotonic()
         self._thread = threading.Thread(target=self._grab, daemon=True)
         self._thread.start()
 
@@ -45,17 +45,17 @@ class Grabber:
         """The newest picture, once; raises CameraError when the camera is lost or silent."""
         with self._changed:
             picture, self._newest = self._newest, None
-            error, heard = self._error, self._heard
+            error, last = self._error, self._last
         if picture is not None:
             return picture
         if error is not None:
             raise error
-        if time.monotonic() - heard > self._silence:
-            raise CameraError(f"the camera {self._name} has given no picture for {self._silence:g} s")
+        if time.monotonic() - last > self._silence:
+            raise CameraError(f"the camera {self._name} gave no picture for {self._silence:g} s")
         return None
 
     def close(self) -> None:
-        """Let go of the camera, without waiting long for one that hangs."""
+        """Close the camera, without waiting long for one that hangs."""
         self._closed = True
         self._camera.close()
         self._thread.join(JOIN_PATIENCE)
@@ -70,5 +70,5 @@ class Grabber:
                     self._changed.notify_all()
                 return
             with self._changed:
-                self._newest, self._heard = picture, time.monotonic()
+                self._newest, self._last = picture, time.monotonic()
                 self._changed.notify_all()

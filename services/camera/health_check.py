@@ -1,6 +1,6 @@
 """Whether a camera is alive and lit: ``python -m services.camera.health_check --source=...`` prints one JSON object.
 
-It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason`` says why) or cannot be looked at (``error``).
+It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason`` says why) or gives no picture (``error``).
 """
 
 import contextlib
@@ -27,26 +27,26 @@ BRIGHTNESS = 0.04, 0.97
 BLACK, WHITE = 16.0, 235.0
 """Of the Y plane (BT.601)."""
 SETTLED = 1.0
-"""s after the first picture from which on exposure and white balance have settled, and pictures are judged."""
+"""s after the first picture until exposure and white balance have settled."""
 CONTRAST = 0.02
 """Least standard deviation of brightness: a covered lens or a blown picture has less."""
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
-    """Takes a picture and judges it."""
+    """Take a picture, check it and print the result."""
     try:
         flags = parse(load_manifest(Path(__file__).parent), [*argv, "--cid=1"])
         with interruptible():
-            said = judged(looked(flags))
+            result = check(take_picture(flags))
     except CameraError as error:
-        said = {"ok": False, "reason": " ".join(str(error).split())}
+        result = {"ok": False, "reason": " ".join(str(error).split())}
     except (ValueError, OSError) as error:
-        said = {"ok": False, "error": " ".join(str(error).split())}
-    stdout.write(json.dumps(said) + "\n")
-    return 0 if said["ok"] else 1
+        result = {"ok": False, "error": " ".join(str(error).split())}
+    stdout.write(json.dumps(result) + "\n")
+    return 0 if result["ok"] else 1
 
 
-def judged(picture: Picture) -> dict[str, Any]:
+def check(picture: Picture) -> dict[str, Any]:
     """``ok``, ``reason``, and brightness and contrast as shares of white."""
     luma = (picture.i420[: picture.i420.shape[0] * 2 // 3] - BLACK) / (WHITE - BLACK)
     brightness, contrast = round(float(luma.mean()), 4), round(float(luma.std()), 4)
@@ -61,10 +61,10 @@ def judged(picture: Picture) -> dict[str, Any]:
     return {"ok": not reason, "reason": reason, "brightness": brightness, "contrast": contrast}
 
 
-def looked(flags: Flags) -> Picture:
+def take_picture(flags: Flags) -> Picture:
     """A picture of the camera that the flags name; raises ValueError and OSError, and CameraError when it is not alive.
 
-    A camera that lives has settled by then, and has shown another picture before.
+    A live camera has settled by then, and has shown another picture before.
     """
     camera = open_camera(flags)
     if isinstance(camera, FileCamera):
@@ -77,13 +77,13 @@ def looked(flags: Flags) -> Picture:
             first = _next(grabber, flags["source"])
         while (other := _next(grabber, flags["source"])) and np.array_equal(other.i420, first.i420):
             if time.monotonic() - end > SILENCE:
-                raise CameraError(f"the camera {flags['source']} has shown one and the same picture for {SILENCE:g} s")
+                raise CameraError(f"the camera {flags['source']} has shown the same picture for {SILENCE:g} s")
         return other
 
 
 def _next(grabber: Grabber, name: str) -> Picture:
     if not grabber.wait(SILENCE) or (picture := grabber.take()) is None:
-        raise CameraError(f"the camera {name} has given no picture for {SILENCE:g} s")
+        raise CameraError(f"the camera {name} gave no picture for {SILENCE:g} s")
     return picture
 
 

@@ -11,14 +11,14 @@ Image = NDArray[np.uint8]
 
 
 class CameraError(RuntimeError):
-    """The camera has no more pictures to give; one sentence."""
+    """The camera gives no pictures any more; one sentence."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
     """``argb`` (height, width, 4), ``i420`` (height * 3 / 2, width) and when it was taken (us since the epoch).
 
-    A picture that was not taken now, as of a file, has no time.
+    A picture from a file has no time.
     """
 
     argb: Image

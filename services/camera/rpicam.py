@@ -28,10 +28,10 @@ class RpiCamera:
         """
         if width % ALIGNED or height % 2:
             raise ValueError(
-                f"rpicam needs a width that is a multiple of {ALIGNED} and an even height, not {width} x {height}"
+                f"expected a width that is a multiple of {ALIGNED} and an even height, not {width} x {height}"
             )
         if shutil.which(PROGRAM) is None:
-            raise OSError(f"the program {PROGRAM} is not there, expected it on PATH (package rpicam-apps)")
+            raise OSError(f"there is no program '{PROGRAM}' on PATH, expected it from the package rpicam-apps")
         self._shape, self._size = (height * 3 // 2, width), width * height * 3 // 2
         self._closed = threading.Event()
         self._process = subprocess.Popen(
@@ -42,8 +42,8 @@ class RpiCamera:
         )
         assert self._process.stdout is not None
         self._pipe = self._process.stdout.fileno()
-        self._words, self._busy = b"", threading.Lock()
-        self._stderr = threading.Thread(target=self._listen, daemon=True)
+        self._stderr_end, self._busy = b"", threading.Lock()
+        self._stderr = threading.Thread(target=self._read_stderr, daemon=True)
         self._stderr.start()
 
     def read(self) -> Picture:
@@ -74,24 +74,24 @@ class RpiCamera:
                     pipe.close()
 
     def _readable(self) -> bool:
-        """Wait for bytes or the end of the pipe, but not on after `close`."""
+        """Wait for bytes or the end of the pipe, until ``close``."""
         while not self._closed.is_set():
             if select.select([self._pipe], [], [], 0.1)[0]:
                 return True
         return False
 
-    def _listen(self) -> None:
-        """Keep the end of what the program says, which tells why it ended."""
+    def _read_stderr(self) -> None:
+        """Keep the end of the program's log, which says why it ended."""
         assert self._process.stderr is not None
         with contextlib.suppress(ValueError):
             for line in self._process.stderr:
-                self._words = line.strip() or self._words
+                self._stderr_end = line.strip() or self._stderr_end
 
     def _why(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(PATIENCE)
         self._stderr.join(PATIENCE)
-        words = self._words.decode("utf-8", "replace")
+        words = self._stderr_end.decode("utf-8", "replace")
         return f"{PROGRAM} ended with code {self._process.returncode}" + (f": {words}" if words else "")
 
 

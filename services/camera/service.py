@@ -10,20 +10,25 @@ from services.camera.files import FileCamera
 from services.camera.grabber import SILENCE, Camera, Grabber
 from services.camera.picture import CameraError, Image, Picture
 from services.camera.rpicam import RpiCamera
-from services.camera.telemetry import Report
+from services.camera.telemetry import CameraTelemetry
 from services.camera.v4l2 import V4l2Camera
 
-EMULATED = "--source=emulated is the camera of `rig: emulated`, for which virtual-camera is started in its place"
+EMULATED = "--source=emulated is the camera of 'rig: emulated', which virtual-camera replaces"
 
 
 class CameraService(Service):
-    """Shares the newest picture at each instant of its rate, and none twice; ``report`` says that it does."""
+    """Shares the newest picture at each instant of its rate, and none twice; ``telemetry`` reports its state."""
 
     def __init__(
-        self, camera: Grabber | FileCamera, argb: SharedMemory, i420: SharedMemory, freq: float, report: Report
+        self,
+        camera: Grabber | FileCamera,
+        argb: SharedMemory,
+        i420: SharedMemory,
+        freq: float,
+        telemetry: CameraTelemetry,
     ) -> None:
         self.period = period_of(freq)
-        self._camera, self._argb, self._i420, self._report = camera, argb, i420, report
+        self._camera, self._argb, self._i420, self._telemetry = camera, argb, i420, telemetry
         self.shared = 0
         """How many pictures were shared."""
 
@@ -34,11 +39,11 @@ class CameraService(Service):
             share(self._argb, picture.argb, time)
             share(self._i420, picture.i420, time)
             self.shared += 1
-        return self._report.say(picture is not None, now)
+        return self._telemetry.update(picture is not None, now)
 
 
 def share(memory: SharedMemory, image: Image, time: int) -> None:
-    """Copy an image and stamp it under the lock, and then tell those who wait."""
+    """Copy an image and stamp it under the lock, then notify readers."""
     with memory.lock():
         memory.buffer[: image.nbytes] = image.data.cast("B")
         memory.stamp(time)
@@ -51,18 +56,20 @@ def open_camera(flags: Flags) -> Camera:
     if source == "emulated":
         raise ValueError(EMULATED)
     if source == "file" and not flags["file"]:
-        raise ValueError("--file is missing: the picture, video or recording that the source file shows")
+        raise ValueError("--file is missing: the picture, video or recording for --source=file")
     path = Path(flags["file"] if source == "file" else source)
     if source == "file" or (not source.startswith("/dev/") and path.is_file()):
         return FileCamera(path, width, height)
     if flags["exposure"] * flags["freq"] > 1 + 1e-9:
-        fits = f"{1 / flags['freq']:g} s between two pictures"
-        raise ValueError(f"--exposure={flags['exposure']:g} does not fit into the {fits}")
+        fits = f"the {1 / flags['freq']:g} s between two pictures"
+        raise ValueError(f"--exposure={flags['exposure']:g} does not fit into {fits}")
     if source == "rpicam":
         return RpiCamera(width, height, flags["freq"], flags["exposure"])
     if source.startswith("/dev/"):
         return V4l2Camera(path, width, height, flags["freq"], flags["exposure"])
-    raise ValueError(f"--source={source} is no camera, expected a device such as /dev/video0, rpicam, file or emulated")
+    raise ValueError(
+        f"--source={source} is not a camera, expected a device such as /dev/video0, rpicam, file or emulated"
+    )
 
 
 def build(context: Context) -> Service:
@@ -73,17 +80,19 @@ def build(context: Context) -> Service:
         raise ValueError(f"--width={width} and --height={height} must be even for I420")
     argb = context.memory(flags["name.argb"], width * height * 4)
     i420 = context.memory(flags["name.i420"], width * height * 3 // 2)
-    report = Report(context.messages, flags["status-id"], 2 * max(period_of(freq), round(flags["exposure"] * 1e6)))
+    telemetry = CameraTelemetry(
+        context.messages, flags["status-id"], 2 * max(period_of(freq), round(flags["exposure"] * 1e6))
+    )
     camera = open_camera(flags)
     for note in getattr(camera, "notes", ()):
         context.log.warning("%s", note)
     if isinstance(camera, FileCamera):
         context.resources.callback(camera.close)
-        return CameraService(camera, argb, i420, freq, report)
+        return CameraService(camera, argb, i420, freq, telemetry)
     silence = max(SILENCE, 2 * flags["exposure"])
     grabber = Grabber(camera, flags["source"], silence)
     context.resources.callback(grabber.close)
     with interruptible():
         if not grabber.wait(silence):
-            raise CameraError(f"the camera {flags['source']} has given no picture for {silence:g} s")
-    return CameraService(grabber, argb, i420, freq, report)
+            raise CameraError(f"the camera {flags['source']} gave no picture for {silence:g} s")
+    return CameraService(grabber, argb, i420, freq, telemetry)

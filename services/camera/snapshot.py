@@ -1,8 +1,7 @@
 """A picture of a camera: ``python -m services.camera.snapshot --output=FILE --source=...`` writes it as a PNG.
 
-It takes the camera's flags and prints one JSON object: what `services.camera.health_check` says of the picture, its
-``width`` and ``height``. Exit codes: 0 it is written, also when it is not fit (``reason``); 1 there is none
-(``error``).
+It takes the camera's flags and prints one JSON object: the result of ``services.camera.health_check``, its ``width``
+and ``height``. Exit codes: 0 written, even if it fails the check (``reason``); 1 no picture (``error``).
 """
 
 import json
@@ -16,37 +15,37 @@ import cv2
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.base.signals import interruptible
-from services.camera.health_check import judged, looked
+from services.camera.health_check import check, take_picture
 from services.camera.picture import CameraError
 
 OUTPUT = "--output="
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
-    """Takes a picture and writes it; what became of it is printed."""
+    """Take a picture, write it and print the result."""
     try:
-        said = taken(argv)
+        result = write_picture(argv)
     except (ValueError, OSError, CameraError) as error:
-        said = {"ok": False, "error": " ".join(str(error).split())}
-    stdout.write(json.dumps(said) + "\n")
-    return int("error" in said)
+        result = {"ok": False, "error": " ".join(str(error).split())}
+    stdout.write(json.dumps(result) + "\n")
+    return int("error" in result)
 
 
-def taken(argv: Sequence[str]) -> dict[str, Any]:
-    """What there is to say of the picture that was written; raises ValueError, OSError and CameraError."""
+def write_picture(argv: Sequence[str]) -> dict[str, Any]:
+    """Facts about the picture that was written; raises ValueError, OSError and CameraError."""
     outputs = [word.removeprefix(OUTPUT) for word in argv if word.startswith(OUTPUT)]
     if len(outputs) != 1:
         raise ValueError(f"expected {OUTPUT}FILE once: the PNG to write")
     words = [word for word in argv if not word.startswith(OUTPUT)]
     flags = parse(load_manifest(Path(__file__).parent), [*words, "--cid=1"])
     with interruptible():
-        picture = looked(flags)
+        picture = take_picture(flags)
     done, png = cv2.imencode(".png", picture.argb[..., :3])
     if not done:
         raise OSError("the picture cannot be encoded as a PNG")
     Path(outputs[0]).write_bytes(png.tobytes())
     height, width = picture.argb.shape[:2]
-    return {**judged(picture), "width": width, "height": height}
+    return {**check(picture), "width": width, "height": height}
 
 
 if __name__ == "__main__":

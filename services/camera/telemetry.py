@@ -1,4 +1,4 @@
-"""How the camera does, for those who watch the bus."""
+"""The camera's state, for observers of the bus."""
 
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Output
@@ -6,10 +6,10 @@ from services.base import Output
 STATES = ("the camera gives pictures", "the camera gives no picture")
 """Descriptions by code."""
 SHORTEST = 1_000_000
-"""us without a picture before which none is missed."""
+"""us without a picture that never count as a loss."""
 
 
-class Report:
+class CameraTelemetry:
     """A SystemStatusMessage at first and whenever the state changes; none without a sender stamp.
 
     ``patience`` in us: for how long there may be no picture, if that is more than 1 s.
@@ -21,8 +21,8 @@ class Report:
         self._seen: int | None = None
         self._code: int | None = None
 
-    def say(self, has_picture: bool, now: int) -> tuple[Output, ...]:
-        """What there is to say of an instant (us) at which a picture was there or not."""
+    def update(self, has_picture: bool, now: int) -> tuple[Output, ...]:
+        """Messages at an instant (us) at which there was a picture or not."""
         if has_picture or self._seen is None:
             self._seen = now
         code = int(now - self._seen > self._patience)

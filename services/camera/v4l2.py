@@ -18,14 +18,14 @@ PATIENCE = 2.0
 
 
 class V4l2Camera:
-    """``read`` waits for a picture; ``notes`` says what the device would not take."""
+    """``read`` waits for a picture; ``notes`` are settings that the device refused."""
 
     def __init__(self, device: Path, width: int, height: int, freq: float, exposure: float) -> None:
-        """``freq`` in Hz, ``exposure`` in s; raises OSError for what is no camera."""
+        """``freq`` in Hz, ``exposure`` in s; raises OSError for a device that is not a camera."""
         if not device.exists():
             raise OSError(f"there is no camera {device}; is it plugged in?")
         if not stat.S_ISCHR(device.stat().st_mode):
-            raise OSError(f"{device} is no V4L2 device")
+            raise OSError(f"{device} is not a V4L2 device")
         self._busy = threading.Lock()
         self._device, self._width, self._height = device, width, height
         self._capture: Any = cv2.VideoCapture(str(device), cv2.CAP_V4L2)
@@ -49,11 +49,11 @@ class V4l2Camera:
             good, image = self._capture.read()
         now = time.time_ns() // 1000
         if not good or image is None:
-            raise CameraError(f"the camera {self._device} gives no more pictures; is it still plugged in?")
+            raise CameraError(f"the camera {self._device} gives no pictures any more; is it still plugged in?")
         return from_bgr(image, self._width, self._height, now)
 
     def close(self) -> None:
-        """Let go of the device, if it does not hang; its driver does so at the end of the process."""
+        """Close the device unless it hangs; its driver does so at the end of the process."""
         if self._busy.acquire(timeout=PATIENCE):
             self._capture.release()
             self._busy.release()
@@ -62,12 +62,12 @@ class V4l2Camera:
         get, notes = self._capture.get, []
         size = int(get(cv2.CAP_PROP_FRAME_WIDTH)), int(get(cv2.CAP_PROP_FRAME_HEIGHT))
         if size != (self._width, self._height):
-            notes.append(f"{self._device} gives {size[0]} x {size[1]} pixels, which are scaled")
+            notes.append(f"{self._device} gives {size[0]} x {size[1]} pixels, scaled to {self._width} x {self._height}")
         exposed = get(cv2.CAP_PROP_EXPOSURE) * EXPOSURE_UNIT
         for what, has, wanted, unit in (
             ("exposure", exposed, exposure, "s"),
             ("rate", get(cv2.CAP_PROP_FPS), freq, "Hz"),
         ):
             if abs(has - wanted) > WARNING_SHARE * wanted:
-                notes.append(f"{self._device} does not take the {what} of {wanted:g} {unit}: it has {has:g}")
+                notes.append(f"{self._device} refuses the {what} of {wanted:g} {unit} and has {has:g}")
         return notes

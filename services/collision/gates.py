@@ -1,4 +1,4 @@
-"""Gates: lines that the vehicle's centre has to cross one after the other. Metres, world frame."""
+"""Gates: lines that the vehicle's centre has to cross in order. Metres, world frame."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,7 +12,7 @@ Gate = tuple[str, shapely.MultiLineString]
 class Gates:
     """Counts the gates crossed, in either direction and in their order; a gate out of turn does not count.
 
-    The name of a gate may stand more than once, for a course of several laps.
+    A gate may appear more than once, for several laps.
     """
 
     def __init__(self, gates: Sequence[Gate]) -> None:
@@ -24,13 +24,13 @@ class Gates:
 
     @property
     def next(self) -> Gate | None:
-        """The gate that is to be crossed next; None when all were."""
+        """The next gate; None when all were crossed."""
         return self._gates[self.crossed] if self.crossed < len(self) else None
 
     def move(self, start: Pose, end: Pose) -> float | None:
-        """The centre went straight from one pose to the next.
+        """The centre moved straight from one pose to the next.
 
-        Returns the share of this way after which all gates were crossed, None while some are left.
+        Returns the share of this path after which all gates were crossed, None while some are left.
         """
         reached = 0.0 if self.next is None else -1.0
         while self.next is not None:
@@ -43,9 +43,9 @@ class Gates:
 
 
 def crossings(lines: shapely.MultiLineString, start: Pose, end: Pose) -> Iterator[float]:
-    """The shares of the way from one pose to the next at which it crosses lines.
+    """The shares of the path from one pose to the next at which it crosses lines.
 
-    Every point is on one side of a line: one that lies on it counts as left of it. So a way made of several
+    Every point is on one side of a line: one that lies on it counts as left of it. So a path of several
     moves crosses a line exactly as often as its ends say, wherever the moves begin and end.
     """
     for (x1, y1), (x2, y2) in (segment for line in lines.geoms for segment in _segments(line)):

@@ -1,4 +1,4 @@
-"""A vehicle as a rectangle on the ground, and what it covers on its way. Metres and rad, world frame."""
+"""A vehicle as a rectangle on the ground, and the area it covers when it moves. Metres and rad, world frame."""
 
 import math
 from dataclasses import dataclass
@@ -57,13 +57,14 @@ def swept(start: Pose, end: Pose, box: Box) -> shapely.Geometry:
     """
     change = math.remainder(end.heading - start.heading, math.tau)
     parts = max(1, math.ceil(abs(change) / TURN))
-    ways = [index / parts for index in range(parts + 1)]
-    rings = [corners(between(start, end, way), box) for way in ways]
+    shares = [index / parts for index in range(parts + 1)]
+    rings = [corners(between(start, end, share), box) for share in shares]
     hulls = [shapely.MultiPoint(a + b).convex_hull for a, b in pairwise(rings)]
     return hulls[0] if parts == 1 else shapely.union_all(hulls)
 
 
-def between(start: Pose, end: Pose, way: float) -> Pose:
-    """The pose after a share of the way from one pose to the next, turned the shorter way round."""
+def between(start: Pose, end: Pose, share: float) -> Pose:
+    """The pose after a share of the path from one pose to the next, turned the shorter way round."""
     change = math.remainder(end.heading - start.heading, math.tau)
-    return Pose(start.x + way * (end.x - start.x), start.y + way * (end.y - start.y), start.heading + way * change)
+    x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
+    return Pose(x, y, start.heading + share * change)

@@ -1,4 +1,4 @@
-"""What is measured while the vehicle drives, and the checks made of it."""
+"""Measures taken while the vehicle drives, and the checks made of them."""
 
 import math
 from dataclasses import dataclass
@@ -40,9 +40,9 @@ class Measures:
 
     @staticmethod
     def gate_check(crossed: int, gates: int) -> Check:
-        """The gates crossed in their order: all of them are to be."""
+        """The gates crossed in order; all of them are required."""
         return Check("gates", crossed, {"min": gates}, "", crossed == gates)
 
     def drive_checks(self) -> tuple[Check, Check]:
-        """What has no limit."""
+        """Measures without a limit."""
         return Check("distance", self.distance, {}, "m", True), Check("max-speed", self.max_speed, {}, "m/s", True)

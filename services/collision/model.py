@@ -103,7 +103,7 @@ class TrackEvaluator(Evaluator):
         aside = f"; the application sent no {silent[0]}" if silent else ""
         if len(silent) == len(REQUESTS):
             reason = f"the application sent no {' and no '.join(silent)} {span.within}"
-            return self._verdict("failed", reason, unheard=True)
+            return self._verdict("failed", reason, silent=True)
         if self.track.goal or self.track.gates:
             return self._verdict("failed", f"{self._missed(self._last[1], span.within)}{aside}")
         return self._verdict("passed", f"stayed clear of {' and '.join(self.track.walls)} {span.throughout}{aside}")
@@ -116,9 +116,9 @@ class TrackEvaluator(Evaluator):
         early = f"; {next(iter(self.track.goal))} does not count before the gates" if self._early else ""
         return f"crossed {self._gates.crossed} of {len(self._gates)} gates {within}: {away} {name}, the next{early}"
 
-    def _verdict(self, outcome: Literal["passed", "failed"], reason: str, unheard: bool = False) -> Verdict:
+    def _verdict(self, outcome: Literal["passed", "failed"], reason: str, silent: bool = False) -> Verdict:
         track, measures = self.track, self._measures
         goal = (measures.goal_check(track.max_time),) if track.goal or track.gates else ()
         gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
         walls = (measures.wall_check(track.min_margin),) if track.walls else ()
-        return Verdict(outcome, reason, (*goal, *gates, *walls, *measures.drive_checks()), unheard)
+        return Verdict(outcome, reason, (*goal, *gates, *walls, *measures.drive_checks()), silent)

@@ -13,7 +13,7 @@ NUMBERS = 4
 
 
 class MapError(ValueError):
-    """A map that cannot be read, or that lacks an obstacle; the text names the file and the place."""
+    """A map that cannot be read, or that lacks an obstacle; the message names file and place."""
 
 
 def load(path: Path) -> dict[str, shapely.MultiLineString]:
@@ -40,7 +40,7 @@ def load(path: Path) -> dict[str, shapely.MultiLineString]:
 def pick(
     obstacles: dict[str, shapely.MultiLineString], names: Sequence[str], parameter: str, path: Path
 ) -> dict[str, shapely.MultiLineString]:
-    """Those obstacles that a parameter names, prepared for many questions; MapError for a name not there."""
+    """Those obstacles that a parameter names, prepared for many queries; MapError for an unknown name."""
     chosen = {}
     for name in names:
         if name not in obstacles:

@@ -60,17 +60,17 @@ class Collision(TrackEvaluator):
 
 
 def track(flags: Flags) -> Track:
-    """The obstacles that the flags name, from the map; raises MapError, and ValueError for what makes no track."""
+    """The obstacles that the flags name, from the map; raises MapError, and ValueError for flags that make no track."""
     path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
     if not goal and not walls and not gates:
-        raise ValueError("there is nothing to judge by: give --goal, --gates or --walls")
+        raise ValueError("nothing to judge: give --goal, --gates or --walls")
     if goal in walls:
         raise ValueError(f"--goal={goal} is one of the --walls too")
     for name in gates:
         if name in walls:
             raise ValueError(f"{name} of --gates is one of the --walls too")
     if flags["min-margin"] and not walls:
-        raise ValueError("--min-margin is a distance to --walls, of which there are none")
+        raise ValueError("--min-margin needs --walls")
     obstacles = load(path)
     picked = pick(obstacles, gates, "gates", path)
     return Track(

@@ -1,4 +1,4 @@
-"""What a vehicle is judged by: the obstacles of a map by what they are for."""
+"""The track by which a vehicle is judged: the obstacles of a map by their purpose."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ Obstacles = Mapping[str, shapely.MultiLineString]
 
 @dataclass(frozen=True)
 class Track:
-    """What may not be touched, and what is to be reached; `gates` are to be crossed before, in their order.
+    """Walls must not be touched, and the goal be reached; ``gates`` have to be crossed before, in order.
 
-    Obstacles by name in m, `max_time` in s. The vehicle keeps `min_margin` m away from walls; with 0 it only may
-    not touch them.
+    Obstacles by name in m, `max_time` in s. The vehicle keeps ``min_margin`` m away from walls; with 0 it only
+    must not touch them.
     """
 
     walls: Obstacles
@@ -37,7 +37,7 @@ def nearest(obstacles: Obstacles, area: shapely.Geometry) -> tuple[float, str] |
 
 
 def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
-    """What is wrong with a test whose vehicle covers this area when it is first seen; None for nothing."""
+    """What is wrong with a test whose vehicle covers this area at first; None if nothing."""
     ends = {} if track.gates else track.goal  # a lap may begin on the line where it ends
     for kind, obstacles in (("wall", track.walls), ("goal", ends)):
         name = touched(obstacles, area)
@@ -51,5 +51,5 @@ def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
 
 
 def place(pose: Pose) -> str:
-    """Where the vehicle is, as it stands in sentences."""
+    """The vehicle's position for sentences."""
     return f"at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"

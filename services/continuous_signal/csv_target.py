@@ -34,12 +34,14 @@ def read_table(path: Path, field: str, from_first: bool) -> Target:
 
 
 def _columns(header: Sequence[str], field: str, path: Path) -> tuple[int, int, int]:
-    """Where time and value stand, and how many columns there are."""
+    """The columns of time and value, and the number of columns."""
     names = [name.strip() for name in header]
     value = next((name for name in (field, VALUE) if name in names and name != TIME), None)
     if TIME not in names or value is None:
-        told = ", ".join(names) or "nothing"
-        raise TargetError(f"{path}:1: expected a header with the columns {TIME} and {field} (or {VALUE}), found {told}")
+        found = ", ".join(names) or "nothing"
+        raise TargetError(
+            f"{path}:1: expected a header with the columns {TIME} and {field} (or {VALUE}), found {found}"
+        )
     return names.index(TIME), names.index(value), len(names)
 
 
@@ -56,7 +58,7 @@ def _samples(rows: Iterator[list[str]], columns: tuple[int, int, int], path: Pat
         if abs(time) > LATEST:
             raise TargetError(f"{place}: the time {time} s is out of range")
         if last is not None and _micros(time) <= _micros(last):
-            what = f"the time {time} s comes twice" if time == last else f"the time {time} s comes after {last} s"
+            what = f"the time {time} s appears twice" if time == last else f"the time {time} s comes after {last} s"
             raise TargetError(f"{place}: {what}, expected times that increase by at least a microsecond")
         last = time
         yield _micros(time), float(value)
@@ -66,9 +68,9 @@ def _number(text: str, what: str) -> Decimal:
     try:
         number = Decimal(text.strip())
     except InvalidOperation:
-        raise TargetError(f"{what} '{text.strip()}' is no number") from None
+        raise TargetError(f"{what} '{text.strip()}' is not a number") from None
     if not number.is_finite() or abs(float(number)) == float("inf"):
-        raise TargetError(f"{what} '{text.strip()}' is no finite number")
+        raise TargetError(f"{what} '{text.strip()}' is not a finite number")
     return number
 
 

@@ -11,7 +11,7 @@ from services.continuous_signal.target import MICROSECONDS, Target, Times, Value
 
 @dataclass(frozen=True)
 class Limits:
-    """What is asked of a signal, in its own unit; None asks nothing.
+    """Limits of a signal, in its own unit; None for no limit.
 
     `start` and `until` are the window of time that is judged, in microseconds, both included; at least `samples`
     have to be judged.
@@ -38,12 +38,12 @@ class Worst:
 
 @dataclass(frozen=True)
 class Measures:
-    """The distances d of `samples` samples; `heard` counts all in the window, `outside` those without a target.
+    """The distances d of `samples` samples; `received` counts all in the window, `outside` those without a target.
 
     `broken` holds the times (s) of those in the window that are not finite. Without a sample all else is None.
     """
 
-    heard: int
+    received: int
     samples: int
     outside: int
     broken: tuple[float, ...]
@@ -84,7 +84,7 @@ def measure(target: Target, times: Times, values: Values, limits: Limits) -> Mea
     distances: Values = np.abs(values - expected)
     at = int(np.argmax(distances))
     return Measures(
-        heard=len(known),
+        received=len(known),
         samples=samples,
         outside=outside,
         broken=broken,

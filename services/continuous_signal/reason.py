@@ -8,12 +8,12 @@ _NAMES = {"mean": "the mean distance", "std": "the standard deviation", "distanc
 
 
 def verdict(signal: str, target: Target, measures: Measures, limits: Limits, during: str) -> Verdict:
-    """Passed when every limit is kept; `during` says until when was heard."""
+    """Passed when every limit is kept; ``during`` is the observed time in words."""
     checks = measures.checks(limits)
     faults = [] if measures.samples else [_nothing(signal, target, measures, during)]
     faults += [] if faults else [_fault(check, measures, limits) for check in checks if not check.ok]
     if faults:
-        return Verdict("failed", "; ".join(faults) + _worst(measures), checks, unheard=not measures.heard)
+        return Verdict("failed", "; ".join(faults) + _worst(measures), checks, silent=not measures.received)
     kept = [
         f"{check.name} {_number(check.value)} ({_bound(check)})"
         for check in checks
@@ -24,14 +24,14 @@ def verdict(signal: str, target: Target, measures: Measures, limits: Limits, dur
 
 
 def _nothing(signal: str, target: Target, measures: Measures, during: str) -> str:
-    if not measures.heard:
+    if not measures.received:
         return f"no sample of {signal} came {during}"
     if measures.broken:
         return (
             f"{signal} was not a finite number in {_times(len(measures.broken))}, first at {measures.broken[0]:.2f} s"
         )
     begin, end = target.span
-    return f"none of {measures.heard} samples of {signal} is from the target's time, {begin:.2f} s to {end:.2f} s"
+    return f"none of {measures.received} samples of {signal} is from the target's time, {begin:.2f} s to {end:.2f} s"
 
 
 def _fault(check: Check, measures: Measures, limits: Limits) -> str:
@@ -40,14 +40,14 @@ def _fault(check: Check, measures: Measures, limits: Limits) -> str:
         aside = f", and {measures.outside} outside the target's time" if measures.outside else ""
         return f"only {value} samples came ({bound}){aside}"
     if check.name == "broken":
-        return f"{value} samples are no finite number, the first at {measures.broken[0]:.2f} s"
+        return f"{value} samples are not finite numbers, the first at {measures.broken[0]:.2f} s"
     if check.name == "share":
         return f"the share of samples within {_number(limits.band)} of the target is {value} ({bound})"
     return f"{_NAMES[check.name]} is {value} ({bound})"
 
 
 def _value(check: Check) -> str:
-    """In full where rounding would make it look as if it kept its limit."""
+    """In full where rounding would hide that it broke its limit."""
     short = _number(check.value)
     return str(check.value) if short in map(_number, check.limit.values()) else short
 
@@ -56,7 +56,7 @@ def _worst(measures: Measures) -> str:
     worst = measures.worst
     if worst is None:
         return ""
-    return f"; worst at {worst.time:.2f} s: {_number(worst.value)}, and the target {_number(worst.target)}"
+    return f"; worst at {worst.time:.2f} s: {_number(worst.value)} with a target of {_number(worst.target)}"
 
 
 def _bound(check: Check) -> str:

@@ -68,7 +68,7 @@ def _target(flags: Flags, signal: Signal, messages: MessageSet) -> Target | None
 
 def _limits(flags: Flags) -> Limits:
     if all(flags[name] is None for name in REQUIRED):
-        raise ValueError(f"there is no limit to judge by: give one or more of --{', --'.join(REQUIRED)}")
+        raise ValueError(f"there is no limit: give one or more of --{', --'.join(REQUIRED)}")
     if flags["min-share"] is not None and flags["band"] is None:
         raise ValueError("--min-share needs --band, the distance that counts as inside")
     until = flags["until"]

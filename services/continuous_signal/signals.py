@@ -1,4 +1,4 @@
-"""Which field of which message a signal is, and its values."""
+"""A signal: a field of a message."""
 
 import difflib
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Signal:
 
 
 def check(signal: Signal, messages: MessageSet) -> Signal:
-    """The signal itself; raises UnknownMessage, and ValueError for a field that is not there or no number."""
+    """The signal itself; raises UnknownMessage, and ValueError for a field that is unknown or not a number."""
     fields = {field.name: field for field in messages.type(signal.message).DESCRIPTOR.fields}
     field = fields.get(signal.field)
     if field is None:
@@ -36,5 +36,5 @@ def check(signal: Signal, messages: MessageSet) -> Signal:
         hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(fields) or 'none'}"
         raise ValueError(f"{signal.message} has no field '{signal.field}'; {hint}")
     if field.cpp_type in _NO_NUMBERS:
-        raise ValueError(f"the field {signal.field} of {signal.message} is no number")
+        raise ValueError(f"the field {signal.field} of {signal.message} is not a number")
     return signal

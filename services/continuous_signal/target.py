@@ -14,7 +14,7 @@ Values = NDArray[np.float64]
 
 
 class TargetError(ValueError):
-    """A target that cannot be used; the text names the file and the place."""
+    """A target that cannot be used; the message names file and place."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import yaml
 
 
 class CarError(ValueError):
-    """A file that is no car; one sentence with file and line."""
+    """A file that does not describe a car; one sentence with file and line."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ _ANY = ("steering-gain",)
 
 
 def read_car(path: Path) -> Car:
-    """The car of a YAML or JSON file, the Kiwi's where the file says nothing; raises CarError."""
+    """The car of a YAML or JSON file, the Kiwi's for parameters that it omits; raises CarError."""
     try:
         node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
     except OSError as error:
@@ -77,13 +77,13 @@ def read_car(path: Path) -> Car:
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{path}:{mark.line + 1}" if mark else str(path)
-        raise CarError(f"{place}: this is neither YAML nor JSON: {getattr(error, 'problem', None) or error}") from None
+        raise CarError(f"{place}: neither YAML nor JSON: {getattr(error, 'problem', None) or error}") from None
     if not isinstance(node, yaml.MappingNode):
         raise CarError(f"{path}: expected the parameters of a car, such as 'mass: 1.113'")
     given: dict[str, float] = {}
     for place, name, value in _entries(path, node):
         if KEYS[name] in given:
-            raise CarError(f"{place}: {name} is there twice")
+            raise CarError(f"{place}: {name} appears twice")
         given[KEYS[name]] = value
     return replace(KIWI, **given)
 
@@ -93,7 +93,7 @@ def _entries(path: Path, node: yaml.MappingNode) -> Iterator[tuple[str, str, flo
         place, name = f"{path}:{key.start_mark.line + 1}", str(key.value)
         if name not in KEYS:
             close = difflib.get_close_matches(name, KEYS, 1)
-            raise CarError(f"{place}: a car has no '{name}'" + (f", did you mean '{close[0]}'?" if close else ""))
+            raise CarError(f"{place}: unknown parameter '{name}'" + (f", did you mean '{close[0]}'?" if close else ""))
         yield place, name, _checked(f"{place}: {name}", name, _number(value))
 
 
@@ -108,7 +108,7 @@ def _number(node: Any) -> float:
 
 def _checked(what: str, name: str, value: float) -> float:
     if not math.isfinite(value):
-        raise CarError(f"{what} is no finite number")
+        raise CarError(f"{what} is not a finite number")
     if name in _ANY:
         return value
     if name in _NEGATIVE:

@@ -47,7 +47,7 @@ class DynamicModel(Service):
 
     def _ignored(self, name: str, value: float) -> None:
         if self.vehicle.rejected == 1:
-            self._log.warning("a %s of %s is ignored, as all that are not finite will be", name, value)
+            self._log.warning("ignored a %s of %s, and will ignore all that are not finite", name, value)
 
 
 def build(context: Context) -> Service:

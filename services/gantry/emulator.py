@@ -1,4 +1,4 @@
-"""The emulated rig: the gantry's own firmware under simavr, as a program of its own with a serial port."""
+"""The emulated rig: the gantry's own firmware under simavr, a separate program with a serial port."""
 
 import contextlib
 import json
@@ -39,7 +39,7 @@ class EmulatedRig:
             [folder / "rig-emulator", "--start", START, folder / "gantry.elf"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            process_group=0,  # it outlives a signal to the gantry's group, so that it hears the last STOP
+            process_group=0,  # it outlives a signal to the gantry's group, so that it gets the last STOP
         )
         _hurry(self._process.pid)
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -80,7 +80,7 @@ class EmulatedRig:
         self.close()
 
     def _read(self) -> None:
-        """The thread that takes what the program says, up to its end."""
+        """The thread that reads the program's output up to its end."""
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
@@ -88,17 +88,17 @@ class EmulatedRig:
                     self._take(json.loads(line))
                 except (ValueError, KeyError, TypeError, AttributeError):
                     text = line.decode(errors="replace").strip()[:_LONGEST]
-                    self._fault = f"the emulated rig said what cannot be read: {text}"
+                    self._fault = f"the emulated rig sent an unreadable line: {text}"
         self._ready.set()
 
-    def _take(self, said: dict[str, Any]) -> None:
-        if said.get("ready"):
-            self.port = str(said["port"])
+    def _take(self, line: dict[str, Any]) -> None:
+        if line.get("ready"):
+            self.port = str(line["port"])
             self._ready.set()
-        elif said.get("event") == "late" and self._watched:
-            self._fault = f"the emulated rig could not keep real time: it was {said['late']:.3f} s late"
-        elif "x" in said:
-            self._true = Position(said["x"], said["y"], said["yaw"])
+        elif line.get("event") == "late" and self._watched:
+            self._fault = f"the emulated rig could not keep real time: it was {line['late']:.3f} s late"
+        elif "x" in line:
+            self._true = Position(line["x"], line["y"], line["yaw"])
 
 
 def _hurry(process: int) -> None:

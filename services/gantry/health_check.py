@@ -1,4 +1,4 @@
-"""Whether a rig is fit for a test: its line answers each time and in time, and its home is where it was before."""
+"""Whether a rig is fit for a test: its line answers reliably and in time, and its home has not moved."""
 
 import math
 import statistics
@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from services.gantry import start
-from services.gantry.link import ASKING, Link, RigError
+from services.gantry.link import REQUEST_STATE, Link, RigError
 from services.gantry.motion import Limits
 from services.gantry.protocol import Position, Status
 
@@ -15,16 +15,16 @@ ROUNDS = 20
 ANSWER = 0.25
 """s within which position and status have to come, each time."""
 LATENCY = 0.05
-"""s that the middle one of the answers may take; the firmware needs 5 ms and the line as much."""
-WAYS = {"x": 0.04, "y": 0.04, "yaw": 0.15}
+"""s that the median answer may take; the firmware needs 5 ms and the line as much."""
+DISTANCES = {"x": 0.04, "y": 0.04, "yaw": 0.15}
 """How far from home (m, m, rad) each axis looks for home, and from twice as far."""
 SPEEDS = {"x": 0.1, "y": 0.1, "yaw": 0.35}
 """Of homing (m/s, m/s, rad/s), as firmware/protocol.yml has them."""
 REPEATS = {"x": 0.005, "y": 0.005, "yaw": math.radians(2.5)}
-"""By how much the switch may be elsewhere than before (m, m, rad)."""
+"""By how much the switch may have moved (m, m, rad)."""
 DECIMAL = 1e-4
 TRIES = 3
-"""For each axis, as a busy machine looks at the clock too late at times."""
+"""For each axis, as a busy machine sometimes measures late."""
 _POLL = 0.005
 
 Check = dict[str, Any]
@@ -35,19 +35,19 @@ def home(limits: Limits) -> Position:
     return replace(limits.low, yaw=limits.low.yaw + DECIMAL)
 
 
-def asked(link: Link) -> tuple[Position | None, Status]:
+def read_state(link: Link) -> tuple[Position | None, Status]:
     """Position and status; a rig that is not calibrated has no position. Raises RigError when no answer comes."""
     for _ in range(ROUNDS):
-        at, status, refusals = link.exchange(ASKING, ANSWER)
+        at, status, refusals = link.exchange(REQUEST_STATE, ANSWER)
         if status is not None and (at is not None or refusals):
             return at, status
-    raise RigError(f"the rig at {link.name} does not say where it is")
+    raise RigError(f"the rig at {link.name} does not report its position")
 
 
-def tried(link: Link, limits: Limits, patience: float) -> dict[str, Any]:
+def run_checks(link: Link, limits: Limits, patience: float) -> dict[str, Any]:
     """``ok``, the ``reason`` when it is not, and the ``checks``; the rig moves, and ends at home.
 
-    A rig that cannot, or still reports a fault from before, is not fit.
+    A rig that cannot move, or still reports an old fault, is not fit.
     """
     checks: list[Check] = []
     try:
@@ -77,7 +77,7 @@ def _answers(link: Link) -> list[Check]:
     took = []
     for _ in range(ROUNDS):
         begin = time.monotonic()
-        at, status, _ = link.exchange(ASKING, ANSWER)
+        at, status, _ = link.exchange(REQUEST_STATE, ANSWER)
         if at is not None and status is not None:
             took.append(time.monotonic() - begin)
     middle = statistics.median(took) if took else ANSWER
@@ -88,9 +88,9 @@ def _answers(link: Link) -> list[Check]:
 
 
 def _homing(link: Link, limits: Limits, patience: float) -> list[Check]:
-    """Looks for home from two places of each axis: the times differ by the way between them, unless home has moved.
+    """Homes from two places of each axis: the times differ by the distance between them, unless home has moved.
 
-    Positions say nothing while home is being looked for, and agree with themselves afterwards whatever was lost.
+    Positions mean nothing while homing, and agree with themselves afterwards whatever steps were lost.
     """
     checks = []
     for axis, unit in (("x", "mm"), ("y", "mm"), ("yaw", "deg")):
@@ -104,12 +104,12 @@ def _homing(link: Link, limits: Limits, patience: float) -> list[Check]:
 
 
 def _difference(link: Link, limits: Limits, axis: str, patience: float) -> float:
-    """By how much an axis has its switch elsewhere the second time (m or rad)."""
+    """By how much an axis' switch seems to have moved the second time (m or rad)."""
     low: float = getattr(limits.low, axis)
     high: float = getattr(limits.high, axis)
-    way = min(WAYS[axis], (high - low) / 2)
+    distance = min(DISTANCES[axis], (high - low) / 2)
     took = []
     for times in (1, 2):
-        start.go(link, replace(home(limits), **{axis: low + times * way}), patience)
+        start.go(link, replace(home(limits), **{axis: low + times * distance}), patience)
         took.append(start.calibrate(link, patience, _POLL))
-    return abs((took[1] - took[0]) * SPEEDS[axis] - way)
+    return abs((took[1] - took[0]) * SPEEDS[axis] - distance)

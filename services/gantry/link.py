@@ -1,4 +1,4 @@
-"""The line to the rig: found at first, then relied upon, and never left without a stop."""
+"""The line to the rig: found first, then supervised, and never left without a stop."""
 
 import contextlib
 import logging
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from services.gantry.port import Port, PortError
-from services.gantry.protocol import LATCHED, Lines, Position, Refusal, Status, Word, command
+from services.gantry.protocol import LATCHED, LineReader, Position, Refusal, Status, Word, command
 
 SILENCE = 1.0
 """s without an answer after which a line counts as lost."""
@@ -15,7 +15,7 @@ PATIENCE = 5.0
 """s that a rig has to answer at first: an Arduino that was plugged in needs two."""
 RETRY = 0.25
 STOP_TRIES, STOP_PATIENCE = 3, 0.2
-ASKING = command(Word.POSITION) + command(Word.STATUS)
+REQUEST_STATE = command(Word.POSITION) + command(Word.STATUS)
 
 _log = logging.getLogger(__name__)
 
@@ -24,8 +24,8 @@ class RigError(RuntimeError):
     """The rig cannot go on; one sentence."""
 
 
-class Heard(NamedTuple):
-    """What a rig answered; None stands for an answer that did not come."""
+class Answers(NamedTuple):
+    """A rig's answers; None for one that did not come."""
 
     at: Position | None = None
     status: Status | None = None
@@ -33,9 +33,9 @@ class Heard(NamedTuple):
 
 
 class Link:
-    """Asks the rig over a line that it opens; ``name`` is the line's, for sentences.
+    """Commands the rig over a line that it opens; ``name`` names the line in errors.
 
-    Nothing is sent but what is asked for, so that a fault is still there to be read when the line is opened.
+    It sends nothing on its own, so that a fault can still be read when the line is opened.
     """
 
     def __init__(self, name: str, open_port: Callable[[], Port], now: Callable[[], float] = time.monotonic) -> None:
@@ -43,39 +43,39 @@ class Link:
         self.name = name
         self._open, self._now = open_port, now
         self._port: Port | None = None
-        self._lines = Lines()
-        self._heard = self._retry = now()
+        self._lines = LineReader()
+        self._last_state = self._retry = now()
         self._found = False
         self._status: Status | None = None
 
-    def exchange(self, lines: bytes, patience: float) -> Heard:
+    def exchange(self, lines: bytes, patience: float) -> Answers:
         """Send commands of which STATUS is the last, and wait up to ``patience`` s for its answer.
 
-        A rig that has not answered yet is waited for, for PATIENCE, with nothing heard meanwhile. From its first answer
-        on it is there: RigError when the line is lost or silent for SILENCE. Raises PortError when the line cannot be
+        A rig that has not answered yet has PATIENCE to do so, without answers meanwhile. From its first answer on:
+        RigError when the line is lost or silent for SILENCE. Raises PortError when the line cannot be
         opened.
         """
         try:
             if self._port is None and not self._opened():
-                return Heard()
+                return Answers()
             assert self._port is not None
             late = self._lines.feed(self._port.read(0.0))
-            if lines != ASKING:
+            if lines != REQUEST_STATE:
                 self._status = None
             self._port.write(lines)
             heard = self._answers(self._port, patience)
         except OSError as error:
             self._let_go()
             self._miss(str(error))
-            return Heard()
-        if self._now() - self._heard > SILENCE:
+            return Answers()
+        if self._now() - self._last_state > SILENCE:
             self._miss("it does not answer")
         return heard._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *heard.refusals))
 
     def close(self) -> None:
-        """Stop the rig, make sure as far as the line allows that it heard it, and let go.
+        """Stop the rig, wait for its confirmation as far as the line allows, and close the line.
 
-        A rig that has stopped for a fault of its own is left as it is: STOP would acknowledge the fault.
+        A rig that a fault has stopped is left alone: STOP would acknowledge the fault.
         """
         reason = "it does not answer"
         try:
@@ -89,21 +89,21 @@ class Link:
                         return
         except OSError as error:
             reason = str(error)
-        _log.warning("the rig at %s did not confirm to have stopped: %s", self.name, reason)
+        _log.warning("the rig at %s did not confirm that it stopped: %s", self.name, reason)
 
-    def _answers(self, port: Port, patience: float) -> Heard:
+    def _answers(self, port: Port, patience: float) -> Answers:
         at, status, refusals = None, None, []
         end = self._now() + patience
         while status is None and (left := end - self._now()) > 0:
             for answer in self._lines.feed(port.read(left)):
-                self._heard, self._found = self._now(), True
+                self._last_state, self._found = self._now(), True
                 if isinstance(answer, Position):
                     at = answer
                 elif isinstance(answer, Status):
                     status = self._status = answer
                 else:
                     refusals.append(answer)
-        return Heard(at, status, tuple(refusals))
+        return Answers(at, status, tuple(refusals))
 
     def _opened(self) -> bool:
         now = self._now()
@@ -111,9 +111,9 @@ class Link:
             return False
         self._retry = now + RETRY
         try:
-            self._port, self._lines = self._open(), Lines()
+            self._port, self._lines = self._open(), LineReader()
         except OSError as error:
-            if now - self._heard > PATIENCE:
+            if now - self._last_state > PATIENCE:
                 raise PortError(f"the line to the rig at {self.name} cannot be opened: {error}") from None
             return False
         return True
@@ -122,8 +122,8 @@ class Link:
         """The line is lost, or has not been found yet."""
         if self._found:
             raise RigError(f"the line to the rig at {self.name} is lost: {reason}")
-        if self._now() - self._heard > PATIENCE:
-            raise RigError(f"the rig at {self.name} has been away for {PATIENCE:g} s: {reason}")
+        if self._now() - self._last_state > PATIENCE:
+            raise RigError(f"the rig at {self.name} gave no answer for {PATIENCE:g} s: {reason}")
 
     def _let_go(self) -> None:
         if self._port is not None:

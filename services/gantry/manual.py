@@ -1,7 +1,7 @@
-"""The rig by hand: ``python -m services.gantry.manual --serial=PORT ACTION``, which prints one JSON object.
+"""Manual control of the rig: ``python -m services.gantry.manual --serial=PORT ACTION``, which prints one JSON object.
 
-Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is told to stop
-on every way out, unless a fault has stopped it: that is left to be seen, and ``calibrate`` acknowledges it. Exit codes:
+Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is stopped
+at every exit, unless a fault has stopped it: that is kept to be seen, and ``calibrate`` acknowledges it. Exit codes:
 0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.
 """
 
@@ -32,23 +32,23 @@ DONE, BROKEN, USAGE = 0, 1, 2
 
 
 class UsageError(ValueError):
-    """A command line that means nothing, or a place out of the rig's ranges; one sentence."""
+    """A wrong command line, or a place out of the rig's ranges; one sentence."""
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
-    """Does one action; what became of it is printed."""
+    """Do one action and print its result."""
     try:
         flags, action, numbers = _parsed(argv)
         limits = _limits(flags)
         goal = _goal(action, numbers, limits)
-        said, code = _done(flags, action, goal, limits)
+        result, code = _done(flags, action, goal, limits)
     except RigError as error:
-        said, code = {"error": str(error)}, BROKEN
+        result, code = {"error": str(error)}, BROKEN
     except UsageError as error:
-        said, code = {"error": str(error)}, USAGE
+        result, code = {"error": str(error)}, USAGE
     except (ValueError, OSError) as error:
-        said, code = {"error": " ".join(str(error).split())}, BROKEN
-    stdout.write(json.dumps(said) + "\n")
+        result, code = {"error": " ".join(str(error).split())}, BROKEN
+    stdout.write(json.dumps(result) + "\n")
     stdout.flush()
     return code
 
@@ -63,7 +63,7 @@ def _parsed(argv: Sequence[str]) -> tuple[Flags, str, list[float]]:
     except ValueError as error:
         raise UsageError(str(error)) from None
     if action not in ACTIONS:
-        raise UsageError(f"'{action}' is no action, expected one of {', '.join(ACTIONS)}")
+        raise UsageError(f"'{action}' is not an action, expected one of {', '.join(ACTIONS)}")
     if len(numbers) != ACTIONS[action] or not all(map(math.isfinite, numbers)):
         raise UsageError(f"{action} takes {ACTIONS[action] or 'no'} numbers: X and Y in m, YAW in degrees")
     return flags, action, numbers
@@ -97,8 +97,8 @@ def _done(flags: Flags, action: str, goal: Position | None, limits: Limits) -> t
         link = Link(target, lambda: SerialPort(target))
         resources.callback(link.close)
         if action == "check":
-            tried = health_check.tried(link, limits, patience)
-            return {**tried, **(_where(link) if tried["ok"] else {})}, DONE if tried["ok"] else BROKEN
+            health = health_check.run_checks(link, limits, patience)
+            return {**health, **(_where(link) if health["ok"] else {})}, DONE if health["ok"] else BROKEN
         status = start.find(link)
         if action == "calibrate" or (emulated and goal):
             start.calibrate(link, patience)
@@ -112,7 +112,7 @@ def _done(flags: Flags, action: str, goal: Position | None, limits: Limits) -> t
 
 def _where(link: Link) -> dict[str, Any]:
     """Status and position, yaw in degrees; no position before the rig is calibrated."""
-    at, status = health_check.asked(link)
+    at, status = health_check.read_state(link)
     return {
         "status": int(status),
         "word": status.name.lower().replace("_", " "),

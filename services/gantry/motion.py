@@ -58,11 +58,11 @@ def turned(velocity: Velocity, yaw: float) -> Velocity:
 
 
 class Shaper:
-    """Turns what the vehicle does into what the rig is told, one step after the other."""
+    """Turns the vehicle's velocities into commands for the rig, step by step."""
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
-        self.told = Velocity()
+        self.velocity = Velocity()
         self.cut = 0
         """Steps in which the edge of the workspace took speed away."""
 
@@ -70,22 +70,22 @@ class Shaper:
         """The velocity in the rig's frame for the next ``dt`` seconds, from the body's and the measured position.
 
         A speed above the limit is cut without a change of direction; it changes no faster than the accelerations;
-        towards an edge the rig is told no more than what it can brake from.
+        towards an edge it is never higher than the rig can brake from.
         """
         limits = self.limits
         wanted = turned(body, at.yaw)
         x, y = _shortened(wanted.x, wanted.y, limits.speed)
-        change_x, change_y = _shortened(x - self.told.x, y - self.told.y, limits.acceleration * dt)
+        change_x, change_y = _shortened(x - self.velocity.x, y - self.velocity.y, limits.acceleration * dt)
         rate = _within(wanted.yaw, limits.yaw_rate)
-        rate = self.told.yaw + _within(rate - self.told.yaw, limits.yaw_acceleration * dt)
-        free = Velocity(self.told.x + change_x, self.told.y + change_y, rate)
-        self.told = self._before_the_edge(free, at, LATENCY + 4 * dt)
-        self.cut += self.told != free
-        return self.told
+        rate = self.velocity.yaw + _within(rate - self.velocity.yaw, limits.yaw_acceleration * dt)
+        free = Velocity(self.velocity.x + change_x, self.velocity.y + change_y, rate)
+        self.velocity = self._before_the_edge(free, at, LATENCY + 4 * dt)
+        self.cut += self.velocity != free
+        return self.velocity
 
     def halt(self) -> None:
-        """The rig was told to stop."""
-        self.told = Velocity()
+        """The rig was commanded to stop."""
+        self.velocity = Velocity()
 
     def _before_the_edge(self, v: Velocity, at: Position, lag: float) -> Velocity:
         low, high, limits = self.limits.low, self.limits.high, self.limits

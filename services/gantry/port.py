@@ -22,7 +22,7 @@ _SOCKET = re.compile(r"socket://(127\.0\.0\.1|localhost|\[::1\]):[0-9]{1,5}")
 
 
 class PortError(ValueError):
-    """A port that is not opened; one sentence."""
+    """A port that cannot be used; one sentence."""
 
 
 class Port(Protocol):
@@ -37,12 +37,12 @@ class Port(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         ...
 
 
 class SerialPort:
-    """A port of pyserial's that never waits for longer than it was asked to."""
+    """A port of pyserial that never waits longer than requested."""
 
     def __init__(self, target: str) -> None:
         """``target`` is a device, or a socket of this machine; raises OSError when it cannot be opened."""
@@ -52,7 +52,7 @@ class SerialPort:
                 target, BAUD, timeout=0, write_timeout=WRITE_PATIENCE, exclusive=exclusive
             )
         except termios.error as error:
-            raise OSError(f"{target} is no serial port: {error.args[-1]}") from None
+            raise OSError(f"{target} is not a serial port: {error.args[-1]}") from None
         _keep(target, self._port)
 
     def write(self, data: bytes) -> None:
@@ -73,14 +73,14 @@ class SerialPort:
 def checked(target: str) -> str:
     """A target that may be opened: a device, or a socket of this machine; raises PortError.
 
-    Other kinds of pyserial's are refused, as some of them write files or listen.
+    Other URLs of pyserial are refused, as some of them write files or listen.
     """
     if "://" in target:
         if _SOCKET.fullmatch(target):
             return target
-        raise PortError(f"'{target}' is no port of the rig, expected a device or socket://127.0.0.1:PORT")
+        raise PortError(f"'{target}' is not a port of the rig, expected a device or socket://127.0.0.1:PORT")
     if not target.startswith("/") or not os.path.realpath(target).startswith("/dev/"):
-        raise PortError(f"'{target}' is no device, expected one such as /dev/ttyACM0")
+        raise PortError(f"'{target}' is not a device, expected one such as /dev/ttyACM0")
     if not Path(target).is_char_device():
         raise PortError(f"there is no serial port {target}; is the rig plugged in?")
     return target
@@ -88,7 +88,7 @@ def checked(target: str) -> str:
 
 @contextlib.contextmanager
 def _as_os_errors() -> Iterator[None]:
-    """What a port raises that went away, as OSError."""
+    """Errors of a port that went away, as OSError."""
     try:
         yield
     except (termios.error, TypeError, ValueError) as error:
@@ -96,7 +96,7 @@ def _as_os_errors() -> Iterator[None]:
 
 
 def _keep(target: str, port: serial.SerialBase) -> None:
-    """Nobody else opens the device, from a container neither, where pyserial's lock on the file does not reach.
+    """Nobody else can open the device, not even from a container, where pyserial's lock on the file has no effect.
 
     DTR stays up when the port is closed: its fall and rise would reset the Arduino.
     """

@@ -11,12 +11,12 @@ from enum import StrEnum
 
 from services.gantry.rig_table import BAUD, Error, Status
 
-__all__ = ["BAUD", "LATCHED", "SENTENCES", "Error", "Lines", "Position", "Refusal", "Status", "Word", "command"]
+__all__ = ["BAUD", "LATCHED", "SENTENCES", "Error", "LineReader", "Position", "Refusal", "Status", "Word", "command"]
 
 LONGEST = 96
 """Bytes of the longest line that can be an answer."""
 FARTHEST = 10.0
-"""A position farther from the middle (m, rad) was garbled on the line."""
+"""A position farther from the middle (m, rad) was garbled."""
 
 _NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{1,9})?(?:[eE][-+]?[0-9]{1,2})?"
 _ANSWER = re.compile(rf"\$(?P<numbers>{_NUMBER}(?:,{_NUMBER}){{0,3}})\r?")
@@ -38,8 +38,8 @@ SENTENCES = {
     Status.LIMIT: "touched a limit switch and stopped",
     Status.STALL: "lost steps, as a motor stalled",
     Status.HOT: "has a motor driver that is too hot",
-    Status.NOT_CALIBRATED: "is not calibrated and does not know where it is",
-    Status.WATCHDOG: "heard nothing for 500 ms and braked by itself",
+    Status.NOT_CALIBRATED: "is not calibrated and does not know its position",
+    Status.WATCHDOG: "got no command for 500 ms and braked by itself",
     Status.FAULT: "reports a fault",
 }
 """What a status means that ends a test, with the rig as subject."""
@@ -69,7 +69,7 @@ class Refusal:
 
     def __str__(self) -> str:
         names = [error.name for error in Error if error == self.code]
-        return f"$ERROR:{self.code} ({names[0] if names else 'which this version does not know'})"
+        return f"$ERROR:{self.code} ({names[0] if names else 'unknown to this version'})"
 
 
 Answer = Position | Status | Refusal
@@ -84,7 +84,7 @@ def command(word: Word, *arguments: float) -> bytes:
 
 
 def answer(line: str) -> Answer | None:
-    """What a line without its end says; None for one that is no answer."""
+    """The answer in a line without its end; None for any other line."""
     refusal = _REFUSAL.fullmatch(line)
     if refusal is not None:
         return Refusal(int(refusal["code"]))
@@ -99,8 +99,8 @@ def answer(line: str) -> Answer | None:
     return None
 
 
-class Lines:
-    """Bytes as they come, put together to answers; what is none is counted in ``garbage``."""
+class LineReader:
+    """Splits incoming bytes into answers; other lines are counted in ``garbage``."""
 
     def __init__(self) -> None:
         self.garbage = 0

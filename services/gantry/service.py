@@ -1,4 +1,4 @@
-"""The gantry on the bus: hears how the vehicle moves, moves the rig so, and says where the rig is."""
+"""The gantry on the bus: moves the rig as the vehicle moves, and publishes the rig's position."""
 
 import math
 import time
@@ -11,26 +11,26 @@ from services.base import Context, Flags, Output, Service, period_of
 from services.base.signals import interruptible
 from services.gantry import start
 from services.gantry.emulator import EmulatedRig
-from services.gantry.link import ASKING, Link, RigError
+from services.gantry.link import REQUEST_STATE, Link, RigError
 from services.gantry.motion import Limits, Shaper, Velocity, box
 from services.gantry.port import PortError, SerialPort, checked
 from services.gantry.protocol import SENTENCES, Position, Refusal, Status, Word, command
-from services.gantry.telemetry import Meter
+from services.gantry.telemetry import LinkTelemetry
 
 EMULATED = "emulated"
 MICROSECONDS = 1_000_000
 STALE, SILENT = 0.45, 1.0
-"""s without a kinematic state after which the vehicle counts as standing, and after which it has no more to say."""
+"""s without a kinematic state after which the vehicle counts as standing, and after which its source counts as lost."""
 RUNNER_SILENT = 3.0
-"""s without a sign of life of the runner, once it gave one, after which it counts as killed."""
+"""s without a sign of life of the runner, after the first one, after which it counts as killed."""
 TRUTH_PERIOD = 10_000
-"""us between two messages of where an emulated rig truly is."""
+"""us between two messages with the true position of an emulated rig."""
 LOST = 300_000
 """us without a measured position after which the rig is not moved on."""
 
 
 class Gantry(Service):
-    """Sends RUN at its rate, as the rig brakes after 500 ms without, and asks for position and status each time."""
+    """Sends RUN at its rate, as the rig brakes after 500 ms without, and requests position and status each time."""
 
     period: int
 
@@ -41,7 +41,7 @@ class Gantry(Service):
         emulated: EmulatedRig | None = None,
         wall: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``wall`` in s: what hangs is noticed in real time."""
+        """``wall`` in s: a peer that hangs is noticed in real time."""
         flags = context.flags
         self._wall = wall
         self._log = context.log
@@ -54,9 +54,9 @@ class Gantry(Service):
         self.ended = False
         self._patience = min(0.4 * self._turn / MICROSECONDS, 0.05)
         self._state, self._rejected = Velocity(), 0
-        self._heard: float | None = None
+        self._last_state: float | None = None
         self._alive: float | None = None
-        self.meter = Meter(self._turn / MICROSECONDS)
+        self.telemetry = LinkTelemetry(self._turn / MICROSECONDS)
         self._at: Position | None = None
         self._blind = 0
         self._moved = False
@@ -66,8 +66,8 @@ class Gantry(Service):
         self._report = context.messages.type("opendlv.system.SystemStatusMessage")
         self._frame_id, self._status_id, self._truth_id = (flags[f"{name}-id"] for name in ("frame", "status", "truth"))
         self.inputs = {
-            ("opendlv.sim.KinematicState", self._frame_id): self._feed,
-            ("dodo.Alive", None): self._hear_runner,
+            ("opendlv.sim.KinematicState", self._frame_id): self._take_state,
+            ("dodo.Alive", None): self._take_sign_of_life,
         }
 
     def update(self, now: int) -> Iterator[Output]:
@@ -81,15 +81,15 @@ class Gantry(Service):
     def _exchange(self) -> Iterator[Output]:
         self._supervise()
         begin = self._wall()
-        at, status, refusals = self.link.exchange(self._command() + ASKING, self._patience)
-        self.meter.note(begin, self._wall() if at is not None else None)
+        at, status, refusals = self.link.exchange(self._command() + REQUEST_STATE, self._patience)
+        self.telemetry.note(begin, self._wall() if at is not None else None)
         self._at, self._blind = (self._at, self._blind + self._turn) if at is None else (at, 0)
         if status is not None:
-            self._judge(status)
+            self._check(status)
             if status != self._status and self._status_id is not None:
                 yield Output(self._report(code=int(status), description=describe(status)), self._status_id)
             self._status = status
-        self._listen(refusals)
+        self._check_refusals(refusals)
         if at is not None:
             yield Output(self._where(at), self._frame_id)
 
@@ -101,40 +101,40 @@ class Gantry(Service):
         self.ended = True
 
     def _command(self) -> bytes:
-        """RUN, or STOP once: it also acknowledges a fault, which is to be read first."""
+        """RUN, or STOP once, after any fault was read: STOP acknowledges it."""
         if self.ended or self._at is None or self._blind > LOST:
             self.shaper.halt()
             moved, self._moved = self._moved, False
             return command(Word.STOP) if moved else b""
         self._moved = True
-        body = self._state if self._age(self._heard) <= STALE else Velocity()
+        body = self._state if self._age(self._last_state) <= STALE else Velocity()
         cut = self.shaper.cut
-        told = self.shaper.step(body, self._at, self._turn / MICROSECONDS)
+        velocity = self.shaper.step(body, self._at, self._turn / MICROSECONDS)
         if self.shaper.cut == 1 and not cut:
-            self._log.warning("the vehicle drives to the edge of the rig, which stops there: %s", place(self._at))
-        return command(Word.RUN, told.x, told.y, told.yaw)
+            self._log.warning("the vehicle drives to the edge of the rig, where the rig stops: %s", place(self._at))
+        return command(Word.RUN, velocity.x, velocity.y, velocity.yaw)
 
     def _age(self, since: float | None) -> float:
         return math.inf if since is None else self._wall() - since
 
     def _supervise(self) -> None:
-        """Raises RigError when who moved the vehicle, or who started all this, hangs or is gone."""
-        if self._heard is not None and not self.ended and self._age(self._heard) > SILENT:
+        """Raises RigError when the source of kinematic states or the runner hangs or is gone."""
+        if self._last_state is not None and not self.ended and self._age(self._last_state) > SILENT:
             raise RigError(f"no KinematicState of the vehicle has come for {SILENT:g} s, and they came before")
         if self._alive is not None and self._age(self._alive) > RUNNER_SILENT:
             raise RigError(f"the runner has given no sign of life for {RUNNER_SILENT:g} s")
 
-    def _judge(self, status: Status) -> None:
+    def _check(self, status: Status) -> None:
         if status in SENTENCES:
             where = f", {place(self._at)}" if self._at else ""
             raise RigError(f"the rig at {self.link.name} {SENTENCES[status]}{where} (status {int(status)})")
 
-    def _listen(self, refusals: tuple[Refusal, ...]) -> None:
-        """A line that came damaged is said again soon; any other refusal means that the rig is not as it should be."""
+    def _check_refusals(self, refusals: tuple[Refusal, ...]) -> None:
+        """A damaged line is repeated soon; any other refusal means that the rig is in a wrong state."""
         for refusal in refusals:
             if not refusal.is_garbled:
                 raise RigError(f"the rig at {self.link.name} refuses to move: {refusal}")
-            self._log.warning("the rig at %s got a damaged line: %s", self.link.name, refusal)
+            self._log.warning("the rig at %s received a damaged line: %s", self.link.name, refusal)
 
     def _where(self, at: Position) -> Message:
         x, y, yaw = self._origin
@@ -143,26 +143,26 @@ class Gantry(Service):
         frame: Message = self._frame(x=x, y=y, qz=math.sin(half), qw=math.cos(half))
         return frame
 
-    def _feed(self, state: Any, _sample_time: int) -> None:
+    def _take_state(self, state: Any, _sample_time: int) -> None:
         velocity = Velocity(state.vx, state.vy, state.yawRate)
         if all(map(math.isfinite, (velocity.x, velocity.y, velocity.yaw))):
-            self._state, self._heard = velocity, self._wall()
+            self._state, self._last_state = velocity, self._wall()
             return
         self._rejected += 1
         if self._rejected == 1:
-            self._log.warning("a KinematicState of %s is ignored, as all that are not finite will be", velocity)
+            self._log.warning("ignored a KinematicState of %s, and will ignore all that are not finite", velocity)
 
-    def _hear_runner(self, _message: Any, _sample_time: int) -> None:
+    def _take_sign_of_life(self, _message: Any, _sample_time: int) -> None:
         self._alive = self._wall()
 
 
 def place(at: Position) -> str:
-    """A position as it stands in sentences."""
+    """A position for sentences."""
     return f"at x = {at.x:.3f} m, y = {at.y:.3f} m, yaw = {math.degrees(at.yaw):.1f} degrees"
 
 
 def describe(status: Status) -> str:
-    """A status as it stands in messages."""
+    """A status for messages."""
     return f"the rig {SENTENCES[status]}" if status in SENTENCES else f"the rig is {status.name.lower()}"
 
 
@@ -180,7 +180,7 @@ def limits_of(flags: Flags) -> Limits:
 
 
 def build(context: Context) -> Service:
-    """The service from its flags: it is ready when the rig is at its start, and stops the rig on every way out."""
+    """The service from its flags: it is ready when the rig is at its start, and stops the rig at every exit."""
     flags = context.flags
     emulated = context.resources.enter_context(EmulatedRig()) if flags["serial"] == EMULATED else None
     target = checked(emulated.port if emulated else flags["serial"])
@@ -195,8 +195,8 @@ def build(context: Context) -> Service:
         if flags["calibrate"] or emulated:
             start.calibrate(link, flags["patience"])
         elif status == Status.NOT_CALIBRATED:
-            raise PortError(f"{start.trouble(link, status)}; --calibrate lets it find its home")
+            raise PortError(f"{start.trouble(link, status)}; --calibrate makes it find its home")
         start.go(link, goal, flags["patience"])
     gantry = Gantry(context, link, emulated)
-    context.resources.callback(lambda: context.log.info("%s", gantry.meter))
+    context.resources.callback(lambda: context.log.info("%s", gantry.telemetry))
     return gantry

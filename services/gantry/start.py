@@ -1,38 +1,38 @@
-"""Before a test begins: the rig is found, calibrated if that was asked for, and driven to its start."""
+"""Before a test begins: the rig is found, calibrated on request, and driven to its start."""
 
 import math
 import time
 from collections.abc import Callable
 
-from services.gantry.link import ASKING, Link, RigError
+from services.gantry.link import REQUEST_STATE, Link, RigError
 from services.gantry.protocol import LATCHED, SENTENCES, Position, Status, Word, command
 
 NEAR, NEAR_YAW = 0.005, math.radians(1.5)
 """m and rad within which the rig has reached a place: 1.5 degrees are less than a full step of the turn."""
 POLL = 0.05
 ANSWER = 0.25
-"""s that the rig has to obey or refuse an order."""
+"""s that the rig has to obey or refuse a command."""
 _BEGIN = 1.0
-"""s within which the rig has to say that it looks for home."""
+"""s within which the rig has to report that it looks for home."""
 
 
 def find(link: Link) -> Status:
     """The rig's status, as soon as it answers, with any fault still latched; raises RigError when it does not."""
     while True:
-        status = link.exchange(ASKING, POLL).status
+        status = link.exchange(REQUEST_STATE, POLL).status
         if status is not None:
             return status
         time.sleep(POLL)
 
 
 def settle(link: Link, status: Status) -> None:
-    """Stop whatever the rig still does, and acknowledge that it braked or started anew before.
+    """Stop the rig, and acknowledge that it braked or restarted before.
 
-    Raises RigError for a fault, which only CALIBRATE by hand ends.
+    Raises RigError for a fault, which only a manual CALIBRATE ends.
     """
     if status in LATCHED:
         raise RigError(trouble(link, status))
-    order(link, Word.STOP)
+    give(link, Word.STOP)
 
 
 def trouble(link: Link, status: Status) -> str:
@@ -40,7 +40,7 @@ def trouble(link: Link, status: Status) -> str:
     return f"the rig at {link.name} {SENTENCES[status]} (status {int(status)})"
 
 
-def order(link: Link, word: Word, *arguments: float) -> Status | None:
+def give(link: Link, word: Word, *arguments: float) -> Status | None:
     """Give a command; the status after it, None when that did not come. Raises RigError when it is refused."""
     heard = link.exchange(command(word, *arguments) + command(Word.STATUS), ANSWER)
     if heard.refusals:
@@ -51,13 +51,13 @@ def order(link: Link, word: Word, *arguments: float) -> Status | None:
 def calibrate(link: Link, patience: float, poll: float = POLL) -> float:
     """Let the rig find its home; how long that took, in s. Raises RigError when it has not after ``patience`` s."""
     begin = time.monotonic()
-    homing = order(link, Word.CALIBRATE) == Status.HOMING
+    homing = give(link, Word.CALIBRATE) == Status.HOMING
 
     def done(_: Position | None, status: Status | None) -> bool:
         nonlocal homing
         homing |= status == Status.HOMING
         if not homing and time.monotonic() - begin > _BEGIN:
-            raise RigError(f"the rig at {link.name} was told to find its home and does not look for it")
+            raise RigError(f"the rig at {link.name} does not begin to find its home")
         return homing and status == Status.IDLE
 
     _wait(link, patience, done, "has not found its home", command(Word.STATUS), poll)
@@ -66,7 +66,7 @@ def calibrate(link: Link, patience: float, poll: float = POLL) -> float:
 
 def go(link: Link, goal: Position, patience: float) -> None:
     """Drive the rig to a place; raises RigError when it is not there after ``patience`` s."""
-    order(link, Word.GOTO, goal.x, goal.y, goal.yaw)
+    give(link, Word.GOTO, goal.x, goal.y, goal.yaw)
     place = f"x = {goal.x:g} m, y = {goal.y:g} m, yaw = {math.degrees(goal.yaw):g} degrees"
     _wait(link, patience, lambda at, status: status == Status.IDLE and near(at, goal), f"has not reached {place}")
 
@@ -81,12 +81,12 @@ def _wait(
     patience: float,
     done: Callable[[Position | None, Status | None], bool],
     what: str,
-    asking: bytes = ASKING,
+    request: bytes = REQUEST_STATE,
     poll: float = POLL,
 ) -> None:
     end = time.monotonic() + patience
     while time.monotonic() < end:
-        at, status, _ = link.exchange(asking, ANSWER)
+        at, status, _ = link.exchange(request, ANSWER)
         if done(at, status):
             return
         if status in SENTENCES:

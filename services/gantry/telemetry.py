@@ -1,4 +1,4 @@
-"""How evenly the rig is told to move, and how long it takes to answer."""
+"""How evenly commands are sent to the rig, and how long it takes to answer."""
 
 import statistics
 from array import array
@@ -9,8 +9,8 @@ MOST = 1_000_000
 """Turns that are counted: 14 hours at 20 Hz."""
 
 
-class Meter:
-    """Notes turns of ``period`` s; its text is one line with the jitter of RUN and the latency of POSITION in ms."""
+class LinkTelemetry:
+    """Notes turns of ``period`` s; as a string one line with the jitter of RUN and the latency of POSITION in ms."""
 
     def __init__(self, period: float) -> None:
         self._period = period

@@ -29,7 +29,7 @@ class Integration(Service):
         self._old = MessageSet(parser.load(OLD_FRAME)) if flags["euler"] else None
         self._stamps = [stamp for stamp in (flags["frame-id"], flags["copy-id"]) if stamp is not None]
         self.inputs = {
-            ("opendlv.sim.KinematicState", flags["frame-id"]): self._feed,
+            ("opendlv.sim.KinematicState", flags["frame-id"]): self._take_state,
             ("opendlv.sim.Command", None): self._command,
         }
 
@@ -47,14 +47,14 @@ class Integration(Service):
         if message.command == RESET:
             self.body.reset()
 
-    def _feed(self, state: Any, sample_time: int) -> None:
+    def _take_state(self, state: Any, sample_time: int) -> None:
         twist = Twist((state.vx, state.vy, state.vz), (state.rollRate, state.pitchRate, state.yawRate))
         if all(map(math.isfinite, (*twist.velocity, *twist.rates))):
             self.body.feed(twist, sample_time)
             return
         self.rejected += 1
         if self.rejected == 1:
-            self._log.warning("a KinematicState of %s is ignored, as all that are not finite will be", twist)
+            self._log.warning("ignored a KinematicState of %s, and will ignore all that are not finite", twist)
 
 
 def _old_payload(messages: MessageSet, pose: Pose) -> bytes:

@@ -18,8 +18,8 @@ class Box(NamedTuple):
     height: float
 
 
-class Thing(NamedTuple):
-    """A box with its class; an empty class is none."""
+class LabelledBox(NamedTuple):
+    """A box with its class; the empty string is no class."""
 
     label: str
     box: Box

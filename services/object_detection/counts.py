@@ -1,14 +1,14 @@
-"""What was found, what was false and what was missed, and what that is worth."""
+"""Counts of found, false and missed objects, and the measures made of them."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from services.object_detection.boxes import Thing, overlaps
+from services.object_detection.boxes import LabelledBox, overlaps
 from services.object_detection.pairing import best_pairs
 
 
 @dataclass
-class Tally:
+class Counts:
     """True positives with the sum of their intersections over union, false positives, false negatives."""
 
     hits: int = 0
@@ -16,8 +16,8 @@ class Tally:
     missed: int = 0
     overlap: float = 0.0
 
-    def add(self, other: "Tally") -> None:
-        """Take in another's counts."""
+    def add(self, other: "Counts") -> None:
+        """Add other counts."""
         self.hits += other.hits
         self.false += other.false
         self.missed += other.missed
@@ -45,41 +45,43 @@ class Tally:
 
 
 @dataclass
-class Tallies:
-    """A tally a class, in the order in which classes came."""
+class CountsByClass:
+    """Counts by class, in the order in which classes came."""
 
-    by_label: dict[str, Tally] = field(default_factory=dict)
+    by_label: dict[str, Counts] = field(default_factory=dict)
 
-    def add(self, label: str, tally: Tally) -> None:
-        """Take in the counts of a class."""
-        self.by_label.setdefault(label, Tally()).add(tally)
+    def add(self, label: str, counts: Counts) -> None:
+        """Add counts of a class."""
+        self.by_label.setdefault(label, Counts()).add(counts)
 
-    def __iter__(self) -> Iterator[tuple[str, Tally]]:
+    def __iter__(self) -> Iterator[tuple[str, Counts]]:
         return iter(self.by_label.items())
 
-    def total(self) -> Tally:
+    def total(self) -> Counts:
         """The counts of all classes together."""
-        total = Tally()
-        for tally in self.by_label.values():
-            total.add(tally)
+        total = Counts()
+        for counts in self.by_label.values():
+            total.add(counts)
         return total
 
 
-def compare(found: Sequence[Thing], true: Sequence[Thing], threshold: float, labels: Collection[str]) -> Tallies:
-    """The tallies of one frame. Boxes of a class pair up where they overlap by more than `threshold`.
+def compare(
+    found: Sequence[LabelledBox], true: Sequence[LabelledBox], threshold: float, labels: Collection[str]
+) -> CountsByClass:
+    """The counts of one frame. Boxes of a class pair up where they overlap by more than ``threshold``.
 
-    Only classes in `labels` count, or all where it is empty.
+    Only classes in ``labels`` count, or all where it is empty.
     """
-    result = Tallies()
-    for label in dict.fromkeys(thing.label for thing in (*true, *found)):
+    result = CountsByClass()
+    for label in dict.fromkeys(each.label for each in (*true, *found)):
         if labels and label not in labels:
             continue
-        mine = [thing.box for thing in found if thing.label == label]
-        real = [thing.box for thing in true if thing.label == label]
+        mine = [each.box for each in found if each.label == label]
+        real = [each.box for each in true if each.label == label]
         scores = overlaps(mine, real)
         pairs = best_pairs(scores, threshold)
         overlap = float(sum(scores[pair] for pair in pairs))
-        result.add(label, Tally(len(pairs), len(mine) - len(pairs), len(real) - len(pairs), overlap))
+        result.add(label, Counts(len(pairs), len(mine) - len(pairs), len(real) - len(pairs), overlap))
     return result
 
 

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 
 from services.base import Evaluator, Span, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
-from services.object_detection.boxes import Box, Thing
+from services.object_detection.boxes import Box, LabelledBox
 from services.object_detection.counts import compare
-from services.object_detection.frames import Frame, Mark, Parts, Value
+from services.object_detection.frames import Detections, Frame, FrameKey, Value
 from services.object_detection.reason import verdict
 from services.object_detection.score import Limits, Rules, Score
 from services.object_detection.truth import Truth
@@ -36,24 +36,24 @@ class DetectionEvaluator(Evaluator):
         self._passed_over |= self._judged
         self._judged.clear()
         for frame in self._frames.values():
-            self._pass_over(frame.mark)
+            self._pass_over(frame.key)
         self._frames.clear()
 
-    def detect(self, mark: Mark, number: int, value: Value) -> None:
-        """The application said something of its detection `number` in a frame."""
-        self._take(mark, number, value, lambda frame: frame.found)
+    def detect(self, key: FrameKey, number: int, value: Value) -> None:
+        """The application sent something about its detection ``number`` in a frame."""
+        self._take(key, number, value, lambda frame: frame.found)
 
-    def reveal(self, mark: Mark, number: int, value: Value) -> None:
-        """The truth about object `number` in a frame."""
+    def reveal(self, key: FrameKey, number: int, value: Value) -> None:
+        """The truth about object ``number`` in a frame."""
         self._has_truth = True
-        self._take(mark, number, value, lambda frame: frame.true)
+        self._take(key, number, value, lambda frame: frame.true)
 
-    def announce(self, mark: Mark, by_application: bool) -> None:
-        """There is such a frame; by the application: it has answered it."""
-        frame = self._frame(mark)
+    def announce(self, key: FrameKey, by_application: bool) -> None:
+        """There is such a frame; if the application says so, it has answered it."""
+        frame = self._frame(key)
         if frame is not None:
             frame.answered |= by_application
-            frame.told |= not by_application
+            frame.has_truth |= not by_application
 
     def advance(self, now: int) -> None:
         self._settle(lambda frame: now - frame.since >= self._rules.max_delay * MICROSECONDS)
@@ -69,38 +69,38 @@ class DetectionEvaluator(Evaluator):
             raise UnjudgeableError(f"no true box came {span.within}")
         for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
             if self._truth and (span.is_complete or key < self._last):
-                tallies = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
-                self._score.add(tallies, f"of picture {key}", False)
+                counts = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
+                self._score.add(counts, f"of picture {key}", False)
         return verdict(self._score, self._limits, span.within)
 
-    def _take(self, mark: Mark, number: int, value: Value, side: Callable[[Frame], Parts]) -> None:
-        frame = self._frame(mark)
+    def _take(self, key: FrameKey, number: int, value: Value, side: Callable[[Frame], Detections]) -> None:
+        frame = self._frame(key)
         if frame is not None:
-            parts = side(frame)
-            parts.add(number, value)
-            frame.answered |= parts is frame.found
-        elif mark.time in self._judged and isinstance(value, Box):
+            detections = side(frame)
+            detections.add(number, value)
+            frame.answered |= detections is frame.found
+        elif key.time in self._judged and isinstance(value, Box):
             self._score.late += 1
 
-    def _frame(self, mark: Mark) -> Frame | None:
-        """The frame that a message is about; None for one that is judged already, or does not count."""
-        frame = self._frames.get(mark.time)
-        if frame is not None or mark.time in self._judged or mark.time in self._passed_over:
+    def _frame(self, key: FrameKey) -> Frame | None:
+        """The frame of a message; None for one that is judged already, or does not count."""
+        frame = self._frames.get(key.time)
+        if frame is not None or key.time in self._judged or key.time in self._passed_over:
             return frame
         if self.now is None or self.elapsed(self.now) < self._rules.start:
-            self._pass_over(mark)
+            self._pass_over(key)
             return None
-        return self._frames.setdefault(mark.time, Frame(mark, self.now))
+        return self._frames.setdefault(key.time, Frame(key, self.now))
 
-    def _pass_over(self, mark: Mark) -> None:
-        self._passed_over.add(mark.time)
+    def _pass_over(self, key: FrameKey) -> None:
+        self._passed_over.add(key.time)
         if self._truth is not None and self._truth.frames != "one":
-            self._pictures.discard(self._truth.key(mark))
+            self._pictures.discard(self._truth.picture_of(key))
 
     def _settle(self, due: Callable[[Frame], bool]) -> None:
         for frame in [frame for frame in self._frames.values() if due(frame)]:
-            del self._frames[frame.mark.time]
-            self._judged.add(frame.mark.time)
+            del self._frames[frame.key.time]
+            self._judged.add(frame.key.time)
             self._judge(frame)
 
     def _judge(self, frame: Frame) -> None:
@@ -109,14 +109,14 @@ class DetectionEvaluator(Evaluator):
         if true is None:
             self._score.without_truth += 1
             return
-        tallies = compare(frame.found.things(), true, self._rules.iou, self._rules.labels)
-        self._score.add(tallies, f"at {self.elapsed(frame.since):.2f} s", frame.answered)
+        counts = compare(frame.found.labelled(), true, self._rules.iou, self._rules.labels)
+        self._score.add(counts, f"at {self.elapsed(frame.since):.2f} s", frame.answered)
 
-    def _true(self, frame: Frame) -> Sequence[Thing] | None:
-        """What is in a frame; each picture of a file is there for one frame, unless there is one for all."""
+    def _true(self, frame: Frame) -> Sequence[LabelledBox] | None:
+        """The true boxes of a frame; each picture of a file holds for one frame, unless there is one for all."""
         if self._truth is None:
-            return frame.true.things() if frame.true or frame.told else None
-        key = self._truth.key(frame.mark)
+            return frame.true.labelled() if frame.true or frame.has_truth else None
+        key = self._truth.picture_of(frame.key)
         if key not in self._pictures:
             return None
         if self._truth.frames != "one":

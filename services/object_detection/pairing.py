@@ -1,4 +1,4 @@
-"""Which found box is taken for which true one."""
+"""Which found box is paired with which true one."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ def best_pairs(scores: Scores, threshold: float) -> list[Pair]:
 def _assigned(costs: Scores) -> NDArray[np.int64]:
     """The column of each row so that the sum of costs is smallest; there are no more rows than columns.
 
-    Rows join one by one, each along the shortest way of changes that frees a column (Kuhn 1955, in the form of
+    Rows join one by one, each along the shortest path of changes that frees a column (Kuhn 1955, in the form of
     Jonker and Volgenant 1987). Prices of rows and columns keep all reduced costs from being negative.
     """
     rows, columns = costs.shape
@@ -37,7 +37,7 @@ def _assigned(costs: Scores) -> NDArray[np.int64]:
     column_of, row_of = np.full(rows, -1), np.full(columns, -1)
     for newcomer in range(rows):
         reduced = costs - row_price[:, None] - column_price
-        lengths, came_from, settled, free = _shortest_way(reduced, row_of, newcomer)
+        lengths, came_from, settled, free = _shortest_path(reduced, row_of, newcomer)
         slack = np.where(settled, lengths[free] - lengths, 0.0)
         column_price -= slack
         row_price[newcomer] += lengths[free]
@@ -51,7 +51,7 @@ def _assigned(costs: Scores) -> NDArray[np.int64]:
     return column_of
 
 
-def _shortest_way(
+def _shortest_path(
     reduced: Scores, row_of: NDArray[np.int64], start: int
 ) -> tuple[Scores, NDArray[np.int64], NDArray[np.bool_], int]:
     """Dijkstra's search from a row to the nearest column without a row.

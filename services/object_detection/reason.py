@@ -5,26 +5,26 @@ from services.object_detection.score import MEASURES, Limits, Score
 
 
 def verdict(score: Score, limits: Limits, during: str) -> Verdict:
-    """Passed when every limit is kept; `during` says until when was heard."""
+    """Passed when every limit is kept; ``during`` is the observed time in words."""
     checks = score.checks(limits)
     if not score.answered:
         return Verdict("failed", _silence(score, during), checks)
     faults = [_fault(check, score) for check in checks if not check.ok]
     if faults:
         return Verdict("failed", "; ".join(faults) + _worst(score) + _aside(score), checks)
-    total = score.tallies.total()
-    told = ", ".join(
+    total = score.counts.total()
+    kept = ", ".join(
         f"{check.name} {_number(check)} ({_bound(check)})" for check in checks[: len(MEASURES)] if check.limit
     )
     found = f"found {total.hits} of {total.hits + total.missed} objects in {_count(score.frames, 'frame')}"
-    return Verdict("passed", f"{found}, with {_count(total.false, 'false detection')}: {told}{_aside(score)}", checks)
+    return Verdict("passed", f"{found}, with {_count(total.false, 'false detection')}: {kept}{_aside(score)}", checks)
 
 
 def _silence(score: Score, during: str) -> str:
     if not score.without_truth:
         return f"no detection came {during}" + (f", in {_count(score.frames, 'frame')}" if score.frames else "")
     others = _count(score.without_truth, "frame")
-    return f"there is no truth for any of {others} with detections: is their sample time that of the picture?"
+    return f"none of {others} with detections has ground truth: is their sample time that of the picture?"
 
 
 def _fault(check: Check, score: Score) -> str:
@@ -35,10 +35,10 @@ def _fault(check: Check, score: Score) -> str:
     name = f"{'F1' if measure == 'f1' else measure}{f' of {label}' if label else ''}"
     if check.value is None:
         return f"{name} has no value ({bound}), as {_nothing(measure)}"
-    tally = dict(score.tallies)["" if label == "unnamed" else label] if label else score.tallies.total()
-    wrong = {"precision": _count(tally.false, "false detection"), "recall": f"{tally.missed} missed"}
+    counts = dict(score.counts)["" if label == "unnamed" else label] if label else score.counts.total()
+    wrong = {"precision": _count(counts.false, "false detection"), "recall": f"{counts.missed} missed"}
     both = f"{wrong['precision']} and {wrong['recall']}"
-    return f"{name} is {_number(check)} ({bound}), with {wrong.get(measure, both)} beside {tally.hits} found"
+    return f"{name} is {_number(check)} ({bound}), with {wrong.get(measure, both)} beside {counts.hits} found"
 
 
 def _nothing(measure: str) -> str:
@@ -50,18 +50,18 @@ def _nothing(measure: str) -> str:
 def _worst(score: Score) -> str:
     if score.worst is None:
         return ""
-    tally = score.worst.tally
-    return f"; worst was the frame {score.worst.place}, with {tally.false} false and {tally.missed} missed"
+    counts = score.worst.counts
+    return f"; worst was the frame {score.worst.place}, with {counts.false} false and {counts.missed} missed"
 
 
 def _aside(score: Score) -> str:
     notes = [
-        f"{_count(score.without_truth, 'frame')} without a truth" if score.without_truth else "",
+        f"{_count(score.without_truth, 'frame')} without ground truth" if score.without_truth else "",
         f"{_count(score.late, 'detection')} too late" if score.late else "",
-        f"{_count(score.repeated, 'detection')} under a detectionId that was taken" if score.repeated else "",
+        f"{_count(score.repeated, 'detection')} under a detectionId that was in use" if score.repeated else "",
     ]
-    told = ", ".join(note for note in notes if note)
-    return f"; left out: {told}" if told else ""
+    left_out = ", ".join(note for note in notes if note)
+    return f"; left out: {left_out}" if left_out else ""
 
 
 def _bound(check: Check) -> str:
@@ -69,7 +69,7 @@ def _bound(check: Check) -> str:
 
 
 def _number(check: Check) -> str:
-    """In full where rounding would make it look as if it kept its limit."""
+    """In full where rounding would hide that it broke its limit."""
     short = f"{check.value:.4g}"
     return str(check.value) if not check.ok and short == f"{check.limit['min']:.4g}" else short
 

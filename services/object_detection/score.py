@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from services.base import Check
-from services.object_detection.counts import Tallies, Tally
+from services.object_detection.counts import Counts, CountsByClass
 
 MEASURES = ("precision", "recall", "f1")
 
@@ -13,7 +13,7 @@ MEASURES = ("precision", "recall", "f1")
 class Rules:
     """How frames are judged: overlap needed, classes that count (all when empty), and times in seconds.
 
-    Frames from before `start` do not count. A frame is judged `max_delay` after it was first heard of.
+    Frames from before ``start`` do not count. A frame is judged ``max_delay`` after its first message.
     """
 
     iou: float
@@ -25,7 +25,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Limits:
-    """The least that is asked, None where nothing is; `each_class` asks it of every class, too."""
+    """The least required values, None for no limit; ``each_class`` applies them to every class, too."""
 
     precision: float | None = None
     recall: float | None = None
@@ -44,23 +44,23 @@ class Worst:
     """The frame with the most mistakes, where it was, and what was wrong."""
 
     place: str
-    tally: Tally
+    counts: Counts
 
     @property
     def mistakes(self) -> int:
         """False and missed ones together."""
-        return self.tally.false + self.tally.missed
+        return self.counts.false + self.counts.missed
 
 
 @dataclass
 class Score:
-    """Tallies of the judged frames, and what was left out.
+    """Counts of the judged frames, and what was left out.
 
-    `answered` of the `frames` had a word of the application. Detections may have been without a truth, late, or under
-    a detectionId that was taken.
+    The application sent something on ``answered`` of the ``frames``. Left out were frames ``without_truth``, and
+    detections that were ``late`` or ``repeated`` a detectionId.
     """
 
-    tallies: Tallies = field(default_factory=Tallies)
+    counts: CountsByClass = field(default_factory=CountsByClass)
     frames: int = 0
     answered: int = 0
     without_truth: int = 0
@@ -68,19 +68,19 @@ class Score:
     repeated: int = 0
     worst: Worst | None = None
 
-    def add(self, tallies: Tallies, place: str, answered: bool) -> None:
-        """One more frame; `place` says which."""
+    def add(self, frame: CountsByClass, place: str, answered: bool) -> None:
+        """Add a frame's counts; ``place`` names it in sentences."""
         self.frames += 1
         self.answered += answered
-        for label, tally in tallies:
-            self.tallies.add(label, tally)
-        worst = Worst(place, tallies.total())
+        for label, counts in frame:
+            self.counts.add(label, counts)
+        worst = Worst(place, frame.total())
         if worst.mistakes > (self.worst.mistakes if self.worst else 0):
             self.worst = worst
 
     def checks(self, limits: Limits) -> tuple[Check, ...]:
         """Totals, what was counted, and a line of measures for each class; a measure without a value keeps no limit."""
-        total = self.tallies.total()
+        total = self.counts.total()
         counts = {
             "true-positives": total.hits,
             "false-positives": total.false,
@@ -98,10 +98,10 @@ class Score:
         )
 
     def _classes(self, limits: Limits) -> Iterator[Check]:
-        for label, tally in self.tallies:
+        for label, counts in self.counts:
             for name in MEASURES:
                 limit = limits.of(name) if limits.each_class else None
-                yield _check(f"{name}-{label or 'unnamed'}", getattr(tally, name), limit)
+                yield _check(f"{name}-{label or 'unnamed'}", getattr(counts, name), limit)
 
 
 def _check(name: str, value: float | None, least: float | None) -> Check:

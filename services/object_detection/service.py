@@ -7,7 +7,7 @@ from typing import Any
 
 from services.base import Context, Flags, Handler
 from services.object_detection.boxes import Box
-from services.object_detection.frames import Kind, Mark, Value
+from services.object_detection.frames import FrameKey, TypeNumber, Value
 from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import MEASURES, Limits, Rules
 from services.object_detection.truth import Truth, TruthError, load
@@ -15,12 +15,12 @@ from services.object_detection.truth import Truth, TruthError, load
 LOGIC = "opendlv.logic.perception.Detection"
 ANNOUNCEMENT = "opendlv.proxy.ImageReadingShm"
 
-Take = Callable[[Mark, int, Value], None]
+Take = Callable[[FrameKey, int, Value], None]
 
 VALUES: dict[str, Callable[[Any], Value]] = {
     "BoundingBox": lambda message: Box(message.x, message.y, message.width, message.height),
     "Property": lambda message: str(message.property),
-    "Type": lambda message: Kind(message.type),
+    "Type": lambda message: TypeNumber(message.type),
 }
 
 
@@ -41,7 +41,7 @@ class ObjectDetection(DetectionEvaluator):
 
     def _take_announcement(self, message: Any, sample_time: int) -> None:
         by_application = (ANNOUNCEMENT, self._sender) in self.inputs
-        self.announce(Mark(sample_time, message.sampleId), by_application)
+        self.announce(FrameKey(sample_time, message.sampleId), by_application)
 
 
 def build(context: Context) -> ObjectDetection:
@@ -54,7 +54,7 @@ def _handlers(sender: int, take: Take) -> dict[tuple[str, int | None], Handler]:
 
 
 def _handler(value: Callable[[Any], Value], take: Take) -> Handler:
-    return lambda message, time: take(Mark(time, message.sampleId), message.detectionId, value(message))
+    return lambda message, time: take(FrameKey(time, message.sampleId), message.detectionId, value(message))
 
 
 def _truth(flags: Flags) -> Truth | None:
@@ -77,12 +77,12 @@ def _truth(flags: Flags) -> Truth | None:
 
 def _rules(flags: Flags) -> Rules:
     if flags["from"] + flags["max-delay"] >= flags["max-time"]:
-        raise ValueError("no frame could be judged: --max-time has to be longer than --from and --max-delay together")
+        raise ValueError("no frame would be judged: --max-time must be longer than --from and --max-delay together")
     return Rules(flags["iou"], flags["classes"], flags["max-delay"], flags["max-time"], flags["from"])
 
 
 def _limits(flags: Flags) -> Limits:
     precision, recall, f1 = (flags[f"min-{name}"] for name in MEASURES)
     if precision is recall is f1 is None:
-        raise ValueError("there is no limit to judge by: give one or more of --min-precision, --min-recall, --min-f1")
+        raise ValueError("there is no limit: give one or more of --min-precision, --min-recall, --min-f1")
     return Limits(precision, recall, f1, flags["min-frames"], flags["each-class"])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from services.object_detection.boxes import Box, Thing
-from services.object_detection.frames import Mark, plain
+from services.object_detection.boxes import Box, LabelledBox
+from services.object_detection.frames import FrameKey, plain
 
 Frames = Literal["one", "sample-time", "number"]
 
@@ -15,27 +15,27 @@ LARGEST = 2**63
 
 
 class TruthError(ValueError):
-    """A truth that cannot be used; the text names the file and the place."""
+    """A truth that cannot be used; the message names file and place."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is in each picture; `frames` says how a frame finds its picture."""
+    """The true boxes of each picture; ``frames`` says how a frame finds its picture."""
 
     frames: Frames
-    pictures: Mapping[int, tuple[Thing, ...]]
+    pictures: Mapping[int, tuple[LabelledBox, ...]]
 
-    def key(self, mark: Mark) -> int:
+    def picture_of(self, key: FrameKey) -> int:
         """The picture that a frame would have."""
-        return {"one": 0, "sample-time": mark.time, "number": mark.number}[self.frames]
+        return {"one": 0, "sample-time": key.time, "number": key.number}[self.frames]
 
-    def of(self, mark: Mark) -> tuple[Thing, ...] | None:
-        """The true boxes of a frame; None where the file says nothing of it."""
-        return self.pictures.get(self.key(mark))
+    def of(self, key: FrameKey) -> tuple[LabelledBox, ...] | None:
+        """The true boxes of a frame; None where the file does not have it."""
+        return self.pictures.get(self.picture_of(key))
 
     def labels(self) -> list[str]:
         """All its classes, sorted."""
-        return sorted({thing.label for things in self.pictures.values() for thing in things})
+        return sorted({each.label for boxes in self.pictures.values() for each in boxes})
 
 
 def load(path: Path, frames: Frames) -> Truth:
@@ -47,16 +47,16 @@ def load(path: Path, frames: Frames) -> Truth:
         raise TruthError(f"{path}: cannot be read as COCO JSON: {reason}") from None
     images = {_whole(entry, "id", place): (entry, place) for entry, place in _entries(document, "images", path)}
     if len(images) != len(document["images"]):
-        raise TruthError(f"{path}: images: two of them have the same id")
+        raise TruthError(f"{path}: images: two have the same id")
     names = {_whole(entry, "id", place): _name(entry, place) for entry, place in _entries(document, "categories", path)}
-    things: dict[int, list[Thing]] = {number: [] for number in images}
+    boxes: dict[int, list[LabelledBox]] = {number: [] for number in images}
     for entry, place in _entries(document, "annotations", path):
         image, category = _known(entry, "image_id", images, place), _known(entry, "category_id", names, place)
-        things[image].append(Thing(names[category], _box(entry, images[image], place)))
-    if not any(things.values()):
-        raise TruthError(f"{path}: has no boxes (annotations)")
+        boxes[image].append(LabelledBox(names[category], _box(entry, images[image], place)))
+    if not any(boxes.values()):
+        raise TruthError(f"{path}: annotations: no boxes, expected at least one")
     keys = _keys(images, frames, path)
-    return Truth(frames, {keys[number]: tuple(boxes) for number, boxes in things.items()})
+    return Truth(frames, {keys[number]: tuple(found) for number, found in boxes.items()})
 
 
 def _entries(document: Any, name: str, path: Path) -> Sequence[tuple[dict[str, Any], str]]:
@@ -77,17 +77,17 @@ def _keys(images: Mapping[int, tuple[Any, str]], frames: Frames, path: Path) -> 
     if frames == "sample-time":
         keys = {number: _whole(entry, "sample_time", place) for number, (entry, place) in images.items()}
         if len(set(keys.values())) < len(keys):
-            raise TruthError(f"{path}: images: two of them have the same sample_time")
+            raise TruthError(f"{path}: images: two have the same sample_time")
         return keys
     if len(images) > 1:
-        raise TruthError(f"{path}: has {len(images)} images, and one was to hold for every frame: see --truth-frames")
+        raise TruthError(f"{path}: has {len(images)} images, expected one for all frames; see --truth-frames")
     return dict.fromkeys(images, 0)
 
 
 def _box(entry: dict[str, Any], image: tuple[dict[str, Any], str], place: str) -> Box:
     """The box as fractions of its image."""
     if entry.get("iscrowd"):
-        raise TruthError(f"{place}: is a crowd (iscrowd), expected the box of one object")
+        raise TruthError(f"{place}: iscrowd is set, expected the box of one object")
     width, height = (_whole(image[0], side, image[1], 1) for side in ("width", "height"))
     numbers = entry.get("bbox")
     if not isinstance(numbers, list) or len(numbers) != 4 or not all(map(_is_number, numbers)):
@@ -103,14 +103,14 @@ def _box(entry: dict[str, Any], image: tuple[dict[str, Any], str], place: str) -
 def _name(entry: dict[str, Any], place: str) -> str:
     name = entry.get("name")
     if not isinstance(name, str) or not plain(name):
-        raise TruthError(f"{place}.name: expected a text")
+        raise TruthError(f"{place}.name: expected a string")
     return plain(name)
 
 
 def _known(entry: dict[str, Any], key: str, known: Mapping[int, object], place: str) -> int:
     number = _whole(entry, key, place)
     if number not in known:
-        raise TruthError(f"{place}.{key}: there is none with the id {number}")
+        raise TruthError(f"{place}.{key}: no entry has the id {number}")
     return number
 
 

@@ -14,14 +14,14 @@ _log = logging.getLogger(__name__)
 
 
 class RecordingError(ValueError):
-    """A file that cannot become a recording, or that takes no more."""
+    """A file that cannot become a recording, or a disk that is full."""
 
 
 class Recording:
-    """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and says so.
+    """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and logs that.
 
-    Nothing is held back in the process: whatever ends it, the file holds all frames written so far.
-    Raises RecordingError for a file that is there, and where none can be made.
+    Nothing is buffered in the process: whatever ends it, the file holds all frames written so far.
+    Raises RecordingError for a file that exists, and where none can be made.
     """
 
     def __init__(self, path: Path, max_size: int | None = None) -> None:
@@ -31,7 +31,7 @@ class Recording:
         try:
             self._writer = RecordingWriter(path)
         except FileExistsError:
-            raise RecordingError(f"{path} is there already and is not overwritten") from None
+            raise RecordingError(f"{path} exists and is not overwritten") from None
         except OSError as error:
             raise RecordingError(f"{path} cannot be written: {error.strerror}") from None
 
@@ -41,12 +41,12 @@ class Recording:
         return self._writer.frames
 
     def command(self, command: int) -> None:
-        """RecorderCommand: 1 records from the next message on, 2 stops; anything else is no command."""
+        """RecorderCommand: 1 records from the next message on, 2 stops; others are logged and ignored."""
         if command not in (RECORD, STOP):
-            _log.warning("%d is no command for a recorder, expected 1 to record or 2 to stop", command)
+            _log.warning("unknown recorder command %d, expected 1 to record or 2 to stop", command)
             return
         self.is_on = command == RECORD
-        _log.info("recording %s, %d messages are recorded", "goes on" if self.is_on else "stops", self.frames)
+        _log.info("recording %s with %d messages", "resumed" if self.is_on else "stopped", self.frames)
 
     def write(self, envelope: Envelope) -> None:
         """Append an envelope as it was received; raises RecordingError when the disk takes no more."""
@@ -82,5 +82,5 @@ class Recording:
 
     def _leave_out(self, reason: str) -> None:
         if not self.left_out:
-            _log.warning("a message is not recorded: %s", reason)
+            _log.warning("a message was not recorded: %s", reason)
         self.left_out += 1

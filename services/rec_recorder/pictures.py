@@ -34,12 +34,12 @@ class Camera:
         self._encoder: VideoEncoder | None = None
 
     def envelope(self, now: int) -> Envelope | None:
-        """The message of a new picture, if there is one; raises SourceError or VideoError for none that can be."""
+        """The message of a new picture, if there is one; raises SourceError or VideoError when that fails."""
         taken = self._source.take(now)
         if taken is None:
             return None
         data, sample_time = taken
-        layout = self._source.wanted.layout(len(data))
+        layout = self._source.spec.layout(len(data))
         if self._encoder is None or layout != self._layout:
             quality = self._quality
             self._encoder = VideoEncoder(*layout, quality.key_interval, quality.quality, quality.lossless)
@@ -50,12 +50,12 @@ class Camera:
         return Envelope(self._messages.id(MESSAGE), payload, sent, sent, sample_time, self._sender_stamp)
 
     def restart(self) -> None:
-        """Begin with the next picture, one that stands alone, as what came before is not in the recording."""
+        """Begin with a key frame at the next picture, as those before are not in the recording."""
         self._source.skip()
         self._encoder = None
 
     def close(self) -> None:
-        """Let go of the memory."""
+        """Detach from the memory."""
         self._source.close()
 
     def _message(self, packet: bytes) -> Any:
@@ -86,6 +86,6 @@ class Cameras:
         self._was_on = True
 
     def close(self) -> None:
-        """Let go of all memories."""
+        """Detach from all memories."""
         for camera in self._cameras:
             camera.close()

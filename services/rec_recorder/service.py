@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from services.base import Context, Service
 from services.base.service import period_of
 from services.rec_recorder.model import Recording
-from services.rec_recorder.source import Source, Wanted, parse
+from services.rec_recorder.source import MemorySpec, Source, parse
 
 if TYPE_CHECKING:
     from services.rec_recorder.pictures import Cameras
@@ -18,7 +18,7 @@ MEGABYTE = 1_000_000
 
 
 class Recorder(Service):
-    """Records every envelope that comes, whatever its message, and pictures where there are cameras."""
+    """Records every envelope, and pictures where there are cameras."""
 
     period = None
 
@@ -60,13 +60,13 @@ def build(context: Context) -> Service:
     recording = context.resources.enter_context(Recording(Path(flags["rec"]), max_size))
     if flags["paused"]:
         recording.is_on = False
-    sources = [Source(wanted, round(period_of(flags["frames"]))) for wanted in memories if flags["frames"]]
+    sources = [Source(spec, round(period_of(flags["frames"]))) for spec in memories if flags["frames"]]
     cameras = _cameras(context, sources, recording) if sources else None
     snapshot = _snapshot(context, Path(flags["snapshot"]), memories[0]) if flags["snapshot"] else None
     return Recorder(recording, cameras, snapshot, flags["commands"])
 
 
-def _snapshot(context: Context, path: Path, memory: Wanted) -> "Snapshot":
+def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "Snapshot":
     from services.rec_recorder.snapshot import Snapshot
 
     snapshot = Snapshot(Source(memory, 1), path)

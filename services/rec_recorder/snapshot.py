@@ -14,7 +14,7 @@ _log = logging.getLogger(__name__)
 class Snapshot:
     """The first picture of ``source``, and then the first from a test's begin on, in the file ``path``.
 
-    A picture that cannot be written is told in the log, and ends no recording.
+    A picture that cannot be written is logged; the recording goes on.
     """
 
     def __init__(self, source: Source, path: Path) -> None:
@@ -35,14 +35,14 @@ class Snapshot:
         try:
             self._write(taken[0])
         except (ValueError, OSError) as error:
-            _log.warning("there is no snapshot: %s", error)
+            _log.warning("no snapshot was taken: %s", error)
 
     def close(self) -> None:
-        """Let go of the memory."""
+        """Detach from the memory."""
         self._source.close()
 
     def _write(self, data: bytes) -> None:
-        layout = self._source.wanted.layout(len(data))
+        layout = self._source.spec.layout(len(data))
         done, png = cv2.imencode(".png", pixels.to_bgr(pixels.view(data, *layout), layout[0]))
         if not done:
             raise OSError(f"a picture of {layout[1]} x {layout[2]} pixels cannot be encoded")

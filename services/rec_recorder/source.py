@@ -1,4 +1,4 @@
-"""Memories as the recorder is told of them, and the pictures that it takes from one without standing in line."""
+"""The memories to record, and pictures taken from them without being one of their readers."""
 
 import logging
 import re
@@ -14,18 +14,18 @@ COMMON_SIZES = (
     (320, 240), (640, 360), (640, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024),
     (1640, 1232), (1920, 1080), (2592, 1944), (3280, 2464),
 )  # fmt: skip
-HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3}  # twice the bytes a pixel
+HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3}  # twice the bytes per pixel
 
 _WRITTEN = re.compile(r"(?P<name>[^:]+)(:(?P<width>[1-9][0-9]{0,4})x(?P<height>[1-9][0-9]{0,4}))?")
 _log = logging.getLogger(__name__)
 
 
 class SourceError(ValueError):
-    """A memory that is written wrongly or holds no picture; one sentence."""
+    """A wrong name of a memory, or one without a picture; one sentence."""
 
 
 @dataclass(frozen=True)
-class Wanted:
+class MemorySpec:
     """A memory to record, and the size of its pictures where it is known (else 0 x 0)."""
 
     name: str
@@ -38,36 +38,38 @@ class Wanted:
             for kind, half in HALF_BYTES.items():
                 if self.width * self.height * half // 2 == size:
                     return kind, self.width, self.height
-            text = f"which is no picture of {self.width} x {self.height} pixels"
+            text = f"not those of a picture of {self.width} x {self.height} pixels"
             raise SourceError(f"memory '{self.name}' has {size} bytes, {text}")
-        kinds = sorted(HALF_BYTES, key=lambda kind: kind not in self.name)  # a name that tells its format counts
+        kinds = sorted(HALF_BYTES, key=lambda kind: kind not in self.name)  # a format in the name comes first
         for kind in kinds:
             for width, height in COMMON_SIZES:
                 if width * height * HALF_BYTES[kind] // 2 == size:
-                    _log.info("memory '%s' is taken for %d x %d pixels of %s", self.name, width, height, kind)
+                    _log.info("assuming that memory '%s' has %d x %d pixels of %s", self.name, width, height, kind)
                     return kind, width, height
-        raise SourceError(f"memory '{self.name}' has {size} bytes, of no usual size: write {self.name}:WIDTHxHEIGHT")
+        raise SourceError(
+            f"memory '{self.name}' has {size} bytes, not those of a common size: write {self.name}:WIDTHxHEIGHT"
+        )
 
 
-def parse(text: str) -> Wanted:
+def parse(text: str) -> MemorySpec:
     """`name` or `name:640x480`; raises SourceError."""
     match = _WRITTEN.fullmatch(text)
     if match is None:
         raise SourceError(
-            f"'{text}' is no memory to record, expected a name such as video0.i420 or video0.i420:640x480"
+            f"'{text}' is not a memory to record, expected a name such as video0.i420 or video0.i420:640x480"
         )
-    return Wanted(match["name"], int(match["width"] or 0), int(match["height"] or 0))
+    return MemorySpec(match["name"], int(match["width"] or 0), int(match["height"] or 0))
 
 
 class Source:
     """The newest picture of a memory, at most one each `period` microseconds of its own sample times.
 
-    It looks at the memory and never waits for a notification: a camera that counts its readers does not see it.
-    What was in the memory when it was found is left, as it may be no picture yet.
+    It polls the memory and never waits for a notification, so that a camera that counts its readers does not see it.
+    What was in the memory at first is skipped, as it may not be a picture yet.
     """
 
-    def __init__(self, wanted: Wanted, period: int, attach: Callable[[str], SharedMemory] | None = None) -> None:
-        self.wanted = wanted
+    def __init__(self, spec: MemorySpec, period: int, attach: Callable[[str], SharedMemory] | None = None) -> None:
+        self.spec = spec
         self._period = period
         self._attach = attach or SharedMemory.attach
         self._memory: SharedMemory | None = None
@@ -90,20 +92,20 @@ class Source:
                 time = self._memory.sample_time()
                 return (bytes(self._memory.buffer), time) if self._is_due(time) else None
         except SharedMemoryError as error:
-            _log.debug("no picture of '%s': %s", self.wanted.name, error)
+            _log.debug("no picture of '%s': %s", self.spec.name, error)
             if not self._is_there():
                 self.close()
                 self._retry = now + RETRY
             return None
 
     def skip(self) -> None:
-        """Leave the picture that is there now."""
+        """Skip the picture that is there now."""
         if self._memory is not None:
             with suppress(SharedMemoryError), self._memory.lock(PATIENCE):
                 self._last, self._due = self._memory.sample_time(), None
 
     def close(self) -> None:
-        """Let go of the memory."""
+        """Detach from the memory."""
         if self._memory is not None:
             self._memory.close()
             self._memory = None
@@ -121,7 +123,7 @@ class Source:
     def _found(self, now: int) -> bool:
         if now < self._retry:
             return False
-        memory = self._attach(self.wanted.name)
+        memory = self._attach(self.spec.name)
         try:
             with memory.lock(PATIENCE):
                 self._last, self._due = memory.sample_time(), None

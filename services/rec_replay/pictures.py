@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.video.decoder import Frame, VideoDecoder, VideoError, has_
 from services.rec_replay.selection import IMAGE
 
 FARTHEST = 3000
-"""Pictures that are looked at for one that stands alone, before a place in the recording."""
+"""Pictures that are searched for a key frame before a place in the recording."""
 
 _log = logging.getLogger(__name__)
 
@@ -39,7 +39,7 @@ class Decoder:
         self._codec: VideoDecoder | None = None
 
     def restart(self) -> None:
-        """What comes next does not follow on what came before."""
+        """The next picture does not follow the last one."""
         self._codec = None
 
     def frame(self, envelope: Envelope) -> Frame | None:
@@ -53,13 +53,13 @@ class Decoder:
         self.undecoded += frame is None
         return frame
 
-    def stands_alone(self, envelope: Envelope) -> bool:
+    def is_key_frame(self, envelope: Envelope) -> bool:
         """Whether decoding can begin here."""
         image = self._image(envelope)
         return image is not None and has_key_frame(image.data)
 
     def _image(self, envelope: Envelope) -> Any:
-        """Set 0.9 has the same fields under other names."""
+        """The decoded message; set 0.9 has the same fields under other names."""
         try:
             return self._messages.decode(IMAGE, envelope.payload)
         except MessageError:
@@ -83,19 +83,19 @@ def first_frame(recording: Recording, rows: Numbers) -> Frame:
 
 
 def lead_in(recording: Recording, rows: Numbers, before: int) -> Iterator[Envelope]:
-    """The messages to decode first so that row number `before` of the rows can be: from the last that stands alone."""
+    """The messages to decode before row number ``before`` of the rows: from the last key frame."""
     decoder, first = Decoder(), max(0, before - FARTHEST)
     for number in range(before, first - 1, -1):
-        if number < len(rows) and decoder.stands_alone(recording.envelope(int(rows[number]))):
+        if number < len(rows) and decoder.is_key_frame(recording.envelope(int(rows[number]))):
             yield from recording.envelopes(rows[number:before])
             return
     yield from recording.envelopes(rows[first:before])
 
 
-class Screen:
-    """The memories of the pictures: each is copied and stamped under the lock, then told.
+class PictureMemories:
+    """Memories for pictures: each is copied and stamped under the lock, then announced.
 
-    A picture of another size than the first is left out, and counted in `misfits`.
+    A picture of another size than the first is skipped, and counted in ``misfits``.
     """
 
     def __init__(self, argb: SharedMemory, i420: SharedMemory | None) -> None:
@@ -106,7 +106,7 @@ class Screen:
         """Publish a picture; raises SharedMemoryError when a reader keeps the lock."""
         if picture.argb.nbytes != self._argb.size:
             if not self.misfits:
-                _log.warning("the picture of %d us has another size than the first and is left out", sample_time)
+                _log.warning("skipped the picture of %d us, which has another size than the first", sample_time)
             self.misfits += 1
             return
         for memory, array in ((self._argb, picture.argb), (self._i420, picture.i420)):

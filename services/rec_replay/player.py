@@ -10,7 +10,7 @@ _log = logging.getLogger(__name__)
 
 
 class Player:
-    """Says which entries are due. `due` holds the time of each in microseconds from the start, ascending.
+    """Computes which entries are due. ``due`` holds the time of each in microseconds from the start, ascending.
 
     It waits for `play` before anything is due. With `rewinds` it begins anew at its end; else it is `ended` then.
     """
@@ -34,7 +34,7 @@ class Player:
         return self.position >= len(self._due)
 
     def play(self) -> None:
-        """Go on from here."""
+        """Play from here."""
         self.playing = True
 
     def command(self, command: int, seek_to: float) -> None:
@@ -50,7 +50,7 @@ class Player:
             self._seek(min(int(len(self) * seek_to), len(self) - 1))
         else:
             _log.warning(
-                "command %d to %g is none for a player: 1 play, 2 pause, 3 seek 0 to 1, 4 step", command, seek_to
+                "unknown player command %d to %g, expected 1 play, 2 pause, 3 seek 0 to 1, 4 step", command, seek_to
             )
 
     def advance(self, now: int) -> None:
@@ -60,7 +60,7 @@ class Player:
         self._now = now
 
     def when(self, position: int, in_next_round: bool = False) -> int:
-        """The test time at which an entry is due when nothing holds the player up."""
+        """The test time at which an entry is due if the player is not paused before."""
         due: int = self._due[position] + (self._due[-1] if in_next_round else 0)
         return (self._now or 0) + due - self._elapsed
 
@@ -69,7 +69,7 @@ class Player:
         if self.ended and self.rewinds and self.playing:
             self._elapsed = self._elapsed - self._due[-1] if self._due[-1] else 0
             self.position, self.jumped = 0, True
-            return None  # a round an update at most: a part may last no time at all
+            return None  # one round per update, as a part may have no duration
         if self.ended:
             return None
         due = self._due[self.position]

@@ -1,4 +1,4 @@
-"""What of a recording is played: a stretch of time, some messages, and the pictures of one camera."""
+"""The part of a recording to play: a span of time, some messages, and the pictures of one camera."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ MICROSECONDS = 1_000_000
 
 
 class SelectionError(ValueError):
-    """A selection that is written wrongly, or with which nothing is played; one sentence."""
+    """A wrong selection, or one that leaves nothing to play; one sentence."""
 
 
 @dataclass(frozen=True)
 class Selection:
     """Seconds count from the recording's first message; `messages` and `without` name messages on the bus.
 
-    Of pictures (ImageReading) those of `video_sender` are shown, unless that is None; on the bus they come only
-    where `send_video` says so. DoDo's own messages of an earlier test are never sent.
+    Pictures (ImageReading) of ``video_sender`` are shown, unless that is None; they are sent on the bus only with
+    ``send_video``. DoDo's own messages of an earlier test are never sent.
     """
 
     start: float = 0.0
@@ -67,7 +67,7 @@ def select(recording: Recording, selection: Selection, known: MessageSet, max_ga
     shown = images & (index["sender_stamp"] == selection.video_sender)
     chosen = np.flatnonzero(sent | shown)
     if not len(chosen):
-        raise SelectionError(f"nothing of {recording.path} is played: the part that is chosen holds no message")
+        raise SelectionError(f"{recording.path} has no message in the selected part")
     return Part(stretch[chosen], due[chosen], sent[chosen], shown[chosen])
 
 
@@ -75,7 +75,7 @@ def _stretch(recording: Recording, selection: Selection) -> Numbers:
     times = recording.index["time"]
     valid = times[times > 0]
     begin = int(valid.min()) if len(valid) else 0
-    # a part may begin anywhere; the whole has what bears no time, too
+    # the whole recording includes messages without a time, a part does not
     start = begin + round(selection.start * MICROSECONDS) if selection.start else None
     end = None if selection.end is None else begin + round(selection.end * MICROSECONDS)
     return recording.rows(start=start, end=end)
@@ -92,7 +92,7 @@ def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:
 def _parsed(text: str, known: MessageSet) -> tuple[int, int | None]:
     name, slash, stamp = text.partition("/")
     if slash and not stamp.isdecimal():
-        raise SelectionError(f"'{text}' is no message: after the slash stands a sender stamp, a number")
+        raise SelectionError(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
     try:
         id_ = int(name) if name.isdecimal() else known.id(name)
     except UnknownMessage as error:

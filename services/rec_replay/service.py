@@ -14,7 +14,7 @@ from dodo_dsl.opendlv.messages import versions
 from dodo_dsl.opendlv.recordings.recording import Recording
 from services.base import Context, Service
 from services.base.service import Output, period_of
-from services.rec_replay.pictures import Screen, first_frame
+from services.rec_replay.pictures import PictureMemories, first_frame
 from services.rec_replay.player import Player
 from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Selection, SelectionError, select
 from services.rec_replay.stream import Stream
@@ -29,9 +29,9 @@ _log = logging.getLogger(__name__)
 
 
 class Replay(Service):
-    """Sends what is due and shows pictures; when all has been played, the input ends `settle` microseconds later.
+    """Sends due messages and shows pictures; ``settle`` microseconds after the last of them the input ends.
 
-    ``shifts`` gives messages and pictures the test time at which they are due, else they keep their sample times.
+    With ``shifts`` messages and pictures get the test time at which they are due, else they keep their sample times.
     """
 
     period = period_of(LOOKS_HZ)
@@ -40,17 +40,17 @@ class Replay(Service):
         self,
         player: Player,
         stream: Stream,
-        screen: Screen | None,
+        memories: PictureMemories | None,
         status: type[Any],
         shifts: bool,
         settle: int,
         expect: Callable[[int], None],
     ) -> None:
         self.inputs = {(COMMAND, None): self._command}
-        self._player, self._stream, self._screen = player, stream, screen
+        self._player, self._stream, self._memories = player, stream, memories
         self._status, self._shifts, self._settle = status, shifts, settle
         self._too_large = 0
-        self._told = -STATUS_PERIOD
+        self._reported = -STATUS_PERIOD
         self._end: int | None = None
         self._pictures = np.flatnonzero(stream.shown)
         self._expect = expect
@@ -74,8 +74,8 @@ class Replay(Service):
             self._end = now + self._settle
         self.finished = self._end is not None and now >= self._end and not player.jumped
         self._expect(self._next_picture(now))
-        if now - self._told >= STATUS_PERIOD:
-            self._told = now
+        if now - self._reported >= STATUS_PERIOD:
+            self._reported = now
             status = self._status(state=_PLAYING, numberOfEntries=len(player), currentEntryForPlayback=player.position)
             yield Output(status, 0)
 
@@ -90,13 +90,13 @@ class Replay(Service):
         return now + round(looks * self.period)
 
     def close(self) -> None:
-        """Say what was not played as it should."""
+        """Log what could not be played."""
         if self._too_large:
             _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
         if self._stream.decoder.undecoded:
             _log.warning("%d pictures could not be decoded and were not shown", self._stream.decoder.undecoded)
-        if self._screen is not None:
-            _log.info("%d pictures were shown", self._screen.shown)
+        if self._memories is not None:
+            _log.info("%d pictures were shown", self._memories.shown)
 
     def _command(self, message: Any, _sample_time: int) -> None:
         self._player.command(message.command, message.seekTo)
@@ -106,13 +106,13 @@ class Replay(Service):
         self._player.jumped = False
 
     def _play(self, due: int) -> Envelope | None:
-        """Show an entry's picture and give what is to be sent."""
+        """Show an entry's picture; returns the message to send."""
         envelope, is_sent, picture = self._stream.take()
         envelope = envelope._replace(received=0)  # it has not been received yet
         if self._shifts:
             envelope = envelope._replace(sent=due, sample_time=due)
-        if picture is not None and self._screen is not None:
-            self._screen.show(picture, envelope.sample_time)
+        if picture is not None and self._memories is not None:
+            self._memories.show(picture, envelope.sample_time)
         if not is_sent:
             return None
         if len(envelope.payload) > LARGEST_PAYLOAD:
@@ -135,8 +135,8 @@ def build(context: Context) -> Service:
         player.play()
     settle = round(flags["settle"] * MICROSECONDS)
     status = context.messages.type(STATUS)
-    screen = _screen(context, recording, part)
-    service = Replay(player, stream, screen, status, flags["sample-times"] == "test", settle, context.clock.expect)
+    memories = _memories(context, recording, part)
+    service = Replay(player, stream, memories, status, flags["sample-times"] == "test", settle, context.clock.expect)
     context.resources.callback(service.close)
     return service
 
@@ -156,25 +156,25 @@ def _part(context: Context, recording: Recording) -> Part:
     max_gap = round(flags["max-gap"] * MICROSECONDS)
     part = select(recording, selection, versions.load(version, *own), max_gap, flags["timemod"])
     seconds = part.due[-1] / MICROSECONDS
-    _log.info("plays %d messages and %d pictures in %.1f s", part.sent.sum(), part.shown.sum(), seconds)
+    _log.info("playing %d messages and %d pictures in %.1f s", part.sent.sum(), part.shown.sum(), seconds)
     return part
 
 
-def _screen(context: Context, recording: Recording, part: Part) -> Screen | None:
+def _memories(context: Context, recording: Recording, part: Part) -> PictureMemories | None:
     """Memories for the pictures; None where there are none to show."""
     flags = context.flags
     if not flags["video"]:
         return None
     if not part.shown.any():
         _refuse_other_senders(recording, flags["video-sender"])
-        _log.warning("%s holds no pictures in the part that is played: no shared memory is made", recording.path)
+        _log.warning("%s has no pictures in the selected part: no shared memory is created", recording.path)
         return None
     frame = first_frame(recording, part.rows[part.shown])
     argb = context.memory(flags["name.argb"], frame.width * frame.height * 4)
     if frame.width % 2 or frame.height % 2:
-        _log.warning("pictures of %d x %d pixels cannot be had as I420", frame.width, frame.height)
-        return Screen(argb, None)
-    return Screen(argb, context.memory(flags["name.i420"], frame.width * frame.height * 3 // 2))
+        _log.warning("pictures of %d x %d pixels cannot be converted to I420", frame.width, frame.height)
+        return PictureMemories(argb, None)
+    return PictureMemories(argb, context.memory(flags["name.i420"], frame.width * frame.height * 3 // 2))
 
 
 def _refuse_other_senders(recording: Recording, sender: int) -> None:

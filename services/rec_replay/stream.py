@@ -1,4 +1,4 @@
-"""The entries of a part one after the other, read some at a time, pictures decoded ahead."""
+"""The entries of a part in order, read in blocks, pictures decoded ahead."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -15,7 +15,7 @@ READ_AHEAD = 256
 
 
 class Entry(NamedTuple):
-    """An entry as it is played: `picture` where it is shown and could be decoded, `is_sent` where the bus gets it."""
+    """An entry to play: ``picture`` if it is shown and could be decoded, ``is_sent`` if it goes to the bus."""
 
     envelope: Envelope
     is_sent: bool

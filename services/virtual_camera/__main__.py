@@ -1,5 +1,3 @@
-"""The virtual camera as a program: pictures of a map into shared memory."""
-
 import sys
 from pathlib import Path
 

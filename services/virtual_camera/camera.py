@@ -34,7 +34,7 @@ def quaternion_rotation(x: float, y: float, z: float, w: float) -> Array:
     """The rotation of a quaternion of any length; ValueError when it has none or is not finite."""
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if not math.isfinite(length) or length < 1e-6:
-        raise ValueError(f"quaternion ({x}, {y}, {z}, {w}) is no rotation")
+        raise ValueError(f"quaternion ({x}, {y}, {z}, {w}) is not a rotation")
     x, y, z, w = x / length, y / length, z / length, w / length
     return np.array(
         [
@@ -106,7 +106,7 @@ class View:
         return (points - self.position) @ self.axes.T
 
     def visible_part(self, polygon: Array) -> Array:
-        """What of a convex polygon (k, 3), in the camera frame, lies inside the frustum; maybe empty."""
+        """The part of a convex polygon (k, 3), in the camera frame, inside the frustum; may be empty."""
         distances = polygon @ self.camera.planes + self.camera.offsets
         inside = distances >= 0.0
         if not inside.any(axis=0).all():

@@ -37,7 +37,7 @@ class Frame(Protocol):
 
 
 def body_pose(frame: Frame) -> Pose:
-    """The pose that a frame tells; ValueError when it tells none."""
+    """The pose in a frame; ValueError when it has none."""
     position = np.array([frame.x, frame.y, frame.z], dtype=np.float64)
     if not (np.abs(position) <= FARTHEST).all():
         raise ValueError(f"position ({frame.x}, {frame.y}, {frame.z}) is not within {FARTHEST:.0f} m")
@@ -80,7 +80,7 @@ class VirtualCamera:
         self._framed: int | None = None
         self._log = logging.getLogger(__name__)
         self.refused = 0
-        """How many frames told no pose; the camera stays where it was."""
+        """How many frames had no valid pose; the camera stays where it was."""
 
     def take_frame(self, frame: Frame, sample_time: int) -> None:
         """The vehicle is where the frame says; ``sample_time`` in us of test time."""
@@ -88,7 +88,7 @@ class VirtualCamera:
             pose = body_pose(frame)
         except ValueError as error:
             if not self.refused:
-                self._log.warning("refused the frame of %d us, the first of its kind: %s", sample_time, error)
+                self._log.warning("refused the frame of %d us, and will refuse all such: %s", sample_time, error)
             self.refused += 1
             return
         if self._motion is None or self._framed is None:

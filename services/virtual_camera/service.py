@@ -15,7 +15,7 @@ from services.virtual_camera.camera import Pinhole, Pose
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import Scene, Wishes, load_scene
+from services.virtual_camera.draw.scene import Scene, SceneOptions, load_scene
 from services.virtual_camera.image.lens import Distortion
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.overlays import load_overlays
@@ -27,8 +27,8 @@ Memories = list[tuple[SharedMemory, str]]
 """Shared memory and what it holds: argb, i420 or bgr."""
 
 
-class Teller:
-    """Says true boxes as OpenDLV's detections, under a sender stamp of its own."""
+class TruthSender:
+    """Sends true boxes as OpenDLV's detections, under its own sender stamp."""
 
     def __init__(self, truth: Truth, classes: Iterable[str], camera: Pinhole, messages: MessageSet, stamp: int) -> None:
         self._truth, self._camera, self._stamp = truth, camera, stamp
@@ -36,7 +36,7 @@ class Teller:
         names = ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
         self._kinds = [messages.type(f"opendlv.logic.perception.{name}") for name in names]
 
-    def tell(self, pose: Pose) -> Iterator[Output]:
+    def outputs(self, pose: Pose) -> Iterator[Output]:
         """Three messages a box, the same detectionId for the same model in every picture."""
         for box in self._truth.boxes(pose):
             for message in self._messages(box):
@@ -56,18 +56,18 @@ class Teller:
 class CameraService(Service):
     """Draws at its rate from the frames of one sender."""
 
-    def __init__(self, camera: VirtualCamera, freq: float, frame_id: int, teller: Teller | None) -> None:
+    def __init__(self, camera: VirtualCamera, freq: float, frame_id: int, truth_sender: TruthSender | None) -> None:
         self.period = period_of(freq)
         self.inputs = {("opendlv.sim.Frame", frame_id): camera.take_frame}
-        self._camera, self._teller = camera, teller
+        self._camera, self._truth_sender = camera, truth_sender
 
     def update(self, now: int) -> Iterable[Output]:
         pose = self._camera.update(now)
-        return self._teller.tell(pose) if self._teller and pose else ()
+        return self._truth_sender.outputs(pose) if self._truth_sender and pose else ()
 
 
 def publisher(memories: Memories) -> Publish:
-    """Writes all pictures as OpenDLV's readers expect: copied and stamped under the lock, then told."""
+    """Writes all pictures as OpenDLV's readers expect: copied and stamped under the lock, then announced."""
 
     def publish(argb: Image, i420: Image, sample_time: int) -> None:
         pictures = {"argb": argb, "i420": i420}
@@ -82,7 +82,7 @@ def publisher(memories: Memories) -> Publish:
     return publish
 
 
-def opened(flags: Flags) -> tuple[Renderer, Optics]:
+def open_scene(flags: Flags) -> tuple[Renderer, Optics]:
     """The scene and the camera of the flags; raises MapError and ValueError."""
     cv2.setNumThreads(1)
     scene = _scene(flags)
@@ -96,7 +96,7 @@ def mounted_camera(flags: Flags, renderer: Renderer, optics: Optics, publish: Pu
     return VirtualCamera(renderer, mounted, publish, optics, _start(flags))
 
 
-def truth_of(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[Truth, dict[str, str]]:
+def open_truth(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[Truth, dict[str, str]]:
     """What knows the true boxes, and the classes by model; raises ValueError for a model that the map lacks."""
     classes = classes_of(flags["truth-classes"], renderer.bodies.names)
     limits = Limits(flags["truth-min-visible"], flags["truth-min-height"])
@@ -104,10 +104,10 @@ def truth_of(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[Truth, d
 
 
 def _scene(flags: Flags) -> Scene:
-    light = Light.asked(flags["light.azimuth"], flags["light.elevation"], flags["light.ambient"])
+    light = Light.of_flags(flags["light.azimuth"], flags["light.elevation"], flags["light.ambient"])
     lines = tuple(flags["lines"])
     return load_scene(
-        Path(flags["map-path"]), Wishes(light, lines, flags["line-width"], flags["clutter"], flags["seed"])
+        Path(flags["map-path"]), SceneOptions(light, lines, flags["line-width"], flags["clutter"], flags["seed"])
     )
 
 
@@ -127,12 +127,12 @@ def _start(flags: Flags) -> Pose | None:
     return Pose.at(x, y, 0.0, yaw=math.radians(yaw))
 
 
-def _teller(context: Context, renderer: Renderer, optics: Optics) -> Teller | None:
+def _truth_sender(context: Context, renderer: Renderer, optics: Optics) -> TruthSender | None:
     stamp = context.flags["truth-sender"]
     if stamp is None:
         return None
-    truth, classes = truth_of(context.flags, renderer, optics)
-    return Teller(truth, classes.values(), optics.camera, context.messages, stamp)
+    truth, classes = open_truth(context.flags, renderer, optics)
+    return TruthSender(truth, classes.values(), optics.camera, context.messages, stamp)
 
 
 def _memories(context: Context, pixels: int) -> Memories:
@@ -144,7 +144,7 @@ def _memories(context: Context, pixels: int) -> Memories:
 def build(context: Context) -> Service:
     """The service from its flags; raises MapError, ValueError and SharedMemoryError."""
     flags = context.flags
-    renderer, optics = opened(flags)
+    renderer, optics = open_scene(flags)
     publish = publisher(_memories(context, flags["width"] * flags["height"]))
     camera = mounted_camera(flags, renderer, optics, publish)
-    return CameraService(camera, flags["freq"], flags["frame-id"], _teller(context, renderer, optics))
+    return CameraService(camera, flags["freq"], flags["frame-id"], _truth_sender(context, renderer, optics))

@@ -18,7 +18,7 @@ from services.base import Flags
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.service import mounted_camera, opened, truth_of
+from services.virtual_camera.service import mounted_camera, open_scene, open_truth
 from services.virtual_camera.truth import Box
 
 OUTPUT = "--output="
@@ -27,24 +27,24 @@ NOW = 0
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
-    """Draws and writes the picture; the truth about it is printed."""
+    """Draw and write the picture; print the truth about it."""
     try:
-        said, code = drawn(argv), 0
+        result, code = write_picture(argv), 0
     except (ValueError, OSError) as error:
-        said, code = {"error": " ".join(str(error).split())}, 2 if isinstance(error, ValueError) else 1
-    stdout.write(json.dumps(said) + "\n")
+        result, code = {"error": " ".join(str(error).split())}, 2 if isinstance(error, ValueError) else 1
+    stdout.write(json.dumps(result) + "\n")
     return code
 
 
-def drawn(argv: Sequence[str]) -> dict[str, Any]:
-    """What there is to say of the picture that was written; raises MapError, ValueError and OSError."""
+def write_picture(argv: Sequence[str]) -> dict[str, Any]:
+    """Facts about the picture that was written; raises MapError, ValueError and OSError."""
     outputs = [word.removeprefix(OUTPUT) for word in argv if word.startswith(OUTPUT)]
     if len(outputs) != 1:
         raise ValueError(f"expected {OUTPUT}FILE once: the PNG to write")
     words = [word for word in argv if not word.startswith(OUTPUT)]
     if not any(word.startswith("--start-") for word in words):
         words += ORIGIN
-    picture, boxes = _seen(parse(load_manifest(Path(__file__).parent), [*words, "--cid=1"]))
+    picture, boxes = _draw(parse(load_manifest(Path(__file__).parent), [*words, "--cid=1"]))
     done, png = cv2.imencode(".png", picture[..., :3])
     if not done:
         raise OSError("the picture cannot be encoded as a PNG")
@@ -52,18 +52,18 @@ def drawn(argv: Sequence[str]) -> dict[str, Any]:
     return {"width": picture.shape[1], "height": picture.shape[0], "boxes": boxes}
 
 
-def _seen(flags: Flags) -> tuple[Image, list[dict[str, Any]]]:
-    """The picture (height, width, 4) and what is truly in it."""
-    renderer, optics = opened(flags)
-    truth, _ = truth_of(flags, renderer, optics)
+def _draw(flags: Flags) -> tuple[Image, list[dict[str, Any]]]:
+    """The picture (height, width, 4) and the true boxes in it."""
+    renderer, optics = open_scene(flags)
+    truth, _ = open_truth(flags, renderer, optics)
     pictures: list[Image] = []
     camera = mounted_camera(flags, renderer, optics, lambda argb, _i420, _now: pictures.append(argb))
     pose = camera.update(NOW)
     assert pose is not None, "it starts somewhere"
-    return pictures[0], [_told(box) for box in truth.boxes(pose)]
+    return pictures[0], [_as_json(box) for box in truth.boxes(pose)]
 
 
-def _told(box: Box) -> dict[str, Any]:
+def _as_json(box: Box) -> dict[str, Any]:
     edges = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
     return {"class": box.name, **{name: round(value, 3) for name, value in edges.items()}}
 

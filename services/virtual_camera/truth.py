@@ -18,7 +18,7 @@ _ONE = 256
 
 @dataclass(frozen=True)
 class Box:
-    """What is seen of one model: ``left``, ``top``, ``width``, ``height`` in pixels from the upper left corner.
+    """The visible box of one model: ``left``, ``top``, ``width``, ``height`` in pixels from the upper left corner.
 
     ``number`` counts the map's models, all copies of the first before those of the second; ``visible`` is the share of
     the model's pixels that nothing hides and the picture holds.
@@ -35,7 +35,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Limits:
-    """What is too little to be asked for: the smallest share to be seen, and the smallest height in pixels."""
+    """The least for a box: the smallest visible share, and the smallest height in pixels."""
 
     visible: float = 0.25
     height: float = 4.0

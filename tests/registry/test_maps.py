@@ -168,11 +168,11 @@ def test_cones_are_seen_all_along_the_lane(name):
 
 
 def test_the_cone_is_closed_and_of_the_size_of_the_real_one():
-    crowd = load_scene(MAPS / "straight").crowds[0]
-    low, high = crowd.shape.vertices.min(axis=0), crowd.shape.vertices.max(axis=0)
+    copies = load_scene(MAPS / "straight").models[0]
+    low, high = copies.shape.vertices.min(axis=0), copies.shape.vertices.max(axis=0)
     assert (high - low).tolist() == pytest.approx([0.024, 0.024, 0.034])
-    assert len(crowd.shape.faces) < 60
-    outwards = np.einsum("fi,fi->f", crowd.shape.normals, crowd.shape.centres - crowd.shape.middle)
+    assert len(copies.shape.faces) < 60
+    outwards = np.einsum("fi,fi->f", copies.shape.normals, copies.shape.centres - copies.shape.middle)
     assert (outwards > 0).mean() > 0.7
 
 

@@ -39,7 +39,7 @@ def launch(module: str, folder: Path, *flags: str) -> subprocess.Popen[str]:
     )
 
 
-def hear(session: Session, name: str, sender_stamp: int = 0) -> tuple[Envelope, Any]:
+def receive(session: Session, name: str, sender_stamp: int = 0) -> tuple[Envelope, Any]:
     """The next message of a name and sender stamp, with its envelope."""
     while True:
         envelope = session.receive(PATIENCE)
@@ -48,5 +48,5 @@ def hear(session: Session, name: str, sender_stamp: int = 0) -> tuple[Envelope, 
             return envelope, session.messages.decode(envelope.data_type, envelope.payload)
 
 
-def say(session: Session, name: str, sender_stamp: int = 0, sample_time: int | None = None, **fields: Any) -> None:
+def send(session: Session, name: str, sender_stamp: int = 0, sample_time: int | None = None, **fields: Any) -> None:
     session.send(session.messages.type(name)(**fields), sample_time, sender_stamp)

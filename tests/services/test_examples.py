@@ -12,7 +12,7 @@ import pytest
 
 from services.base.manifest import load_manifest
 from services.base.usage import example_line
-from tests.services.gantry.fakerig import FakeRig
+from tests.services.gantry.fake_rig import FakeRig
 from tests.services.process import PATIENCE, ROOT
 
 FOLDERS = sorted(path.parent for path in ROOT.glob("services/*/service.yml") if path.parent.name != "clock")

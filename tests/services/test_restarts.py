@@ -15,7 +15,7 @@ import pytest
 
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.recordings.recording import Recording
-from tests.services.process import PATIENCE, ROOT, hear, running
+from tests.services.process import PATIENCE, ROOT, receive, running
 
 FRAME, IMAGE = 1003, 1055
 SEEN = "opendlv.proxy.ImageReadingShm"
@@ -75,7 +75,7 @@ def test_readers_and_the_recorder_survive_a_restart_of_a_camera(module: str, cid
         last = 0
         for _ in range(2):
             with running(module, tmp_path, *flags) as camera:
-                seen = [hear(session, SEEN)[0].sample_time for _ in range(4)]
+                seen = [receive(session, SEEN)[0].sample_time for _ in range(4)]
                 until(lambda last=last: max(times(rec, IMAGE), default=0) > last)  # type: ignore[misc]
                 camera.kill()
                 camera.wait(PATIENCE)
@@ -103,7 +103,7 @@ def test_an_evaluator_survives_a_restart_of_what_moves_the_vehicle(cid: int, tmp
     with Session(cid) as session, running("collision", tmp_path, f"--cid={cid}", *track) as judge:
         session.send(session.messages.type("dodo.TestBegin")())
         with running("beacon", tmp_path, f"--cid={cid}", *WAY, "--points=0 0,0 1", "--speed=0.5") as first:
-            while hear(session, "opendlv.sim.Frame", 3)[1].y < 0.1:
+            while receive(session, "opendlv.sim.Frame", 3)[1].y < 0.1:
                 pass
             first.kill()
             first.wait(PATIENCE)

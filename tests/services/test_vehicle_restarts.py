@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dodo_dsl.opendlv.bus.session import Session
-from tests.services.process import PATIENCE, hear, running, say
+from tests.services.process import PATIENCE, receive, running, send
 
 FRAME, STATE, PEDAL = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.proxy.PedalPositionRequest"
 
@@ -14,8 +14,8 @@ def pressed(session: Session, message: str, true: Callable[[float], bool], pedal
     """Press the pedal until vx or x of what is heard is so."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
-        say(session, PEDAL, position=pedal)
-        heard = hear(session, message)[1]
+        send(session, PEDAL, position=pedal)
+        heard = receive(session, message)[1]
         value = float(heard.x if message == FRAME else heard.vx)
         if true(value):
             return value
@@ -28,11 +28,11 @@ def test_the_integrator_survives_a_restart_of_the_dynamic_model(cid: int, tmp_pa
             reached = pressed(session, FRAME, lambda x: x > 0.02)
             first.kill()
             first.wait(PATIENCE)
-        last = hear(session, FRAME)[1].x
+        last = receive(session, FRAME)[1].x
         assert last >= reached
         with running("dynamic_model", tmp_path, f"--cid={cid}"):
             pressed(session, STATE, lambda vx: 0 <= vx < 0.05, pedal=0.0)
-            begin = hear(session, FRAME)[1].x
+            begin = receive(session, FRAME)[1].x
             assert begin >= last
             pressed(session, FRAME, lambda x: x > begin + 0.02)
         assert integrator.poll() is None

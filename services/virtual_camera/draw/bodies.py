@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from services.virtual_camera.camera import NEAR, Array, View
 from services.virtual_camera.draw.bsp import Tree
-from services.virtual_camera.draw.crowd import Crowd
+from services.virtual_camera.draw.copies import Copies
 from services.virtual_camera.draw.faces import Face
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.shading import Group, Piece, cut, gather, silhouettes, whole
@@ -28,15 +28,15 @@ _DRAWINGS: list[Callable[[Group], list[list[Piece]]]] = [silhouettes, whole, cut
 class Bodies:
     """All copies of all models, in fixed order; ``tree`` says which region of space each stands in."""
 
-    def __init__(self, crowds: tuple[Crowd, ...], tree: Tree, light: Light, faces: Sequence[Face] = ()) -> None:
-        self._crowds, self._light = crowds, light
-        counts = [len(crowd.turns) for crowd in crowds]
-        self._crowd = np.repeat(np.arange(len(crowds)), counts)
+    def __init__(self, models: tuple[Copies, ...], tree: Tree, light: Light, faces: Sequence[Face] = ()) -> None:
+        self._models, self._light = models, light
+        counts = [len(copies.turns) for copies in models]
+        self._model = np.repeat(np.arange(len(models)), counts)
         self._member = np.concatenate([np.arange(0), *(np.arange(count) for count in counts)])
-        self._radius = np.repeat([crowd.shape.radius for crowd in crowds], counts)
-        self._middle = np.concatenate([np.zeros((0, 3)), *map(_middles, crowds)])
+        self._radius = np.repeat([copies.shape.radius for copies in models], counts)
+        self._middle = np.concatenate([np.zeros((0, 3)), *map(_middles, models)])
         self._leaf = tree.locate(self._middle)
-        self.names = [crowd.name for crowd in crowds for _ in crowd.turns]
+        self.names = [copies.name for copies in models for _ in copies.turns]
         """The model's name of each body."""
         self._solids = list(self._cut_up(tree, faces))
         self._append(self._solids)
@@ -62,7 +62,7 @@ class Bodies:
     def _append(self, solids: list[Solid]) -> None:
         """Solids are culled and sorted as bodies are."""
         count = len(solids)
-        self._crowd = np.concatenate([self._crowd, np.full(count, len(self._crowds))])
+        self._model = np.concatenate([self._model, np.full(count, len(self._models))])
         self._member = np.concatenate([self._member, np.arange(count)])
         self._radius = np.concatenate([self._radius, np.array([solid.radius for solid in solids])])
         self._middle = np.concatenate([self._middle, np.array([s.middle for s in solids]).reshape(-1, 3)])
@@ -70,20 +70,20 @@ class Bodies:
 
     def _faces(self, body: int) -> Iterator[Face]:
         """The faces of a body in the world, shaded."""
-        crowd, (vertices, numbers) = self._crowds[self._crowd[body]], self.outline(body)
+        copies, (vertices, numbers) = self._models[self._model[body]], self.outline(body)
         for corners in numbers.tolist():
             points = vertices[list(dict.fromkeys(corners))]
             normal = np.cross(points[1] - points[0], points[2] - points[0])
             normal /= np.linalg.norm(normal)
-            lit = np.rint(np.minimum(crowd.colour * self._light.shades(normal @ self._light.direction), 255.0))
+            lit = np.rint(np.minimum(copies.colour * self._light.shades(normal @ self._light.direction), 255.0))
             yield Face(points, normal, float(normal @ points[0]), (*lit.tolist(), 255.0), body)
 
     def outline(self, body: int) -> tuple[Array, Numbers]:
         """A body's vertices (V, 3) in the world and its faces (F, 8) of vertex numbers."""
-        crowd, member = self._crowds[self._crowd[body]], self._member[body]
-        c, s = np.cos(crowd.turns[member]), np.sin(crowd.turns[member])
+        copies, member = self._models[self._model[body]], self._member[body]
+        c, s = np.cos(copies.turns[member]), np.sin(copies.turns[member])
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return crowd.shape.vertices @ turn.T + crowd.positions[member], crowd.shape.faces
+        return copies.shape.vertices @ turn.T + copies.positions[member], copies.shape.faces
 
     def pieces(self, view: View) -> dict[int, list[Drawn]]:
         """For each region with something to see, the bodies in it and their pieces to fill, from back to front."""
@@ -92,11 +92,11 @@ class Bodies:
         seen = seen[np.argsort(-(place[seen] ** 2).sum(axis=1), kind="stable")]
         drawing = self._drawing(view, place, seen)
         drawn: dict[int, list[Piece]] = {}
-        for crowd, kind in sorted(set(zip(self._crowd[seen].tolist(), drawing.tolist(), strict=True))):
-            if crowd == len(self._crowds):
+        for model, kind in sorted(set(zip(self._model[seen].tolist(), drawing.tolist(), strict=True))):
+            if model == len(self._models):
                 continue
-            these = seen[(self._crowd[seen] == crowd) & (drawing == kind)]
-            bodies = _DRAWINGS[kind](self._group(view, crowd, these))
+            these = seen[(self._model[seen] == model) & (drawing == kind)]
+            bodies = _DRAWINGS[kind](self._group(view, model, these))
             drawn.update(zip(these.tolist(), bodies, strict=True))
         regions: dict[int, list[Drawn]] = {}
         for body in seen.tolist():
@@ -114,13 +114,13 @@ class Bodies:
         small = radius * view.camera.focal < SMALL * depth
         return np.where(depth - radius <= NEAR, 2, np.where(small, 0, 1))
 
-    def _group(self, view: View, crowd: int, bodies: Numbers) -> Group:
-        which, members = self._crowds[crowd], self._member[bodies]
+    def _group(self, view: View, model: int, bodies: Numbers) -> Group:
+        which, members = self._models[model], self._member[bodies]
         return gather(view, which.shape, which.colour, which.positions[members], which.turns[members], self._light)
 
 
-def _middles(crowd: Crowd) -> Array:
-    """The middles (n, 3) of a crowd's bounding spheres, in the world."""
-    x, y, z = crowd.shape.middle
-    c, s = np.cos(crowd.turns), np.sin(crowd.turns)
-    return np.asarray(crowd.positions + np.column_stack([c * x - s * y, s * x + c * y, np.full_like(c, z)]))
+def _middles(copies: Copies) -> Array:
+    """The middles (n, 3) of the copies' bounding spheres, in the world."""
+    x, y, z = copies.shape.middle
+    c, s = np.cos(copies.turns), np.sin(copies.turns)
+    return np.asarray(copies.positions + np.column_stack([c * x - s * y, s * x + c * y, np.full_like(c, z)]))

@@ -36,7 +36,7 @@ class Light:
         return cls(DIRECTION, AMBIENT, DIFFUSE, False)
 
     @classmethod
-    def asked(cls, azimuth: float | None, elevation: float | None, ambient: float | None) -> Self:
+    def of_flags(cls, azimuth: float | None, elevation: float | None, ambient: float | None) -> Self:
         """From angles in deg and the share of light from everywhere; what is None is as usual."""
         if azimuth is None and elevation is None and ambient is None:
             return cls.usual()

@@ -25,7 +25,7 @@ class Renderer:
         self.camera = Pinhole(width, height, fovy)
         self.scene = scene
         self._tree = Tree(list(scene.faces))
-        self.bodies = Bodies(scene.crowds, self._tree, scene.light, scene.faces)
+        self.bodies = Bodies(scene.models, self._tree, scene.light, scene.faces)
 
     def render(self, pose: Pose, out: Image | None = None) -> Image:
         """What a camera sees: (height, width, 4) in the order B, G, R, A.

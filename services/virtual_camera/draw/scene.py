@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from services.virtual_camera.camera import Array
-from services.virtual_camera.draw.crowd import Crowd
+from services.virtual_camera.draw.copies import Copies
 from services.virtual_camera.draw.faces import Covering, Face, TextureMap, box_faces
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.lines import line_faces, pick
@@ -25,7 +25,7 @@ _GROUND_REACH = 40.0
 
 
 @dataclass(frozen=True)
-class Wishes:
+class SceneOptions:
     """What a scene has beyond its map: the light, lines of these obstacles on the ground, and boxes around it."""
 
     light: Light = field(default_factory=Light.usual)
@@ -39,7 +39,7 @@ class Wishes:
 class Scene:
     """All that can be seen, in the world frame; ``sky`` and ``ground`` are what is behind the faces."""
 
-    crowds: tuple[Crowd, ...]
+    models: tuple[Copies, ...]
     faces: tuple[Face, ...]
     sky: Colour = SKY
     ground: Colour = GROUND
@@ -51,12 +51,12 @@ def _bgr(colour: Vector3) -> Array:
     return np.array(colour[::-1]) * 255.0
 
 
-def _crowd(entry: ModelEntry) -> Crowd:
+def _model(entry: ModelEntry) -> Copies:
     paint = entry.paint
     colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
     positions = np.array([instance.position for instance in entry.instances])
     turns = np.array([math.pi - instance.angle for instance in entry.instances])
-    return Crowd(make_shape(*load_obj(entry.file)), colour, positions, turns, entry.name)
+    return Copies(make_shape(*load_obj(entry.file)), colour, positions, turns, entry.name)
 
 
 def _cover(entry: BlockEntry) -> Colour | Covering:
@@ -80,23 +80,23 @@ def _block_faces(entry: BlockEntry) -> list[Face]:
     return [face for i in entry.instances for face in box_faces(entry.dimension, i, cover)]
 
 
-def _faces(entries: MapFile, wishes: Wishes) -> Iterator[Face]:
+def _faces(entries: MapFile, options: SceneOptions) -> Iterator[Face]:
     blocks = [face for block in entries.blocks for face in _block_faces(block)]
-    lines = pick(entries.path, wishes.lines)
-    for face in [*(blocks or [_default_floor()]), *line_faces(lines, wishes.line_width)]:
-        yield face.shaded(wishes.light.on(face.normal))
+    lines = pick(entries.path, options.lines)
+    for face in [*(blocks or [_default_floor()]), *line_faces(lines, options.line_width)]:
+        yield face.shaded(options.light.on(face.normal))
 
 
-def load_scene(path: Path, wishes: Wishes | None = None) -> Scene:
+def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
     """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
-    entries, wishes = read_map(path), wishes or Wishes()
-    crowds = tuple(map(_crowd, entries.models))
-    around = clutter(wishes.clutter, wishes.seed, crowds)
-    shade = wishes.light.on(np.array([0.0, 0.0, 1.0]))
+    entries, options = read_map(path), options or SceneOptions()
+    models = tuple(map(_model, entries.models))
+    around = clutter(options.clutter, options.seed, models)
+    shade = options.light.on(np.array([0.0, 0.0, 1.0]))
     return Scene(
-        crowds=crowds + around,
-        faces=tuple(_faces(entries, wishes)),
+        models=models + around,
+        faces=tuple(_faces(entries, options)),
         ground=(*(min(part * shade, 255.0) for part in GROUND[:3]), 255.0),
-        light=wishes.light,
+        light=options.light,
         overlays=entries.overlays,
     )

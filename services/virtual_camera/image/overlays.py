@@ -19,7 +19,7 @@ def load_with_alpha(path: Path) -> Image:
     except cv2.error:
         picture = None
     if picture is None or picture.dtype != np.uint8:
-        raise MapError(f"{path}: this is not a picture of 8 bits a colour that can be read (PNG and JPEG can)")
+        raise MapError(f"{path}: not a picture with 8 bits per colour, expected PNG or JPEG")
     channels = 1 if picture.ndim == 2 else picture.shape[2]
     codes = {1: cv2.COLOR_GRAY2BGRA, 3: cv2.COLOR_BGR2BGRA}
     return np.asarray(cv2.cvtColor(picture, codes[channels]) if channels in codes else picture, np.uint8)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from services.virtual_camera.camera import Array
-from services.virtual_camera.draw.crowd import Crowd
+from services.virtual_camera.draw.copies import Copies
 from services.virtual_camera.draw.shape import Shape, make_shape
 
 KINDS = 8
@@ -21,8 +21,8 @@ def _box(width: float, depth: float, height: float) -> Shape:
     return make_shape(vertices, triangles)
 
 
-def _extent(crowds: tuple[Crowd, ...]) -> tuple[Array, Array]:
-    places = [crowd.positions[:, :2] for crowd in crowds]
+def _extent(models: tuple[Copies, ...]) -> tuple[Array, Array]:
+    places = [copies.positions[:, :2] for copies in models]
     if not places:
         return np.zeros(2), np.zeros(2)
     everything = np.concatenate(places)
@@ -42,16 +42,16 @@ def _places(random: np.random.RandomState, count: int, low: Array, high: Array) 
     return np.column_stack([x, y, np.zeros(count)])
 
 
-def clutter(count: int, seed: int, around: tuple[Crowd, ...]) -> tuple[Crowd, ...]:
+def clutter(count: int, seed: int, around: tuple[Copies, ...]) -> tuple[Copies, ...]:
     """``count`` boxes outside the rectangle that holds all models ``around``; none of them has a name."""
     if count == 0:
         return ()
     random = np.random.RandomState([2902, seed])
     places = _places(random, count, *_extent(around))
     turns = random.uniform(0, np.pi, count)
-    crowds = []
+    models = []
     for kind in range(min(KINDS, count)):
         sizes, colour = random.uniform([0.06, 0.06, 0.06], [0.6, 0.6, 0.9]), random.uniform(10, 250, 3)
         members = np.arange(kind, count, KINDS)
-        crowds.append(Crowd(_box(*sizes.tolist()), colour, places[members], turns[members]))
-    return tuple(crowds)
+        models.append(Copies(_box(*sizes.tolist()), colour, places[members], turns[members]))
+    return tuple(models)

@@ -1,4 +1,4 @@
-"""JSON values that know their file and path, so that every complaint says where it is about."""
+"""JSON values that know their file and path, so that every error names its place."""
 
 import json
 from collections.abc import Iterator
@@ -17,12 +17,12 @@ class MapError(ValueError):
 def read_bytes(path: Path) -> bytes:
     """The contents of a regular file of at most 64 MiB; MapError otherwise."""
     if not path.exists():
-        raise MapError(f"{path}: there is no such file")
+        raise MapError(f"there is no file '{path}'")
     if not path.is_file():
-        raise MapError(f"{path}: this is not a regular file")
+        raise MapError(f"{path}: not a regular file")
     size = path.stat().st_size
     if size > MAX_BYTES:
-        raise MapError(f"{path}: the file has {size} bytes, more than the {MAX_BYTES} that a map's file may have")
+        raise MapError(f"{path}: the file has {size} bytes, expected at most {MAX_BYTES}")
     try:
         return path.read_bytes()
     except OSError as error:
@@ -47,7 +47,7 @@ class Node:
         try:
             return cls(file, "$", json.loads(read_bytes(file).decode("utf-8-sig")))
         except json.JSONDecodeError as error:
-            raise MapError(f"{file}:{error.lineno}:{error.colno}: this is not JSON: {error.msg}") from error
+            raise MapError(f"{file}:{error.lineno}:{error.colno}: not JSON: {error.msg}") from error
         except UnicodeDecodeError as error:
             raise MapError(f"{file}: byte {error.start} is not UTF-8 text") from error
         except RecursionError as error:
@@ -79,7 +79,7 @@ class Node:
 
     def text(self) -> str:
         if not isinstance(self.value, str) or not self.value:
-            self.fail("some text")
+            self.fail("a string that is not empty")
         return self.value
 
     def numbers(self, names: str) -> tuple[float, ...]:

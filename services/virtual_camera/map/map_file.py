@@ -1,4 +1,4 @@
-"""What an OpenDLV ``map.json`` says, checked; models and textures are not loaded yet."""
+"""An OpenDLV ``map.json``, checked; models and textures are not loaded yet."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,7 +62,7 @@ class ObstacleEntry:
 
 @dataclass(frozen=True)
 class MapFile:
-    """What there is to draw; things that stand nowhere are left out."""
+    """Everything to draw; things without instances are left out."""
 
     path: Path
     models: tuple[ModelEntry, ...]
@@ -150,7 +150,7 @@ def _obstacle(node: Node) -> ObstacleEntry | None:
 
 def _limit(path: Path, what: str, count: int, limit: int) -> None:
     if count > limit:
-        raise MapError(f"{path}: {count} instances of {what} are more than the {limit} that a map may have")
+        raise MapError(f"{path}: {count} instances of {what}, expected at most {limit}")
 
 
 def find_map(path: Path) -> Path:

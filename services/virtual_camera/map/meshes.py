@@ -41,7 +41,7 @@ def _is_ring(angles: Array) -> bool:
 
 
 def with_fewer_sides(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
-    """A solid of revolution about a vertical axis with 16 sides; every other mesh as it is.
+    """A solid of revolution about a vertical axis with 16 sides; every other mesh unchanged.
 
     The corners must form rings of one height and radius, each all around the axis; on such a surface
     a corner may move along its ring.
@@ -88,12 +88,12 @@ def _parse(path: Path, data: bytes) -> tuple[Array, Indices]:
     import trimesh
 
     if _RELATIVE_FACE.search(data):
-        raise MapError(f"{path}: faces must count vertices from the file's beginning, not by negative numbers")
+        raise MapError(f"{path}: faces count vertices by negative numbers, expected positive ones")
     try:
         mesh = trimesh.load_mesh(io.BytesIO(data), file_type="obj", process=False, skip_materials=True)
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.intp)
     except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
-        raise MapError(f"{path}: this is not an OBJ file that can be read: {error}") from error
+        raise MapError(f"{path}: not a readable OBJ file: {error}") from error
     return vertices, faces
 
 
@@ -103,7 +103,7 @@ def load_obj(path: Path) -> tuple[Array, Indices]:
     if len(triangles) == 0:
         raise MapError(f"{path}: the OBJ file has no faces")
     if len(triangles) > MAX_TRIANGLES:
-        raise MapError(f"{path}: {len(triangles)} triangles are more than the {MAX_TRIANGLES} a model may have")
+        raise MapError(f"{path}: {len(triangles)} triangles, expected at most {MAX_TRIANGLES}")
     if not np.isfinite(vertices).all() or np.abs(vertices).max() > 1e5:
         raise MapError(f"{path}: the OBJ file has vertices that are not finite numbers below 100 km")
     vertices, triangles = with_fewer_sides(*weld(vertices, triangles))

@@ -54,9 +54,9 @@ def load_picture(path: Path) -> Image:
     try:
         picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
     except cv2.error as error:
-        raise MapError(f"{path}: this picture cannot be read: {error.err}") from error
+        raise MapError(f"{path}: the picture cannot be read: {error.err}") from error
     if picture is None:
-        raise MapError(f"{path}: this is not a picture that can be read (PNG and JPEG can)")
+        raise MapError(f"{path}: not a readable picture, expected PNG or JPEG")
     return np.asarray(picture, np.uint8)
 
 

@@ -18,7 +18,7 @@ def test_no_isolation_leads_around_a_rigs_checks(place: Place) -> None:  # noqa:
     assert "hint: run it without --isolation\n" in said
     place.dodo("compile", "tests/hil-fake", *APPLICATION, "-o", "generated", code=0)
     assert "'fake' is reached through the host" in place.dodo("run", "--compiled", "generated/hil-fake", *words, code=2)
-    assert place.rig.heard == []
+    assert place.rig.received == []
 
 
 @pytest.mark.parametrize("backend", ["process", "docker"])

@@ -27,8 +27,8 @@ from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs import rigs
 from services.gantry.port import SerialPort
 from tests.drive.applications import KIWI, ROOT, results
-from tests.services.gantry.fakerig import FakeRig
-from tests.services.process import hear, running, say
+from tests.services.gantry.fake_rig import FakeRig
+from tests.services.process import receive, running, send
 
 CAMERA = {"map-path": "../maps/rig-straight", "z": "9.5 cm", "freq": "10 Hz"}
 SPEC = {
@@ -161,7 +161,7 @@ def test_a_real_rig_is_never_kept_up(place: Place) -> None:
     application = str(KIWI / "docker-compose.yml")
     said = place.dodo("run", "hil-fake", "--application", application, "--keep", code=2)
     assert "hil-fake runs on rig 'fake', which --keep would leave driven" in said
-    assert not place.rig.heard
+    assert not place.rig.received
 
 
 def drive(place: Place) -> "subprocess.Popen[bytes]":
@@ -222,15 +222,15 @@ def test_what_a_killed_runner_leaves_misses_it_and_stops_the_rig(place: Place, c
     place.rig.at = [0.0, 0.0, 0.0]
     with Session(cid) as session, running("gantry", tmp_path, f"--cid={cid}", f"--serial={place.rig.path}") as gantry:
         ready = time.time_ns() // 1000
-        while hear(session, "dodo.Alive")[0].sent < ready:
+        while receive(session, "dodo.Alive")[0].sent < ready:
             pass  # the gantry was not there yet
         while not any(place.rig.velocity):
-            say(session, "opendlv.sim.KinematicState", vx=0.05)
+            send(session, "opendlv.sim.KinematicState", vx=0.05)
             time.sleep(0.02)
         runner.kill()
         runner.wait()
         while gantry.poll() is None:
-            say(session, "opendlv.sim.KinematicState", vx=0.05)
+            send(session, "opendlv.sim.KinematicState", vx=0.05)
             time.sleep(0.02)
         assert gantry.stderr is not None
         assert "the runner has given no sign of life for 3 s" in gantry.stderr.read()

@@ -34,10 +34,10 @@ def test_numbers(text: str, value: float) -> None:
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["freq=1"], "'freq=1' is no flag, expected --key=value"),
+        (["freq=1"], "'freq=1' is not a flag, expected --key=value"),
         (["--freq", "1"], "--freq has no value, expected --freq=50"),
-        (["--frequency=1"], "there is no flag '--frequency', did you mean '--freq'?"),
-        (["--zzzzzz"], "there is no flag '--zzzzzz'; --help shows all"),
+        (["--frequency=1"], "unknown flag '--frequency', did you mean '--freq'?"),
+        (["--zzzzzz"], "unknown flag '--zzzzzz'; --help lists all flags"),
         (["--freq=fast"], "--freq=fast is not a finite number in Hz"),
         (["--freq=nan"], "--freq=nan is not a finite number in Hz"),
         (["--freq=1e999"], "--freq=1e999 is not a finite number in Hz"),
@@ -48,7 +48,7 @@ def test_numbers(text: str, value: float) -> None:
         (["--id=1.5"], "--id=1.5 is not a whole number"),
         (["--id=-1"], "--id=-1 is out of range, expected 0 to 4294967295"),
         (["--verbose=maybe"], "--verbose=maybe is not true or false"),
-        (["--role=other"], "--role=other is none of echo, judge, source, broken, unbuildable"),
+        (["--role=other"], "--role=other is not one of echo, judge, source, broken, unbuildable"),
         (["--freq=1", "--freq=2"], "--freq is given twice"),
     ],
 )

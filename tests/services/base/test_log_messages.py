@@ -8,7 +8,7 @@ import pytest
 from dodo_dsl.opendlv.bus.session import Session
 from services.base.log_messages import LONGEST, published
 from tests.services.base.conftest import Start
-from tests.services.process import hear
+from tests.services.process import receive
 
 LOG = "opendlv.system.LogMessage"
 END = "the end of this test"
@@ -24,7 +24,7 @@ def heard(session: Session, sender_stamp: int = 3) -> list[tuple[int, str]]:
     """Severities and texts up to the last line."""
     lines = []
     while not lines or lines[-1][1] != END:
-        message = hear(session, LOG, sender_stamp)[1]
+        message = receive(session, LOG, sender_stamp)[1]
         lines.append((message.level, message.description))
     return lines[:-1]
 
@@ -48,14 +48,14 @@ def test_the_error_that_ends_it(sessions: tuple[Session, Session]) -> None:
     ours, theirs = sessions
     with pytest.raises(ValueError, match="lost"), published(ours, 0):
         raise ValueError("the rig is lost")
-    message = hear(theirs, LOG)[1]
+    message = receive(theirs, LOG)[1]
     assert (message.level, message.description) == (2, "the rig is lost")
 
 
 def test_a_service_says_on_the_bus_what_it_logs(start: Start, cid: int) -> None:
     with Session(cid) as session:
         service = start("--role=broken", "--log-id=9")
-        message = hear(session, LOG, 9)[1]
+        message = receive(session, LOG, 9)[1]
         assert (message.level, message.description) == (2, "a model went wrong")
         assert service.end()[0] == 1
 

@@ -114,7 +114,7 @@ def test_a_model_that_fails(start: Start, ready_file: Path, flags: list[str]) ->
     ("flags", "text"),
     [
         (["--role=unbuildable"], "tiny-service: CRITICAL: /no/such/map: cannot be read\n"),
-        (["--role=echo", "--frq=1"], "tiny-service: there is no flag '--frq', did you mean '--freq'?\n"),
+        (["--role=echo", "--frq=1"], "tiny-service: unknown flag '--frq', did you mean '--freq'?\n"),
     ],
 )
 def test_flags_that_cannot_be_met(start: Start, ready_file: Path, flags: list[str], text: str) -> None:

@@ -40,6 +40,6 @@ def test_numbers_of_numpy_and_any_text() -> None:
 
 
 def test_where_nothing_was_heard_the_reason_names_the_bus() -> None:
-    assert json.loads(Verdict("failed", "nothing came", unheard=True).line(130))["reason"] == (
+    assert json.loads(Verdict("failed", "nothing came", silent=True).line(130))["reason"] == (
         "nothing came; the test is on CID 130"
     )

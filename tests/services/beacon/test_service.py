@@ -11,8 +11,8 @@ from services.base import Context
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.beacon.service import Beacon
-from services.beacon.way import WayError
-from tests.services.process import PATIENCE, ROOT, hear, launch, running, say
+from services.beacon.trajectory import TrajectoryError
+from tests.services.process import PATIENCE, ROOT, launch, receive, running, send
 
 FRAME, STATE = "opendlv.sim.Frame", "opendlv.sim.KinematicState"
 SECOND = 1_000_000
@@ -27,7 +27,7 @@ def sent(beacon: Beacon, now: int) -> list[Any]:
     return list(beacon.update(now))
 
 
-def test_it_waits_for_the_test_and_ends_with_its_way() -> None:
+def test_it_waits_for_the_test_and_ends_with_its_trajectory() -> None:
     beacon = service("--points=0 0,2 0", "--speed=1", "--freq=10", "--frame-id=3")
     assert beacon.period == 100_000
     for now in (0, 9 * SECOND):
@@ -67,7 +67,7 @@ def test_the_state_is_sent_when_asked() -> None:
 
 
 def test_two_ways_are_one_too_many() -> None:
-    with pytest.raises(WayError, match="--points and --length tell two ways"):
+    with pytest.raises(TrajectoryError, match="--points and --length exclude each other"):
         service("--points=0 0,1 1", "--length=3")
 
 
@@ -76,7 +76,7 @@ def test_a_bad_table_ends_it_with_a_sentence(tmp_path: Path) -> None:
     process = launch("beacon", tmp_path, "--cid=254", f"--path={tmp_path}/way.csv")
     out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (2, "")
-    assert err == f"beacon: CRITICAL: {tmp_path}/way.csv:3: y: 'here' is no finite number\n"
+    assert err == f"beacon: CRITICAL: {tmp_path}/way.csv:3: y: 'here' is not a finite number\n"
 
 
 def test_on_the_bus(cid: int, tmp_path: Path) -> None:
@@ -84,15 +84,15 @@ def test_on_the_bus(cid: int, tmp_path: Path) -> None:
         Session(cid) as session,
         running("beacon", tmp_path, f"--cid={cid}", "--length=0.1", "--speed=1", "--state-id=2") as process,
     ):
-        assert hear(session, FRAME)[1].x == 0
-        say(session, "dodo.TestBegin")
-        _, end = hear(session, "dodo.EndOfInput")
+        assert receive(session, FRAME)[1].x == 0
+        send(session, "dodo.TestBegin")
+        _, end = receive(session, "dodo.EndOfInput")
         assert end.source == "beacon"
         assert process.wait(PATIENCE) == 0
 
 
 def test_a_signal_ends_it(cid: int, tmp_path: Path) -> None:
     with Session(cid) as session, running("beacon", tmp_path, f"--cid={cid}") as process:
-        hear(session, FRAME)
+        receive(session, FRAME)
         process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE) == 0

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.beacon.table import read_points, read_table
-from services.beacon.way import Way, WayError
+from services.beacon.trajectory import Trajectory, TrajectoryError
 from tests.services.process import ROOT
 
 
@@ -37,7 +37,7 @@ def test_the_tables_of_the_registry_are_ways() -> None:
     paths = sorted((ROOT / "tests_registry" / "targets").glob("*.csv"))
     assert paths
     for path in paths:
-        assert Way(read_table(path, height=0), speed=1).duration > 1
+        assert Trajectory(read_table(path, height=0), speed=1).duration > 1
 
 
 @pytest.mark.parametrize(
@@ -45,29 +45,29 @@ def test_the_tables_of_the_registry_are_ways() -> None:
     [
         ("", " is empty, expected a header with the columns x and y"),
         ("x,z\n", ":1: the column 'y' is missing"),
-        ("x,y,times\n", ":1: there is no column 'times', did you mean 'time'?"),
+        ("x,y,times\n", ":1: unknown column 'times', did you mean 'time'?"),
         ("x;y\n0;0\n", ":1: the column 'x' is missing"),
-        ("X,y\n", ":1: there is no column 'X', did you mean 'x'?"),
-        ("x,y,x\n", ":1: the column 'x' is there twice"),
+        ("X,y\n", ":1: unknown column 'X', did you mean 'x'?"),
+        ("x,y,x\n", ":1: the column 'x' appears twice"),
         ("x,y\n1,2\n1,2,3\n", ":3: 3 values, expected 2: x, y"),
-        ("x,y\n\n1,two\n", ":3: y: 'two' is no finite number"),
-        ("x,y\n1,nan\n", ":2: y: 'nan' is no finite number"),
-        ("x,y\n1,\n", ":2: y: '' is no finite number"),
+        ("x,y\n\n1,two\n", ":3: y: 'two' is not a finite number"),
+        ("x,y\n1,nan\n", ":2: y: 'nan' is not a finite number"),
+        ("x,y\n1,\n", ":2: y: '' is not a finite number"),
         ('x,y\n"1,2\n', ":2: "),
     ],
 )
 def test_mistakes_are_named_with_file_and_line(tmp_path: Path, text: str, sentence: str) -> None:
     path = table(tmp_path, text)
-    with pytest.raises(WayError) as caught:
+    with pytest.raises(TrajectoryError) as caught:
         read_table(path, height=0)
     assert str(caught.value).startswith(f"{path}{sentence}")
 
 
 def test_a_missing_file_and_one_of_bytes(tmp_path: Path) -> None:
-    with pytest.raises(WayError, match=r"no\.csv cannot be read: No such file"):
+    with pytest.raises(TrajectoryError, match=r"no\.csv cannot be read: No such file"):
         read_table(tmp_path / "no.csv", height=0)
     (tmp_path / "way.csv").write_bytes(b"x,y\n\xff\xfe")
-    with pytest.raises(WayError, match="is no text in UTF-8"):
+    with pytest.raises(TrajectoryError, match="is not UTF-8 text"):
         read_table(tmp_path / "way.csv", height=0)
 
 
@@ -77,7 +77,7 @@ def test_any_bytes_are_a_table_or_one_sentence(tmp_path_factory: pytest.TempPath
     path.write_bytes(data)
     try:
         found = read_table(path, height=0)
-    except WayError as error:
+    except TrajectoryError as error:
         assert str(error).startswith(str(path)) and "\n" not in str(error).replace("\\n", "")
     else:
         assert all(isinstance(point.x, float) for point in found)
@@ -86,7 +86,7 @@ def test_any_bytes_are_a_table_or_one_sentence(tmp_path_factory: pytest.TempPath
 def test_points_are_pairs() -> None:
     first, second = read_points(["0 1", " -2.5   3e1 "], height=0.1)
     assert (first.x, first.y, second.x, second.y, second.z) == (0, 1, -2.5, 30, 0.1)
-    with pytest.raises(WayError, match="the point '1 2 3' has 3 numbers"):
+    with pytest.raises(TrajectoryError, match="the point '1 2 3' has 3 numbers"):
         read_points(["1 2 3"], height=0)
-    with pytest.raises(WayError, match="the point '1 b': 'b' is no finite number"):
+    with pytest.raises(TrajectoryError, match="the point '1 b': 'b' is not a finite number"):
         read_points(["1 b"], height=0)

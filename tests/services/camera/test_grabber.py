@@ -67,7 +67,7 @@ def test_a_lost_camera_is_told_after_its_last_picture() -> None:
 
 def test_a_silent_camera_is_lost_too() -> None:
     grabber = Grabber(Scripted(), "/dev/video9", silence=0.0)
-    with pytest.raises(CameraError, match=r"the camera /dev/video9 has given no picture for 0 s"):
+    with pytest.raises(CameraError, match=r"the camera /dev/video9 gave no picture for 0 s"):
         while True:
             grabber.take()
     grabber.close()

@@ -54,5 +54,5 @@ def test_padded_rows_and_a_missing_program(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(ValueError, match="a multiple of 64 and an even height, not 100 x 48"):
         RpiCamera(100, 48, 10, 0.1)
     monkeypatch.setenv("PATH", "/nowhere")
-    with pytest.raises(OSError, match="the program rpicam-vid is not there"):
+    with pytest.raises(OSError, match="there is no program 'rpicam-vid' on PATH"):
         RpiCamera(64, 48, 10, 0.1)

@@ -10,7 +10,7 @@ import pytest
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from services.camera.v4l2 import V4l2Camera
-from tests.services.process import PATIENCE, hear, launch, running
+from tests.services.process import PATIENCE, launch, receive, running
 
 SIZE = ["--width=64", "--height=48"]
 
@@ -64,7 +64,7 @@ def test_its_state_is_told_under_the_stamp_that_is_given(
 ) -> None:
     flags = [*names, *SIZE, "--source=file", f"--file={video}", "--freq=20", "--status-id=6"]
     with Session(cid) as session, running("camera", tmp_path, *flags):
-        state = hear(session, "opendlv.system.SystemStatusMessage", 6)[1]
+        state = receive(session, "opendlv.system.SystemStatusMessage", 6)[1]
     assert (state.code, state.description) == (0, "the camera gives pictures")
 
 
@@ -97,16 +97,16 @@ def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
     ("flags", "words"),
     [
         (["--source=file"], "--file is missing"),
-        (["--source=file", "--file=/none.png"], "there is no file /none.png"),
-        (["--source=webcam"], "--source=webcam is no camera, expected a device such as /dev/video0"),
-        (["--source=/dev/video99"], "there is no camera /dev/video99; is it plugged in?"),
+        (["--source=file", "--file=/none.png"], "there is no file '/none.png'"),
+        (["--source=webcam"], "--source=webcam is not a camera, expected a device such as /dev/video0"),
+        (["--source=/dev/video99"], "there is not a camera /dev/video99; is it plugged in?"),
         (["--source=/dev/null"], "the camera /dev/null cannot be opened"),
-        (["--source=emulated"], "is the camera of `rig: emulated`"),
+        (["--source=emulated"], "is the camera of 'rig: emulated'"),
         (["--source=rpicam", "--freq=20"], "--exposure=0.1 does not fit into the 0.05 s between two pictures"),
         (["--source=file", "--width=63"], "--width=63 and --height=48 must be even"),
     ],
 )
-def test_what_is_no_camera(tmp_path: Path, names: list[str], flags: list[str], words: str) -> None:
+def test_what_is_not_a_camera(tmp_path: Path, names: list[str], flags: list[str], words: str) -> None:
     size = [word for word in SIZE if word.partition("=")[0] not in {flag.partition("=")[0] for flag in flags}]
     process = launch("camera", tmp_path, *names, *size, *flags)
     out, err = process.communicate(timeout=PATIENCE)

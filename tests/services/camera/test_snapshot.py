@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.services.camera.test_check import BOARD
+from tests.services.camera.test_health_check import BOARD
 from tests.services.process import ROOT
 
 
@@ -25,22 +25,22 @@ def snapshot(*words: str) -> tuple[int, dict[str, Any]]:
 def test_a_snapshot_is_the_cameras_picture(tmp_path: Path, divisor: int, reason: str) -> None:
     source, output = tmp_path / "board.png", tmp_path / "snapshot.png"
     cv2.imwrite(str(source), BOARD // divisor)
-    code, said = snapshot(f"--source={source}", "--width=128", "--height=128", f"--output={output}")
-    assert (code, said["ok"], said["width"], said["height"]) == (0, not reason, 128, 128)
-    assert reason in said["reason"]
+    code, result = snapshot(f"--source={source}", "--width=128", "--height=128", f"--output={output}")
+    assert (code, result["ok"], result["width"], result["height"]) == (0, not reason, 128, 128)
+    assert reason in result["reason"]
     assert np.array_equal(cv2.imread(str(output)), np.dstack([BOARD // divisor] * 3))
 
 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--source=/nowhere.png", "--output=OUT"), "is no camera"),
+        (("--source=/nowhere.png", "--output=OUT"), "is not a camera"),
         (("--source=/nowhere.png",), "expected --output=FILE once"),
         (("--source=file", "--fil=x", "--output=OUT"), "did you mean '--file'"),
     ],
 )
 def test_what_gives_no_snapshot(tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
     output = tmp_path / "snapshot.png"
-    code, said = snapshot(*(word.replace("OUT", str(output)) for word in words))
-    assert code == 1 and sentence in said["error"]
+    code, result = snapshot(*(word.replace("OUT", str(output)) for word in words))
+    assert code == 1 and sentence in result["error"]
     assert not output.exists()

@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags, UnjudgeableError
 from services.collision.service import Collision
-from tests.services.process import PATIENCE, launch, running, say
+from tests.services.process import PATIENCE, launch, running, send
 
 FRAME = "opendlv.sim.Frame"
 LANE = {
@@ -131,11 +131,11 @@ def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"goal": None, "walls": []}, "there is nothing to judge by: give --goal, --gates or --walls"),
+        ({"goal": None, "walls": []}, "nothing to judge: give --goal, --gates or --walls"),
         ({"goal": "left"}, "--goal=left is one of the --walls too"),
         ({"gates": ["finish", "left"]}, "left of --gates is one of the --walls too"),
         ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
-        ({"walls": [], "min-margin": 0.1}, "--min-margin is a distance to --walls, of which there are none"),
+        ({"walls": [], "min-margin": 0.1}, "--min-margin needs --walls"),
         ({"goal": "finnish"}, "has no obstacle 'finnish'; did you mean 'finish'?"),
     ],
 )
@@ -152,10 +152,10 @@ def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
 def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
     flags = (f"--cid={cid}", f"--map-path={lane}", "--goal=finish", "--walls=left,right")
     with Session(cid) as session, running("collision", lane, *flags) as process:
-        say(session, "dodo.TestBegin", sample_time=START)
-        say(session, "opendlv.proxy.PedalPositionRequest", position=0.1)
-        say(session, FRAME, sample_time=START + 10_000, qw=1.0)
-        say(session, FRAME, sample_time=START + 2_010_000, x=2.9, y=0.05, qw=1.0)
+        send(session, "dodo.TestBegin", sample_time=START)
+        send(session, "opendlv.proxy.PedalPositionRequest", position=0.1)
+        send(session, FRAME, sample_time=START + 10_000, qw=1.0)
+        send(session, FRAME, sample_time=START + 2_010_000, x=2.9, y=0.05, qw=1.0)
         code, output, errors = finished(process)
     assert (code, errors) == (0, "")
     verdict = json.loads(output)
@@ -174,9 +174,9 @@ def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
 def test_gates_and_margin_come_from_the_flags(lane: Path, cid: int) -> None:
     flags = (f"--cid={cid}", f"--map-path={lane}", "--gates=finish", "--walls=left,right", "--min-margin=0.05")
     with Session(cid) as session, running("collision", lane, *flags) as process:
-        say(session, "dodo.TestBegin", sample_time=START)
-        say(session, FRAME, sample_time=START + 10_000, qw=1.0)
-        say(session, FRAME, sample_time=START + 2_010_000, x=3.1, qw=1.0)
+        send(session, "dodo.TestBegin", sample_time=START)
+        send(session, FRAME, sample_time=START + 10_000, qw=1.0)
+        send(session, FRAME, sample_time=START + 2_010_000, x=3.1, qw=1.0)
         code, output, errors = finished(process)
     assert (code, errors) == (0, "")
     verdict = json.loads(output)
@@ -189,9 +189,9 @@ def test_gates_and_margin_come_from_the_flags(lane: Path, cid: int) -> None:
 def test_the_end_of_the_input_of_a_silent_application(lane: Path, cid: int) -> None:
     flags = (f"--cid={cid}", f"--map-path={lane}", "--goal=finish")
     with Session(cid) as session, running("collision", lane, *flags) as process:
-        say(session, "dodo.TestBegin")
-        say(session, FRAME, qw=1.0)
-        say(session, "dodo.EndOfInput", source="recording")
+        send(session, "dodo.TestBegin")
+        send(session, FRAME, qw=1.0)
+        send(session, "dodo.EndOfInput", source="recording")
         code, output, _ = finished(process)
     verdict = json.loads(output)
     assert (code, verdict["outcome"]) == (0, "failed")

@@ -47,7 +47,7 @@ def test_the_measures_are_those_of_the_thesis(heard: list[tuple[int, float]], ba
     times, signal = np.array([t for t, _ in heard], np.int64), np.array([v for _, v in heard])
     found = measure(RAMP, times, signal, Limits(band=band))
     d = [abs(v - t / (10 * SECOND)) for t, v in heard if 0 <= t <= 10 * SECOND]
-    assert (found.heard, found.samples) == (sum(t >= 0 for t, _ in heard), len(d))
+    assert (found.received, found.samples) == (sum(t >= 0 for t, _ in heard), len(d))
     assert found.outside == sum(t > 10 * SECOND for t, _ in heard)
     if not d:
         assert (found.mean, found.std, found.distance, found.share, found.worst) == (None,) * 5
@@ -84,7 +84,7 @@ def test_a_signal_on_its_target_passes() -> None:
     hear(it, (0, 0), (2.5, 0.25), (5, 0.625), (10, 1))
     assert decided(it) == Verdict("passed", (
         f"{SIGNAL} kept to its target over 4 samples: mean 0.03125 (at most 0.1), std 0.05413 (at most 0.1), "
-        "distance 0.125 (at most 0.2), share 0.75 (at least 0.75); worst at 5.00 s: 0.625, and the target 0.5"
+        "distance 0.125 (at most 0.2), share 0.75 (at least 0.75); worst at 5.00 s: 0.625 with a target of 0.5"
     ), decided(it).checks)  # fmt: skip
     assert values(decided(it)) == {
         "mean": 0.03125, "std": pytest.approx(0.0541266), "distance": 0.125, "share": 0.75, "samples": 4, "outside": 0,
@@ -100,7 +100,7 @@ def test_every_limit_that_is_broken_is_named_with_the_worst_sample() -> None:
     assert decided(it).reason == (
         "the mean distance is 0.5 (at most 0.1); the standard deviation is 0.5 (at most 0.1); "
         "the largest distance is 1 (at most 0.2); the share of samples within 0.1 of the target is 0.5 (at least 0.9); "
-        "worst at 5.00 s: -0.5, and the target 0.5"
+        "worst at 5.00 s: -0.5 with a target of 0.5"
     )
     oks = {check.name: check.ok for check in decided(it).checks}
     assert [name for name, ok in oks.items() if not ok] == ["mean", "std", "distance", "share"]
@@ -150,7 +150,7 @@ def test_samples_that_all_miss_the_target_say_where_it_is() -> None:
 def test_a_sample_that_is_no_number_fails(value: float) -> None:
     it = judge(Limits(mean=9.0))
     hear(it, (4, 0.4), (7, value), (5, value))
-    assert decided(it).reason.startswith("2 samples are no finite number, the first at 5.00 s; worst at 4.00 s")
+    assert decided(it).reason.startswith("2 samples are not finite numbers, the first at 5.00 s; worst at 4.00 s")
     it = judge(Limits(mean=9.0))
     hear(it, (7, value))
     assert decided(it).reason == f"{SIGNAL} was not a finite number in its one sample, first at 7.00 s"

@@ -8,7 +8,7 @@ from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags, Output
 from services.dynamic_model.service import DynamicModel
-from tests.services.process import hear, running, say
+from tests.services.process import receive, running, send
 
 SECOND = 1_000_000
 STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
@@ -43,7 +43,7 @@ def test_what_is_no_number_is_said_once(caplog: pytest.LogCaptureFixture) -> Non
         model.inputs[PEDAL, None](messages.type(PEDAL)(position=math.nan), 0)
         model.inputs[STEERING, None](messages.type(STEERING)(groundSteering=math.inf), 0)
     assert [record.getMessage() for record in caplog.records] == [
-        "a PedalPositionRequest of nan is ignored, as all that are not finite will be"
+        "ignored a PedalPositionRequest of nan, and will ignore all that are not finite"
     ]
     assert model.vehicle.rejected == 2
 
@@ -73,11 +73,11 @@ def test_the_command_reset_and_no_other() -> None:
 
 def test_on_the_bus(cid: int, tmp_path: Path) -> None:
     with Session(cid) as session, running("dynamic_model", tmp_path, f"--cid={cid}", "--frame-id=7"):
-        first, state = hear(session, "opendlv.sim.KinematicState", 7)
+        first, state = receive(session, "opendlv.sim.KinematicState", 7)
         assert state.vx == 0
-        say(session, PEDAL, sender_stamp=42, position=-0.5)
+        send(session, PEDAL, sender_stamp=42, position=-0.5)
         while state.vx == 0:
-            envelope, state = hear(session, "opendlv.sim.KinematicState", 7)
+            envelope, state = receive(session, "opendlv.sim.KinematicState", 7)
         assert state.vx < 0
         assert envelope.sample_time > first.sample_time
         assert (envelope.sample_time - first.sample_time) % 10_000 == 0

@@ -14,8 +14,8 @@ velocities = st.builds(Velocity, st.floats(-3, 3), st.floats(-3, 3), st.floats(-
 def settled(body: Velocity, at: Position) -> Velocity:
     shaper = Shaper(Limits())
     for _ in range(200):
-        told = shaper.step(body, at, 0.05)
-    return told
+        velocity = shaper.step(body, at, 0.05)
+    return velocity
 
 
 def test_forward_is_where_the_rig_looks() -> None:
@@ -24,36 +24,36 @@ def test_forward_is_where_the_rig_looks() -> None:
 
 
 def test_the_measured_heading_turns_the_body() -> None:
-    told = settled(Velocity(0.5, 0, 0.2), Position(0, 0, math.pi / 2))
-    assert (told.x, told.y, told.yaw) == pytest.approx((0, 0.5, 0.2))
+    velocity = settled(Velocity(0.5, 0, 0.2), Position(0, 0, math.pi / 2))
+    assert (velocity.x, velocity.y, velocity.yaw) == pytest.approx((0, 0.5, 0.2))
 
 
 def test_too_fast_is_cut_without_a_change_of_direction() -> None:
-    told = settled(Velocity(4, 3, 9), MIDDLE)
-    assert told.y / told.x == pytest.approx(3 / 4)
-    assert math.hypot(told.x, told.y) == pytest.approx(1)
-    assert told.yaw == 1
+    velocity = settled(Velocity(4, 3, 9), MIDDLE)
+    assert velocity.y / velocity.x == pytest.approx(3 / 4)
+    assert math.hypot(velocity.x, velocity.y) == pytest.approx(1)
+    assert velocity.yaw == 1
 
 
 def test_speeds_change_no_faster_than_the_accelerations() -> None:
     shaper = Shaper(Limits(acceleration=0.4, yaw_acceleration=0.8))
-    told = shaper.step(Velocity(1, 0, 1), MIDDLE, 0.05)
-    assert (told.x, told.y, told.yaw) == pytest.approx((0.02, 0, 0.04))
+    velocity = shaper.step(Velocity(1, 0, 1), MIDDLE, 0.05)
+    assert (velocity.x, velocity.y, velocity.yaw) == pytest.approx((0.02, 0, 0.04))
     shaper.halt()
-    assert shaper.told == Velocity()
+    assert shaper.velocity == Velocity()
 
 
 @settings(deadline=None, max_examples=40)
 @given(velocities, st.sampled_from([0.01, 0.05, 0.2]))
 def test_no_request_drives_the_rig_out_of_its_workspace(body: Velocity, dt: float) -> None:
-    """The rig here does what it is told one step late, as real ones do at best."""
+    """The rig here follows its commands one step late, as real ones do at best."""
     limits = Limits()
     shaper, at, before = Shaper(limits), MIDDLE, Velocity()
     for _ in range(int(6 / dt)):
-        told = shaper.step(body, at, dt)
+        velocity = shaper.step(body, at, dt)
         at = Position(at.x + before.x * dt, at.y + before.y * dt, at.yaw + before.yaw * dt)
-        before = told
-        assert math.hypot(told.x, told.y) <= limits.speed + 1e-9 and abs(told.yaw) <= limits.yaw_rate
+        before = velocity
+        assert math.hypot(velocity.x, velocity.y) <= limits.speed + 1e-9 and abs(velocity.yaw) <= limits.yaw_rate
         assert limits.low.x - 0.002 <= at.x <= limits.high.x + 0.002
         assert limits.low.y - 0.002 <= at.y <= limits.high.y + 0.002
         assert limits.low.yaw - 0.01 <= at.yaw <= limits.high.yaw + 0.01

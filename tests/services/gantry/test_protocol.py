@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.gantry.protocol import LONGEST, Answer, Lines, Position, Refusal, Status, Word, answer, command
-from tests.services.gantry.fakerig import COMMAND
+from services.gantry.protocol import LONGEST, Answer, LineReader, Position, Refusal, Status, Word, answer, command
+from tests.services.gantry.fake_rig import COMMAND
 
 numbers = st.floats(-10, 10)
 positions = st.builds(Position, numbers, numbers, numbers)
@@ -87,7 +87,7 @@ def test_answers(text: str, found: Position | Status | Refusal | None) -> None:
 
 @given(st.lists(answers, max_size=8), st.lists(st.integers(1, 20), min_size=1))
 def test_answers_come_through_however_they_are_cut(sent: list[Answer], cuts: list[int]) -> None:
-    data, lines, found = b"".join(map(line, sent)), Lines(), []
+    data, lines, found = b"".join(map(line, sent)), LineReader(), []
     index = 0
     while data:
         size = cuts[index % len(cuts)]
@@ -99,21 +99,21 @@ def test_answers_come_through_however_they_are_cut(sent: list[Answer], cuts: lis
 
 @given(st.binary(max_size=300).map(lambda noise: noise.replace(b"$", b"!")), answers)
 def test_noise_before_an_answer_does_not_hide_it(noise: bytes, sent: Answer) -> None:
-    lines = Lines()
+    lines = LineReader()
     found = lines.feed(noise) + lines.feed(b"\n" + line(sent))
     assert len(found) == 1 and same(found[0], sent)
 
 
 @given(st.lists(st.binary(max_size=150), max_size=10))
 def test_any_bytes_are_survived_and_the_next_answer_is_read(parts: list[bytes]) -> None:
-    lines = Lines()
+    lines = LineReader()
     for part in parts:
         lines.feed(part)
     assert lines.feed(b"\n" + line(Status.MOVING))[-1] == Status.MOVING
 
 
 def test_a_line_without_end_is_dropped_whole() -> None:
-    lines = Lines()
+    lines = LineReader()
     for _ in range(10):
         assert lines.feed(b"1" * LONGEST) == []
     assert lines.feed(b"$1\n") == []
@@ -122,5 +122,5 @@ def test_a_line_without_end_is_dropped_whole() -> None:
 
 
 def test_a_line_that_broke_off_does_not_spoil_the_next() -> None:
-    lines = Lines()
+    lines = LineReader()
     assert lines.feed(b"$0.12,0.3$0.5,0.5,0.5\n") == [Position(0.5, 0.5, 0.5)]

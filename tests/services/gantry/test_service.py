@@ -21,8 +21,8 @@ from services.gantry.link import Link, RigError
 from services.gantry.port import SerialPort
 from services.gantry.rig_table import Error
 from services.gantry.service import Gantry
-from tests.services.gantry.fakerig import FakeRig
-from tests.services.process import PATIENCE, ROOT, hear, launch, running, say
+from tests.services.gantry.fake_rig import FakeRig
+from tests.services.process import PATIENCE, ROOT, launch, receive, running, send
 
 FRAME, STATE, STATUS = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.system.SystemStatusMessage"
 MANIFEST = load_manifest(ROOT / "services" / "gantry")
@@ -48,29 +48,29 @@ def gantry(cid: int, rig: FakeRig, *flags: str) -> Iterator["subprocess.Popen[st
 
 
 def drive(session: Session, true: Callable[[], object], **fields: float) -> None:
-    """Say the state again and again until something is true."""
+    """Send the state until something is true."""
 
-    def said() -> object:
-        say(session, STATE, **fields)
+    def arrived() -> object:
+        send(session, STATE, **fields)
         return true()
 
-    until(said)
+    until(arrived)
 
 
 def test_it_starts_where_it_is_told_and_follows_the_vehicle(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig, "--x=-0.5", "--y=0.1", "--yaw=90", "--status-id=4"):
         assert rig.at == pytest.approx([-0.5, 0.1, math.pi / 2], abs=1e-3)
         assert not rig.commands("CALIBRATE")
-        _, frame = hear(session, FRAME)
+        _, frame = receive(session, FRAME)
         assert [frame.x, frame.y, frame.z] == pytest.approx([-0.5, 0.1, 0], abs=1e-3)
         assert [frame.qx, frame.qy, frame.qz, frame.qw] == pytest.approx([0, 0, 0.5**0.5, 0.5**0.5], abs=1e-3)
         drive(session, lambda: rig.at[1] > 0.12, vx=0.2)
         assert rig.at[0] == pytest.approx(-0.5, abs=0.01)
-        said = {hear(session, STATUS, 4)[1].description for _ in range(1)}
-        assert said <= {"the rig is idle", "the rig is moving"}
-        envelope, frame = hear(session, FRAME)
+        result = {receive(session, STATUS, 4)[1].description for _ in range(1)}
+        assert result <= {"the rig is idle", "the rig is moving"}
+        envelope, frame = receive(session, FRAME)
         while frame.y < 0.12:
-            envelope, frame = hear(session, FRAME)
+            envelope, frame = receive(session, FRAME)
         assert abs(envelope.sample_time - envelope.sent) < 1_000_000
 
 
@@ -86,11 +86,11 @@ def test_a_signal_stops_the_rig(cid: int, rig: FakeRig, number: signal.Signals) 
 def test_the_end_of_the_input_stops_the_rig_and_the_frames_go_on(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig):
         drive(session, lambda: any(rig.velocity), vx=0.3)
-        say(session, "dodo.EndOfInput")
+        send(session, "dodo.EndOfInput")
         drive(session, lambda: rig.last() == "STOP", vx=0.3)
         runs = len(rig.commands("RUN"))
         for _ in range(5):
-            hear(session, FRAME)
+            receive(session, FRAME)
         assert len(rig.commands("RUN")) == runs
 
 
@@ -131,22 +131,22 @@ def test_a_fault_from_before_is_seen_and_not_erased(cid: int, rig: FakeRig, stat
 def test_a_watchdog_of_its_own_accord_ends_the_test(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         for _ in range(60):  # longer than it is lenient after it opened the line
-            hear(session, FRAME)
+            receive(session, FRAME)
         rig.status = 7
         assert process.wait(PATIENCE) == 1
         assert process.stderr is not None
-        assert "heard nothing for 500 ms and braked by itself" in process.stderr.read()
+        assert "got no command for 500 ms and braked by itself" in process.stderr.read()
 
 
 def test_garbage_and_lines_in_parts_do_no_harm(cid: int, rig: FakeRig) -> None:
     rig.noise, rig.chopped = b"\xff\x00$0.\n$$,,\nok\n$12", True
     with Session(cid) as session, gantry(cid, rig):
         drive(session, lambda: rig.at[0] > 0.05, vx=0.3)
-        _, frame = hear(session, FRAME)
+        _, frame = receive(session, FRAME)
         assert abs(frame.x) < 1
 
 
-@pytest.mark.parametrize(("code", "name"), [(8, "TROUBLE"), (99, "which this version does not know")])
+@pytest.mark.parametrize(("code", "name"), [(8, "TROUBLE"), (99, "unknown to this version")])
 def test_a_rig_that_refuses_to_move_ends_the_test(cid: int, rig: FakeRig, code: int, name: str) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         drive(session, lambda: any(rig.velocity), vx=0.2)
@@ -165,7 +165,7 @@ def test_a_line_that_comes_damaged_is_said_again(cid: int, rig: FakeRig) -> None
         rig.restarted = None
         drive(session, lambda: rig.at[0] > 0.05, vx=0.2)
         process.send_signal(signal.SIGTERM)
-        assert "got a damaged line: $ERROR:5 (DAMAGED)" in process.communicate(timeout=PATIENCE)[1]
+        assert "received a damaged line: $ERROR:5 (DAMAGED)" in process.communicate(timeout=PATIENCE)[1]
 
 
 def test_an_outage_of_the_line_ends_the_test(cid: int, rig: FakeRig) -> None:
@@ -190,7 +190,7 @@ def test_a_rig_that_falls_silent_ends_the_test_and_is_told_to_stop(cid: int, rig
 
 def test_a_rig_that_never_answers(cid: int, rig: FakeRig) -> None:
     rig.silent = True
-    assert f"the rig at {rig.path} has been away for 5 s: it does not answer" in refused(cid, rig)
+    assert f"the rig at {rig.path} gave no answer for 5 s: it does not answer" in refused(cid, rig)
 
 
 def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: FakeRig) -> None:
@@ -219,7 +219,7 @@ def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: Fa
 def test_the_log_tells_jitter_and_latency(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         for _ in range(20):
-            hear(session, FRAME)
+            receive(session, FRAME)
         process.send_signal(signal.SIGTERM)
         log = process.communicate(timeout=PATIENCE)[1]
     assert re.search(
@@ -237,7 +237,7 @@ def refused(cid: int, rig: FakeRig, *flags: str) -> str:
 def test_it_calibrates_only_when_told(cid: int, rig: FakeRig) -> None:
     rig.calibrated = False
     error = refused(cid, rig)
-    assert "is not calibrated and does not know where it is (status 6); --calibrate lets it find its home" in error
+    assert "is not calibrated and does not know its position (status 6); --calibrate lets it find its home" in error
     assert not rig.commands("CALIBRATE") and not rig.commands("GOTO")
     with gantry(cid, rig, "--calibrate"):
         assert rig.commands("CALIBRATE") == [()]
@@ -264,12 +264,12 @@ def test_a_start_that_is_not_reached(cid: int, rig: FakeRig) -> None:
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--serial=spy:///dev/ttyACM0?file=/tmp/x"], "is no port of the rig"),
-        (["--serial=socket://10.0.0.1:80"], "is no port of the rig"),
-        (["--serial=loop://"], "is no port of the rig"),
+        (["--serial=spy:///dev/ttyACM0?file=/tmp/x"], "is not a port of the rig"),
+        (["--serial=socket://10.0.0.1:80"], "is not a port of the rig"),
+        (["--serial=loop://"], "is not a port of the rig"),
         (["--serial=/etc/passwd"], "is no device"),
         (["--serial=ttyACM0"], "is no device"),
-        (["--serial=/dev/ttyNONE7"], "there is no serial port /dev/ttyNONE7; is the rig plugged in?"),
+        (["--serial=/dev/ttyNONE7"], "there is not a serial port /dev/ttyNONE7; is the rig plugged in?"),
         (["--serial=emulated"], "the emulated rig is not built: `make firmware` builds it"),
         (["--serial=/dev/null", "--range-x=0.5"], "the start is out of the rig's ranges: at x = 0.000 m"),
     ],

@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.odvd import parser
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from services.base import Context, Flags, Output
 from services.integrator.service import OLD_FRAME, Integration
-from tests.services.process import hear, running, say
+from tests.services.process import receive, running, send
 
 STATE = "opendlv.sim.KinematicState"
 START = {"freq": 100.0, "x": 1, "y": 2.0, "z": 0.5, "roll": 0, "pitch": 0, "yaw": 90.0, "frame-id": 4}
@@ -75,12 +75,12 @@ def test_the_command_reset_and_no_other() -> None:
 def test_on_the_bus(cid: int, tmp_path: Path) -> None:
     flags = (f"--cid={cid}", "--frame-id=4", "--x=1", "--yaw=180")
     with Session(cid) as session, running("integrator", tmp_path, *flags):
-        _, frame = hear(session, "opendlv.sim.Frame", 4)
+        _, frame = receive(session, "opendlv.sim.Frame", 4)
         assert [frame.x, frame.y] == [1, 0]
-        say(session, STATE, sender_stamp=5, vy=100.0)
-        say(session, STATE, sender_stamp=4, vx=100.0)
+        send(session, STATE, sender_stamp=5, vy=100.0)
+        send(session, STATE, sender_stamp=4, vx=100.0)
         while frame.x == 1:
-            _, frame = hear(session, "opendlv.sim.Frame", 4)
+            _, frame = receive(session, "opendlv.sim.Frame", 4)
         assert frame.x < 1 and frame.y == pytest.approx(0, abs=1e-3)
 
 

@@ -1,8 +1,8 @@
 import pytest
 
 from services.base import UnjudgeableError, Verdict
-from services.object_detection.boxes import Box, Thing
-from services.object_detection.frames import Kind, Mark
+from services.object_detection.boxes import Box, LabelledBox
+from services.object_detection.frames import FrameKey, TypeNumber
 from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import Limits, Rules
 from services.object_detection.truth import Truth
@@ -10,7 +10,7 @@ from services.object_detection.truth import Truth
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND
 A, B, FAR = Box(0.1, 0.1, 0.1, 0.1), Box(0.5, 0.1, 0.1, 0.1), Box(0.8, 0.8, 0.1, 0.1)
-YELLOW, BLUE = Thing("yellow", A), Thing("blue", B)
+YELLOW, BLUE = LabelledBox("yellow", A), LabelledBox("blue", B)
 BOARD = Truth("one", {0: (YELLOW, BLUE)})
 FILM = Truth("sample-time", {number * SECOND: (YELLOW, BLUE) for number in range(1, 6)})
 
@@ -24,19 +24,19 @@ def judge(truth: Truth | None = BOARD, limits: Limits | None = None, **rules: fl
     return it
 
 
-def detect(it: DetectionEvaluator, frame: float, *things: Thing) -> None:
+def detect(it: DetectionEvaluator, frame: float, *boxes: LabelledBox) -> None:
     """All detections of the frame whose sample time is so many seconds."""
-    mark = Mark(round(frame * SECOND), round(frame))
-    for number, (label, box) in enumerate(things):
-        it.detect(mark, number, label)
-        it.detect(mark, number, box)
+    key = FrameKey(round(frame * SECOND), round(frame))
+    for number, (label, box) in enumerate(boxes):
+        it.detect(key, number, label)
+        it.detect(key, number, box)
 
 
-def reveal(it: DetectionEvaluator, frame: float, *things: Thing) -> None:
-    mark = Mark(round(frame * SECOND), round(frame))
-    for number, (label, box) in enumerate(things):
-        it.reveal(mark, number, box)
-        it.reveal(mark, number, label)
+def reveal(it: DetectionEvaluator, frame: float, *boxes: LabelledBox) -> None:
+    key = FrameKey(round(frame * SECOND), round(frame))
+    for number, (label, box) in enumerate(boxes):
+        it.reveal(key, number, box)
+        it.reveal(key, number, label)
 
 
 def at(it: DetectionEvaluator, seconds: float) -> None:
@@ -59,7 +59,7 @@ def test_what_is_found_passes() -> None:
     it = judge(limits=Limits(0.7, 0.7, 0.7, frames=2))
     detect(it, 1, YELLOW, BLUE)
     at(it, 0.5)
-    detect(it, 2, BLUE, Thing("red", FAR))
+    detect(it, 2, BLUE, LabelledBox("red", FAR))
     verdict = decided(it)
     assert (verdict.outcome, verdict.reason) == (
         "passed",
@@ -80,7 +80,7 @@ def test_every_limit_that_is_broken_is_named_with_the_worst_frame() -> None:
     it = judge(limits=Limits(0.9, 0.9, 0.9, frames=3))
     detect(it, 1, YELLOW, BLUE)
     at(it, 0.5)
-    detect(it, 2, Thing("yellow", FAR))
+    detect(it, 2, LabelledBox("yellow", FAR))
     assert (decided(it).outcome, decided(it).reason) == (
         "failed",
         "precision is 0.6667 (at least 0.9), with 1 false detection beside 2 found; "
@@ -92,7 +92,7 @@ def test_every_limit_that_is_broken_is_named_with_the_worst_frame() -> None:
 
 def test_colours_swapped_are_false_and_missed() -> None:
     it = judge()
-    detect(it, 1, Thing("blue", A), Thing("yellow", B))
+    detect(it, 1, LabelledBox("blue", A), LabelledBox("yellow", B))
     found = values(decided(it))
     assert (found["true-positives"], found["false-positives"], found["false-negatives"]) == (0, 2, 2)
 
@@ -106,8 +106,8 @@ def test_a_limit_is_kept_by_what_equals_it(limit: float, outcome: str) -> None:
 
 def test_a_share_without_a_whole_keeps_no_limit() -> None:
     it = judge(truth=None, limits=Limits(0.0, 0.0, 0.0), labels=["yellow"])
-    it.announce(Mark(2 * SECOND, 1), by_application=True)
-    reveal(it, 2, Thing("red", FAR))
+    it.announce(FrameKey(2 * SECOND, 1), by_application=True)
+    reveal(it, 2, LabelledBox("red", FAR))
     assert decided(it).reason == (
         "precision has no value (at least 0), as nothing was detected; recall has no value (at least 0), "
         "as there was nothing to detect; F1 has no value (at least 0), as there was nothing"
@@ -131,7 +131,7 @@ def test_a_frame_that_was_announced_counts_without_a_detection() -> None:
     for by_application in (True, False):
         it = judge()
         detect(it, 1, YELLOW, BLUE)
-        it.announce(Mark(2 * SECOND, 2), by_application)
+        it.announce(FrameKey(2 * SECOND, 2), by_application)
         found = values(decided(it))
         assert (found["frames"], found["false-negatives"], found["answered"]) == (2, 2, 1 + by_application)
 
@@ -145,13 +145,13 @@ def test_a_frame_of_a_live_truth_counts_without_a_detection_and_one_without_trut
     found = values(decided(it))
     assert (found["frames"], found["true-positives"], found["false-negatives"]) == (2, 1, 3)
     assert (found["without-truth"], found["false-positives"]) == (1, 0)
-    assert decided(it).reason.endswith("; left out: 1 frame without a truth")
+    assert decided(it).reason.endswith("; left out: 1 frame without ground truth")
 
 
 def test_an_announced_frame_of_a_live_truth_may_be_empty() -> None:
     it = judge(truth=None)
     reveal(it, 1, YELLOW)
-    it.announce(Mark(2 * SECOND, 2), by_application=False)
+    it.announce(FrameKey(2 * SECOND, 2), by_application=False)
     detect(it, 2, YELLOW)
     assert values(decided(it))["false-positives"] == 1
 
@@ -169,7 +169,7 @@ def test_sample_times_that_never_meet_are_said() -> None:
     detect(it, 1.01, YELLOW)
     detect(it, 2.01, YELLOW)
     assert decided(it).reason == (
-        "there is no truth for any of 2 frames with detections: is their sample time that of the picture?"
+        "none of 2 frames with detections has ground truth: is their sample time that of the picture?"
     )
 
 
@@ -207,11 +207,11 @@ def test_detections_that_come_late_do_not_count() -> None:
     at(it, 0.99)
     detect(it, 1, YELLOW, BLUE)
     at(it, 1.0)
-    it.detect(Mark(SECOND, 1), 7, BLUE.box)
+    it.detect(FrameKey(SECOND, 1), 7, BLUE.box)
     found = values(decided(it))
     assert (found["true-positives"], found["false-positives"], found["late"], found["repeated"]) == (2, 0, 1, 1)
     assert decided(it).reason.endswith(
-        "; left out: 1 detection too late, 1 detection under a detectionId that was taken"
+        "; left out: 1 detection too late, 1 detection under a detectionId that was in use"
     )
 
 
@@ -259,11 +259,11 @@ def test_the_begin_forgets_what_was_before() -> None:
 
 def test_frames_before_the_start_do_not_count() -> None:
     it = judge(start=2.0)
-    detect(it, 1, Thing("red", FAR))
+    detect(it, 1, LabelledBox("red", FAR))
     at(it, 1.999)
-    detect(it, 2, Thing("red", FAR))
+    detect(it, 2, LabelledBox("red", FAR))
     at(it, 2.0)
-    detect(it, 2, Thing("red", FAR))
+    detect(it, 2, LabelledBox("red", FAR))
     detect(it, 3, YELLOW, BLUE)
     found = values(decided(it))
     assert (found["frames"], found["false-positives"], found["late"]) == (1, 0, 0)
@@ -271,15 +271,15 @@ def test_frames_before_the_start_do_not_count() -> None:
 
 def test_classes_that_do_not_count() -> None:
     it = judge(labels=["yellow"], limits=Limits(1.0, 1.0))
-    detect(it, 1, YELLOW, Thing("red", FAR), Thing("", FAR))
+    detect(it, 1, YELLOW, LabelledBox("red", FAR), LabelledBox("", FAR))
     assert decided(it).outcome == "passed" and "recall-blue" not in values(decided(it))
 
 
 def test_a_detection_without_a_property_is_of_its_type_or_of_no_class() -> None:
     it = judge()
-    it.detect(Mark(SECOND, 1), 0, A)
-    it.detect(Mark(SECOND, 1), 1, B)
-    it.detect(Mark(SECOND, 1), 1, Kind(2))
+    it.detect(FrameKey(SECOND, 1), 0, A)
+    it.detect(FrameKey(SECOND, 1), 1, B)
+    it.detect(FrameKey(SECOND, 1), 1, TypeNumber(2))
     found = values(decided(it))
     assert (found["false-positives"], found["precision-unnamed"], found["precision-type 2"]) == (2, 0.0, 0.0)
 
@@ -304,7 +304,7 @@ def test_the_first_verdict_stands() -> None:
     it = judge()
     detect(it, 1, YELLOW, BLUE)
     first = decided(it)
-    detect(it, 2, Thing("red", FAR))
+    detect(it, 2, LabelledBox("red", FAR))
     assert decided(it, 99) is first
 
 
@@ -314,8 +314,8 @@ def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
     it.begin(BEGIN)
     detect(it, 1, YELLOW)
     at(it, 5.9)
-    it.detect(Mark(SECOND, 1), 7, BLUE.box)
-    it.detect(Mark(SECOND, 1), 7, BLUE.label)
+    it.detect(FrameKey(SECOND, 1), 7, BLUE.box)
+    it.detect(FrameKey(SECOND, 1), 7, BLUE.label)
     assert decided(it).outcome == "passed"
 
 

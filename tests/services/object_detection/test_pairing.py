@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-from services.object_detection.boxes import Box, Scores, Thing, overlaps
+from services.object_detection.boxes import Box, LabelledBox, Scores, overlaps
 from services.object_detection.counts import compare
 from services.object_detection.pairing import best_pairs
 
@@ -83,7 +83,7 @@ def coco_counts(found: list[Box], true: list[Box], threshold: float) -> tuple[in
 
 
 def counts(found: list[Box], true: list[Box], threshold: float) -> tuple[int, int, int]:
-    total = compare([Thing("a", b) for b in found], [Thing("a", b) for b in true], threshold, ()).total()
+    total = compare([LabelledBox("a", b) for b in found], [LabelledBox("a", b) for b in true], threshold, ()).total()
     return total.hits, total.false, total.missed
 
 

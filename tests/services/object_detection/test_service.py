@@ -13,7 +13,7 @@ from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.object_detection.service import ANNOUNCEMENT, LOGIC, ObjectDetection
 from tests.services.object_detection.test_truth import single, write
-from tests.services.process import PATIENCE, ROOT, launch, running, say
+from tests.services.process import PATIENCE, ROOT, launch, running, send
 
 YELLOW, BLUE = ("color:yellow", (0.1, 0.1, 0.05, 0.05)), ("blue", (-0.015, 0.0, 0.031, 0.042))
 LIMITS = ("--min-recall=0.9", "--min-precision=0.9", "--min-frames=2")
@@ -32,15 +32,15 @@ def service(*words: str) -> ObjectDetection:
     return ObjectDetection(Context("object-detection", flags(*words), MessageSet.standard()))
 
 
-def send(session: Session, sample_time: int, *things: Any, sender: int = 0, number: int = 0) -> None:
+def send_detections(session: Session, sample_time: int, *boxes: Any, sender: int = 0, number: int = 0) -> None:
     """The detections of a frame, as applications send them."""
-    for detection, (label, (x, y, width, height)) in enumerate(things):
+    for detection, (label, (x, y, width, height)) in enumerate(boxes):
         key: dict[str, Any] = {
             "sender_stamp": sender, "sample_time": sample_time, "sampleId": number, "detectionId": detection
         }  # fmt: skip
-        say(session, LOGIC + "Type", type=1, **key)
-        say(session, LOGIC + "Property", property=label, **key)
-        say(session, LOGIC + "BoundingBox", x=x, y=y, width=width, height=height, **key)
+        send(session, LOGIC + "Type", type=1, **key)
+        send(session, LOGIC + "Property", property=label, **key)
+        send(session, LOGIC + "BoundingBox", x=x, y=y, width=width, height=height, **key)
 
 
 def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
@@ -65,11 +65,11 @@ def test_it_hears_what_its_flags_name(truth: Path) -> None:
         ((*LIMITS, "--truth-sender=0"), "--truth-sender=0 is the --sender of the detections"),
         (
             ("--truth=TRUTH",),
-            "there is no limit to judge by: give one or more of --min-precision, --min-recall, --min-f1",
+            "there is no limit: give one or more of --min-precision, --min-recall, --min-f1",
         ),
         (
             (*LIMITS, "--truth=TRUTH", "--max-time=1"),
-            "no frame could be judged: --max-time has to be longer than --from",
+            "no frame would be judged: --max-time must be longer than --from",
         ),
         ((*LIMITS, "--truth=TRUTH", "--classes=yelow"), "has no box of class 'yelow'; did you mean 'yellow'?"),
         ((*LIMITS, "--truth=TRUTH", "--classes=x"), "has no box of class 'x'; it has blue, yellow"),
@@ -85,11 +85,11 @@ def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
     now = time.time_ns() // 1000
     words = (f"--cid={cid}", f"--truth={truth}", *LIMITS)
     with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
-        say(session, "dodo.TestBegin", sample_time=now)
+        send(session, "dodo.TestBegin", sample_time=now)
         for frame in range(20):
-            send(session, now + frame * 100_000, YELLOW, BLUE, number=frame)
-            send(session, now + frame * 100_000, ("red", (0, 0, 1, 1)), sender=4)
-        say(session, "dodo.EndOfInput", source="recording")
+            send_detections(session, now + frame * 100_000, YELLOW, BLUE, number=frame)
+            send_detections(session, now + frame * 100_000, ("red", (0, 0, 1, 1)), sender=4)
+        send(session, "dodo.EndOfInput", source="recording")
         code, output, errors = finished(process)
     assert (code, errors) == (0, "")
     verdict = json.loads(output)
@@ -105,13 +105,13 @@ def test_a_live_truth_on_the_bus(cid: int, tmp_path: Path) -> None:
     now = time.time_ns() // 1000
     words = (f"--cid={cid}", "--truth-sender=9", "--frame-sender=9", *LIMITS)
     with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
-        say(session, "dodo.TestBegin", sample_time=now)
+        send(session, "dodo.TestBegin", sample_time=now)
         for frame in range(3):
-            send(session, now + frame, YELLOW, BLUE, sender=9)
-            send(session, now + frame, BLUE)
-        say(session, ANNOUNCEMENT, sender_stamp=9, sample_time=now + 7)
-        send(session, now + 7, YELLOW)
-        say(session, "dodo.EndOfInput", source="camera")
+            send_detections(session, now + frame, YELLOW, BLUE, sender=9)
+            send_detections(session, now + frame, BLUE)
+        send(session, ANNOUNCEMENT, sender_stamp=9, sample_time=now + 7)
+        send_detections(session, now + 7, YELLOW)
+        send(session, "dodo.EndOfInput", source="camera")
         code, output, _ = finished(process)
     checks = {check["name"]: check["value"] for check in json.loads(output)["checks"]}
     assert code == 0 and json.loads(output)["outcome"] == "failed"

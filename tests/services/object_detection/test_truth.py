@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.object_detection.boxes import Box, Thing
-from services.object_detection.frames import Mark
+from services.object_detection.boxes import Box, LabelledBox
+from services.object_detection.frames import FrameKey
 from services.object_detection.truth import TruthError, load
 from tests.services.process import ROOT
 
@@ -24,7 +24,7 @@ COCO = {
         {"id": 2, "image_id": 4, "category_id": 2, "bbox": [-10, 0, 20, 20]},
     ],
 }
-YELLOW = Thing("yellow", Box(0.1, 0.1, 0.05, 0.05))
+YELLOW = LabelledBox("yellow", Box(0.1, 0.1, 0.05, 0.05))
 
 
 def write(folder: Path, document: Any) -> Path:
@@ -39,18 +39,18 @@ def single() -> dict[str, Any]:
 
 def test_one_picture_holds_for_every_frame(tmp_path: Path) -> None:
     truth = load(write(tmp_path, single()), "one")
-    things = truth.of(Mark(1, 2))
-    assert things is not None and things == truth.of(Mark(3, 4))
-    assert things[0].label == "yellow" and things[0].box == pytest.approx(YELLOW.box)
+    boxes = truth.of(FrameKey(1, 2))
+    assert boxes is not None and boxes == truth.of(FrameKey(3, 4))
+    assert boxes[0].label == "yellow" and boxes[0].box == pytest.approx(YELLOW.box)
     assert truth.labels() == ["blue", "yellow"]
 
 
 def test_pictures_by_sample_time_and_by_number(tmp_path: Path) -> None:
     path = write(tmp_path, COCO)
     by_time, by_number = load(path, "sample-time"), load(path, "number")
-    assert [len(by_time.of(Mark(time, 4)) or "") for time in (1_000_000, 1_100_000)] == [2, 0]
-    assert by_time.of(Mark(1_100_000, 9)) == () and by_time.of(Mark(1_000_001, 4)) is None
-    assert by_number.of(Mark(1, 5)) == () and by_number.of(Mark(1_000_000, 6)) is None
+    assert [len(by_time.of(FrameKey(time, 4)) or "") for time in (1_000_000, 1_100_000)] == [2, 0]
+    assert by_time.of(FrameKey(1_100_000, 9)) == () and by_time.of(FrameKey(1_000_001, 4)) is None
+    assert by_number.of(FrameKey(1, 5)) == () and by_number.of(FrameKey(1_000_000, 6)) is None
 
 
 def change(path: tuple[Any, ...], value: Any) -> Callable[[dict[str, Any]], None]:
@@ -81,12 +81,12 @@ def change(path: tuple[Any, ...], value: Any) -> Callable[[dict[str, Any]], None
         (("annotations", 1, "bbox"), [1, 2, 3, 0], ": annotations[1].bbox: has no area, 3 x 0 pixels"),
         (("annotations", 1, "bbox"), [640, 2, 3, 3], ": annotations[1].bbox: lies outside its image of 640 x 480"),
         (("annotations", 1, "bbox"), [-3, 2, 3, 3], ": annotations[1].bbox: lies outside its image of 640 x 480"),
-        (("annotations", 0, "iscrowd"), 1, ": annotations[0]: is a crowd (iscrowd), expected the box of one object"),
-        (("categories", 0, "name"), "color: ", ": categories[0].name: expected a text"),
+        (("annotations", 0, "iscrowd"), 1, ": annotations[0]: iscrowd is set, expected the box of one object"),
+        (("categories", 0, "name"), "color: ", ": categories[0].name: expected a string"),
         (("images", 0, "width"), 0, ": images[0].width: expected a whole number, 1 or more"),
         (("images", 0, "sample_time"), 1.5, ": images[0].sample_time: expected a whole number, 0 or more"),
-        (("images", 1, "id"), 4, ": images: two of them have the same id"),
-        (("images", 1, "sample_time"), 1_000_000, ": images: two of them have the same sample_time"),
+        (("images", 1, "id"), 4, ": images: two have the same id"),
+        (("images", 1, "sample_time"), 1_000_000, ": images: two have the same sample_time"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said: str) -> None:
@@ -99,7 +99,7 @@ def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said
 
 
 def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TruthError, match=r"has 2 images, and one was to hold for every frame: see --truth-frames$"):
+    with pytest.raises(TruthError, match=r"has 2 images, expected one for all frames; see --truth-frames$"):
         load(write(tmp_path, COCO), "one")
 
 

@@ -29,7 +29,7 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
     path.write_bytes(b"dear")
     with pytest.raises(RecordingError) as caught:
         Recording(path)
-    assert str(caught.value) == f"{path} is there already and is not overwritten"
+    assert str(caught.value) == f"{path} exists and is not overwritten"
     assert path.read_bytes() == b"dear"
 
 
@@ -50,7 +50,7 @@ def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureF
     assert len(list(read_envelopes(path))) == 2
     assert path.stat().st_size <= 300
     assert [r.getMessage() for r in caplog.records] == [
-        "a message is not recorded: the recording has its largest size, 300 bytes",
+        "a message was not recorded: the recording has its largest size, 300 bytes",
         "3 messages were not recorded",
     ]
 

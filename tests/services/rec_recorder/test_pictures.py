@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
-from tests.services.process import PATIENCE, running, say
+from tests.services.process import PATIENCE, running, send
 from tests.services.rec_replay.viewer import Viewer
 
 WIDTH, HEIGHT, COUNT = 160, 120, 8
@@ -65,7 +65,7 @@ def record(cid: int, folder: Path, kind: str, *flags: str) -> Path:
     ):
         time.sleep(0.3)  # until the recorder has found the memory
         for number in range(COUNT):
-            say(session, "opendlv.proxy.PedalPositionRequest", sample_time=T0 + number * PERIOD + 1, position=number)
+            send(session, "opendlv.proxy.PedalPositionRequest", sample_time=T0 + number * PERIOD + 1, position=number)
             camera.show(number)
             wait_for(path, list(range(number + 1)))
     return path
@@ -83,7 +83,7 @@ def test_lossless_pictures_come_back_bit_for_bit(cid: int, tmp_path: Path, kind:
         Viewer(f"{name}.{kind}") as viewer,
     ):
         time.sleep(0.1)
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         viewer.wait_for(COUNT)
     assert viewer.seen == [(scene(n, kind).tobytes(), T0 + n * PERIOD) for n in range(COUNT)]
 
@@ -109,16 +109,16 @@ def test_commands_pause_pictures_and_messages(cid: int, tmp_path: Path) -> None:
     path, camera = tmp_path / "drive.rec", CameraMemory("i420")
     flags = (f"--cid={cid}", f"--rec={path}", "--frames=20", f"--memories={camera.name}:{WIDTH}x{HEIGHT}", "--paused")
     with camera.memory, Session(cid) as session, running("rec_recorder", tmp_path, *flags):
-        say(session, "opendlv.proxy.PedalPositionRequest")
-        say(session, "cluon.data.RecorderCommand", command=1)
+        send(session, "opendlv.proxy.PedalPositionRequest")
+        send(session, "cluon.data.RecorderCommand", command=1)
         time.sleep(0.3)
         camera.show(0)
         wait_for(path, [0])
-        say(session, "cluon.data.RecorderCommand", command=2)
+        send(session, "cluon.data.RecorderCommand", command=2)
         time.sleep(0.1)
         camera.show(1)
         time.sleep(0.1)
-        say(session, "cluon.data.RecorderCommand", command=1)
+        send(session, "cluon.data.RecorderCommand", command=1)
         time.sleep(0.1)
         camera.show(2)
         wait_for(path, [0, 2])

@@ -7,7 +7,7 @@ from pathlib import Path
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from tests.services.process import PATIENCE, ROOT, launch, running, say
+from tests.services.process import PATIENCE, ROOT, launch, running, send
 
 
 def until_recorded(path: Path, count: int) -> list[Envelope]:
@@ -22,8 +22,8 @@ def test_every_message_is_there_even_after_a_kill(cid: int, tmp_path: Path) -> N
     path = tmp_path / "drive.rec"
     strange = Envelope(4711, b"\x0d\xa4\x01", 5, 0, -1_500_000, 9)
     with Session(cid) as session, running("rec_recorder", tmp_path, f"--cid={cid}", f"--rec={path}") as recorder:
-        say(session, "dodo.TestBegin", seed=3)
-        say(session, "opendlv.proxy.PedalPositionRequest", sender_stamp=2, sample_time=17, position=0.5)
+        send(session, "dodo.TestBegin", seed=3)
+        send(session, "opendlv.proxy.PedalPositionRequest", sender_stamp=2, sample_time=17, position=0.5)
         session.send_envelope(strange)
         recorded = until_recorded(path, 3)
         recorder.kill()
@@ -40,7 +40,7 @@ def test_a_file_that_is_there_ends_it_before_it_is_ready(cid: int, tmp_path: Pat
     recorder = launch("rec_recorder", tmp_path, f"--cid={cid}", f"--rec={path}")
     output, errors = recorder.communicate(timeout=PATIENCE)
     assert (recorder.returncode, output) == (2, "")
-    assert errors == f"rec-recorder: CRITICAL: {path} is there already and is not overwritten\n"
+    assert errors == f"rec-recorder: CRITICAL: {path} exists and is not overwritten\n"
     assert path.read_bytes() == b"dear"
 
 

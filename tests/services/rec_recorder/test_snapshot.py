@@ -9,8 +9,8 @@ import pytest
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory import pixels
 from services.rec_recorder.snapshot import Snapshot
-from services.rec_recorder.source import Source, Wanted
-from tests.services.process import launch, running, say
+from services.rec_recorder.source import MemorySpec, Source
+from tests.services.process import launch, running, send
 from tests.services.rec_recorder.test_pictures import HEIGHT, PATIENCE, WIDTH, CameraMemory, scene
 
 
@@ -31,7 +31,7 @@ def taken(path: Path) -> list[int]:
 
 def test_the_first_picture_and_then_that_of_the_begin(camera: CameraMemory, tmp_path: Path) -> None:
     path, seen = tmp_path / "snapshot.png", []
-    snapshot = Snapshot(Source(Wanted(camera.name, WIDTH, HEIGHT), 1), path)
+    snapshot = Snapshot(Source(MemorySpec(camera.name, WIDTH, HEIGHT), 1), path)
     for number in range(6):
         snapshot.update(number)
         seen.append(taken(path))
@@ -48,18 +48,18 @@ def test_the_first_picture_and_then_that_of_the_begin(camera: CameraMemory, tmp_
 
 @pytest.mark.parametrize(
     ("width", "place", "words"),
-    [(WIDTH + 2, ".", "which is no picture of 162 x 120"), (WIDTH, "nowhere", "No such file")],
+    [(WIDTH + 2, ".", "not those of a picture of 162 x 120"), (WIDTH, "nowhere", "No such file")],
 )
 def test_what_cannot_be_written_is_told(
     camera: CameraMemory, tmp_path: Path, caplog: pytest.LogCaptureFixture, width: int, place: str, words: str
 ) -> None:
-    snapshot = Snapshot(Source(Wanted(camera.name, width, HEIGHT), 1), tmp_path / place / "snapshot.png")
+    snapshot = Snapshot(Source(MemorySpec(camera.name, width, HEIGHT), 1), tmp_path / place / "snapshot.png")
     snapshot.update(0)
     camera.show(1)
     snapshot.update(1)
     snapshot.close()
     (record,) = caplog.records
-    assert record.getMessage().startswith("there is no snapshot: ") and words in record.getMessage()
+    assert record.getMessage().startswith("no snapshot was taken: ") and words in record.getMessage()
 
 
 def test_the_recorder_takes_one_without_recording_frames(cid: int, camera: CameraMemory, tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_the_recorder_takes_one_without_recording_frames(cid: int, camera: Camer
     memories = f"--memories={camera.name}:{WIDTH}x{HEIGHT}"
     flags = (f"--cid={cid}", f"--rec={tmp_path / 'drive.rec'}", f"--snapshot={path}", memories)
     with Session(cid) as session, running("rec_recorder", tmp_path, *flags) as recorder:
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         for number in range(1, 9):
             if taken(path):
                 break

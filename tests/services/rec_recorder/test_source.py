@@ -4,7 +4,7 @@ from collections.abc import Iterator
 import pytest
 
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from services.rec_recorder.source import Source, SourceError, Wanted, parse
+from services.rec_recorder.source import MemorySpec, Source, SourceError, parse
 
 PERIOD = 100_000
 
@@ -46,7 +46,7 @@ def taken(source: Source, memory: SharedMemory, times: list[int]) -> list[int]:
     ],
 )
 def test_pictures_at_a_rate(memory: SharedMemory, times_ms: list[int], wanted_ms: list[int]) -> None:
-    source = Source(Wanted(memory.name), PERIOD)
+    source = Source(MemorySpec(memory.name), PERIOD)
     assert source.take(0) is None  # what was there before
     assert taken(source, memory, [t * 1000 for t in times_ms]) == wanted_ms
     source.close()
@@ -54,7 +54,7 @@ def test_pictures_at_a_rate(memory: SharedMemory, times_ms: list[int], wanted_ms
 
 def test_a_memory_that_comes_and_goes(memory: SharedMemory) -> None:
     name = f"{memory.name}.late"
-    source = Source(Wanted(name), PERIOD)
+    source = Source(MemorySpec(name), PERIOD)
     assert source.take(0) is None
     for start in (1, 3):
         with SharedMemory.create(name, 6) as late:
@@ -64,7 +64,7 @@ def test_a_memory_that_comes_and_goes(memory: SharedMemory) -> None:
 
 
 def test_it_never_stands_in_line(memory: SharedMemory) -> None:
-    source = Source(Wanted(memory.name), PERIOD)
+    source = Source(MemorySpec(memory.name), PERIOD)
     taken(source, memory, [1, 2])
     assert memory.readers_waiting() == 0
     source.close()
@@ -88,8 +88,8 @@ def test_layouts(text: str, size: int, layout: tuple[str, int, int]) -> None:
 @pytest.mark.parametrize(
     ("text", "size", "problem"),
     [
-        ("a.argb:640x480", 5, "memory 'a.argb' has 5 bytes, which is no picture of 640 x 480 pixels"),
-        ("a.argb", 5, "memory 'a.argb' has 5 bytes, of no usual size: write a.argb:WIDTHxHEIGHT"),
+        ("a.argb:640x480", 5, "memory 'a.argb' has 5 bytes, not those of a picture of 640 x 480 pixels"),
+        ("a.argb", 5, "memory 'a.argb' has 5 bytes, not those of a common size: write a.argb:WIDTHxHEIGHT"),
     ],
 )
 def test_memories_without_pictures(text: str, size: int, problem: str) -> None:
@@ -100,12 +100,12 @@ def test_memories_without_pictures(text: str, size: int, problem: str) -> None:
 
 @pytest.mark.parametrize("text", ["", ":640x480", "a:640", "a:0x480", "a:640x480x3"])
 def test_memories_written_wrongly(text: str) -> None:
-    with pytest.raises(SourceError, match="is no memory to record, expected a name such as"):
+    with pytest.raises(SourceError, match="is not a memory to record, expected a name such as"):
         parse(text)
 
 
 def test_a_camera_that_keeps_the_lock_is_waited_for(memory: SharedMemory) -> None:
-    source = Source(Wanted(memory.name), PERIOD)
+    source = Source(MemorySpec(memory.name), PERIOD)
     assert source.take(0) is None
     with SharedMemory.attach(memory.name) as other, other.lock():
         assert source.take(0) is None

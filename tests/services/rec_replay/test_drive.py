@@ -18,7 +18,7 @@ from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from tests.services.process import PATIENCE, running, say
+from tests.services.process import PATIENCE, running, send
 from tests.services.rec_replay.viewer import Viewer
 
 MAKER = Path(__file__).parents[3] / "tests_registry" / "recordings" / "make_recordings.py"
@@ -115,7 +115,7 @@ def replayed(cid: int, folder: Path, path: Path, begin: int) -> tuple[list[Key],
     flags = (f"--cid={cid}", f"--rec={path}", f"--name.i420={name}", f"--name.argb={name}.argb", "--timemod=2")
     with Session(cid) as session, running("rec_replay", folder, *flags), Viewer(name) as viewer:
         time.sleep(0.1)
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         while not heard or heard[-1][0] != END:
             envelope = session.receive(PATIENCE)
             assert envelope is not None, f"no end came after {len(heard)} messages"

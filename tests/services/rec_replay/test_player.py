@@ -72,7 +72,7 @@ def test_what_is_no_command_changes_nothing(command: int, seek_to: float, caplog
     one.play()
     one.command(command, seek_to)
     assert at(one, 10 * S) == [(0, 10), (1, 10)]
-    assert "is none for a player" in caplog.text
+    assert "unknown player command" in caplog.text
 
 
 def test_it_begins_anew_at_its_end() -> None:

@@ -81,8 +81,8 @@ def test_filters_do_not_change_the_times(recording: Recording) -> None:
 @pytest.mark.parametrize(
     ("selection", "problem"),
     [
-        (Selection(start=60), "is played: the part that is chosen holds no message"),
-        (Selection(messages=["1090/x"]), "'1090/x' is no message: after the slash stands a sender stamp, a number"),
+        (Selection(start=60), "has no message in the selected part"),
+        (Selection(messages=["1090/x"]), "'1090/x' is not a message: expected a sender stamp, a number"),
         (Selection(without=["opendlv.GroundSteeringRequest"]), "did you mean `opendlv.proxy.GroundSteeringRequest`"),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
-from tests.services.process import PATIENCE, hear, launch, running, say
+from tests.services.process import PATIENCE, launch, receive, running, send
 from tests.services.rec_replay.recordings import T0, S, images, message, picture, write
 from tests.services.rec_replay.viewer import Viewer
 
@@ -45,7 +45,7 @@ def test_messages_come_when_the_test_begins_and_then_the_input_ends(cid: int, tm
     with Session(cid) as session, running("rec_replay", tmp_path, *flags) as process:
         early = session.receive(0.2)
         assert early is None or early.data_type == STATUS
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         heard = until_end(session)
         assert process.wait(PATIENCE) == 0
     assert [key(e) for e in heard] == [key(e) for e in played]
@@ -57,7 +57,7 @@ def test_sample_times_of_the_test(cid: int, tmp_path: Path) -> None:
     flags = (f"--cid={cid}", f"--rec={rec}", "--settle=0", "--sample-times=test")
     with Session(cid) as session, running("rec_replay", tmp_path, *flags):
         before = time.time_ns() // 1000
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         heard = until_end(session)
     times = [e.sample_time for e in heard]
     assert [t - times[0] for t in times] == [0, S // 10, 3 * S // 10]
@@ -76,7 +76,7 @@ def test_pictures_with_their_sample_times(cid: int, tmp_path: Path) -> None:
         Viewer(names["argb"]) as argb,
     ):
         time.sleep(0.1)
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         i420.wait_for(len(times))
         argb.wait_for(len(times))
     assert i420.seen == [(picture(n).tobytes(), T0 + round(t * S)) for n, t in enumerate(times)]
@@ -89,19 +89,19 @@ def test_commands(cid: int, tmp_path: Path) -> None:
     command = "cluon.data.PlayerCommand"
 
     def position(session: Session) -> float:
-        return float(hear(session, PEDAL)[1].position)
+        return float(receive(session, PEDAL)[1].position)
 
     with Session(cid) as session, running("rec_replay", tmp_path, f"--cid={cid}", f"--rec={rec}", "--timemod=5"):
         for _ in range(2):
-            say(session, command, command=4)
+            send(session, command, command=4)
         assert [position(session), position(session)] == [0, 1]
-        say(session, command, command=3, seekTo=0.75)
-        say(session, command, command=4)
+        send(session, command, command=3, seekTo=0.75)
+        send(session, command, command=4)
         assert position(session) == 6
-        _, status = hear(session, "cluon.data.PlayerStatus")
+        _, status = receive(session, "cluon.data.PlayerStatus")
         assert (status.state, status.numberOfEntries, status.currentEntryForPlayback) == (2, 8, 7)
-        say(session, command, command=3, seekTo=0.5)
-        say(session, command, command=1)
+        send(session, command, command=3, seekTo=0.5)
+        send(session, command, command=1)
         assert [position(session) for _ in range(4)] == [4, 5, 6, 7]
 
 
@@ -109,7 +109,7 @@ def test_it_begins_anew(cid: int, tmp_path: Path) -> None:
     rec = write(tmp_path / "drive.rec", pedals([0, 0.01, 0.02]))
     flags = (f"--cid={cid}", f"--rec={rec}", "--autorewind", "--await-begin=false")
     with Session(cid) as session, running("rec_replay", tmp_path, *flags):
-        positions = [hear(session, PEDAL)[1].position for _ in range(12)]
+        positions = [receive(session, PEDAL)[1].position for _ in range(12)]
     assert [b - a for a, b in pairwise(positions)].count(-2) >= 3
 
 
@@ -141,7 +141,7 @@ def test_damage_and_missing_pictures_are_told(cid: int, tmp_path: Path) -> None:
         assert len(until_end(session)) == 2
         errors = process.communicate(timeout=PATIENCE)[1]
     assert f"{rec}: skipped 5 bytes at byte" in errors
-    assert "holds no pictures in the part that is played: no shared memory is made" in errors
+    assert "has no pictures in the selected part: no shared memory is created" in errors
 
 
 def replayed_by_libcluon(cid: int, rec: Path) -> list[Envelope]:
@@ -160,7 +160,7 @@ def replayed_by_libcluon(cid: int, rec: Path) -> list[Envelope]:
 
 def replayed_by_us(cid: int, rec: Path, folder: Path) -> list[Envelope]:
     with Session(cid) as session, running("rec_replay", folder, f"--cid={cid}", f"--rec={rec}", "--settle=0"):
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         return until_end(session)
 
 
@@ -196,7 +196,7 @@ def test_every_picture_of_the_track(cid: int, tmp_path: Path, shared_data: Calla
     names = [f"--name.{kind}=track-{os.getpid()}.{kind}" for kind in ("argb", "i420")]
     flags = (f"--cid={cid}", f"--rec={rec}", "--timemod=30", "--settle=0", *names)
     with Session(cid) as session, running("rec_replay", tmp_path, *flags) as process:
-        say(session, "dodo.TestBegin")
+        send(session, "dodo.TestBegin")
         assert until_end(session) == []
         errors = process.communicate(timeout=PATIENCE)[1]
     assert "591 pictures were shown" in errors

@@ -6,7 +6,7 @@ import pytest
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.opendlv.video.decoder import VideoError
-from services.rec_replay.pictures import Screen, first_frame, pixels
+from services.rec_replay.pictures import PictureMemories, first_frame, pixels
 from services.rec_replay.selection import Selection, select
 from services.rec_replay.stream import Stream
 from tests.services.rec_replay.recordings import IMAGE, S, images, message, picture, write
@@ -77,6 +77,6 @@ def test_a_picture_of_another_size_is_left_out(path: Path) -> None:
 
     with Recording(path) as recording:
         one = pixels(first_frame(recording, np.arange(10)))
-    screen = Screen(Memory(), None)  # type: ignore[arg-type]
-    screen.show(one, 5)
-    assert (screen.shown, screen.misfits) == (0, 1)
+    memories = PictureMemories(Memory(), None)  # type: ignore[arg-type]
+    memories.show(one, 5)
+    assert (memories.shown, memories.misfits) == (0, 1)

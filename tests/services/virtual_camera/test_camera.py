@@ -30,7 +30,7 @@ def test_quaternion_and_euler_angles_agree(roll, pitch, yaw):
 
 @pytest.mark.parametrize("bad", [(0, 0, 0, 0), (math.nan, 0, 0, 1), (math.inf, 0, 0, 1)])
 def test_what_is_no_rotation_is_refused(bad):
-    with pytest.raises(ValueError, match="is no rotation"):
+    with pytest.raises(ValueError, match="is not a rotation"):
         quaternion_rotation(*bad)
 
 

@@ -21,7 +21,7 @@ from services.virtual_camera.camera import Pose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.service import build
-from tests.services.process import hear, running
+from tests.services.process import receive, running
 
 MANIFEST = load_manifest(package_data.services() / "virtual_camera")
 STRAIGHT = package_data.registry() / "maps" / "straight"
@@ -240,8 +240,8 @@ def test_boxes_on_the_bus_bear_the_time_of_the_picture_in_memory(tmp_path, cid):
             assert memory.wait(10)
             with memory.lock():
                 pictured = memory.sample_time()
-        sampled = [hear(session, f"{LOGIC}BoundingBox", 9)[0].sample_time]
+        sampled = [receive(session, f"{LOGIC}BoundingBox", 9)[0].sample_time]
         while sampled[-1] <= pictured + 50_000:
-            sampled.append(hear(session, f"{LOGIC}BoundingBox", 9)[0].sample_time)
+            sampled.append(receive(session, f"{LOGIC}BoundingBox", 9)[0].sample_time)
     assert pictured in sampled
     assert not (np.diff(sampled) % 50_000).any()

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from dodo_dsl import package_data
 from services.virtual_camera.camera import Pinhole, Pose
 from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import Wishes, load_scene
+from services.virtual_camera.draw.scene import SceneOptions, load_scene
 from services.virtual_camera.image.lens import Distortion
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.motion import still
@@ -20,8 +20,8 @@ FOCAL = 240 / math.tan(FOVY / 2)
 ALL = Limits(0.0, 0.0)
 
 
-def boxes(folder, pose, limits=ALL, classes=(), wishes=None, size=(640, 480)):
-    renderer = Renderer(load_scene(folder, wishes), *size, FOVY)
+def boxes(folder, pose, limits=ALL, classes=(), options=None, size=(640, 480)):
+    renderer = Renderer(load_scene(folder, options), *size, FOVY)
     return Truth(renderer, classes_of(classes, renderer.bodies.names), limits).boxes(pose)
 
 
@@ -128,7 +128,7 @@ def test_classes_are_those_written_or_the_models_own_names():
 
 def test_clutter_has_no_boxes_and_changes_no_numbers():
     pose = Pose.at(0, 0, 0.1, yaw=math.pi / 2)
-    plain, cluttered = (boxes(STRAIGHT, pose, Limits(), wishes=Wishes(clutter=n, seed=2)) for n in (0, 80))
+    plain, cluttered = (boxes(STRAIGHT, pose, Limits(), options=SceneOptions(clutter=n, seed=2)) for n in (0, 80))
     assert plain == cluttered
     assert len(plain) > 8
 

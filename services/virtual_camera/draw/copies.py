@@ -7,10 +7,10 @@ from services.virtual_camera.draw.shape import Shape
 
 
 @dataclass(frozen=True, eq=False)
-class Crowd:
+class Copies:
     """Copies of one shape: ``positions`` (n, 3) in m, ``turns`` (n,) in rad counter-clockwise about z.
 
-    ``name`` is the model's in the map; what has none is scenery, of which nobody asks for boxes.
+    ``name`` is the model's in the map; scenery has none, and no boxes.
     """
 
     shape: Shape

@@ -1,6 +1,6 @@
 """A rig on a pseudo terminal that obeys the protocol and moves, in a thread; it can misbehave.
 
-What it cannot do (accelerate, reset, lose power) is tried on the emulated rig.
+What it cannot do (accelerate, reset, lose power) is tested on the emulated rig.
 """
 
 import math
@@ -32,7 +32,7 @@ class FakeRig:
         self.at = [0.1, -0.1, 0.0]
         self.velocity = [0.0, 0.0, 0.0]
         self.status = 0
-        """What it says; a fault is latched until STOP or CALIBRATE acknowledge it."""
+        """What it answers to STATUS; a fault is latched until STOP or CALIBRATE acknowledge it."""
         self.restarted: int | None = None
         """The error's code with which it answers RUN until STOP, as after a reset."""
         self.calibrated = True
@@ -42,7 +42,7 @@ class FakeRig:
         """m of steps lost on each way home: where its switch x seems to be moves by as much."""
         self.noise = b""
         self.chopped = False
-        self.heard: list[tuple[str, tuple[float, ...]]] = []
+        self.received: list[tuple[str, tuple[float, ...]]] = []
         self._goal: list[float] | None = None
         self._home_at = 0.0
         self._homed = 0
@@ -80,11 +80,11 @@ class FakeRig:
             self.velocity = [0.0, 0.0, 0.0]
 
     def commands(self, word: str) -> list[tuple[float, ...]]:
-        return [arguments for name, arguments in list(self.heard) if name == word]
+        return [arguments for name, arguments in list(self.received) if name == word]
 
     def last(self) -> str:
         """The last command that moves or stops."""
-        return [name for name, _ in list(self.heard) if name in ("RUN", "STOP", "GOTO", "CALIBRATE")][-1]
+        return [name for name, _ in list(self.received) if name in ("RUN", "STOP", "GOTO", "CALIBRATE")][-1]
 
     def _live(self) -> None:
         before = time.monotonic()
@@ -111,7 +111,7 @@ class FakeRig:
         match = COMMAND.fullmatch(line)
         assert match is not None, line
         word, arguments = match[1], tuple(float(a) for a in match[2].split(",") if a)
-        self.heard.append((word, arguments))
+        self.received.append((word, arguments))
         error = self._refusal(word, arguments)
         if error is not None:
             self._answer(f"ERROR:{int(error)}")

@@ -78,7 +78,7 @@ def test_a_cube_through_a_wall_shows_on_both_sides(write_map):
 def test_models_that_only_stand_side_by_side_are_not_cut_up(write_map):
     floor = {"name": "f", "dimension": [90, 90, 1], "color": [1, 1, 1], "instances": [[0, 0, -0.5, 0]]}
     scene = crossing(write_map, (3, 0, 0, 0), (3, 1, 0, 0), (4.3, 0, 0, 0.7), block=[floor])
-    bodies = Bodies(scene.crowds, Tree(list(scene.faces)), Light.usual(), scene.faces)
+    bodies = Bodies(scene.models, Tree(list(scene.faces)), Light.usual(), scene.faces)
     assert bodies.solids == 0
 
 

@@ -19,7 +19,7 @@ exec sleep 60
 def test_what_cannot_be_read_is_an_error_and_no_silence(tmp_path: Path) -> None:
     (tmp_path / "rig-emulator").write_text(SAYS)
     (tmp_path / "rig-emulator").chmod(0o755)
-    with EmulatedRig(tmp_path) as rig, pytest.raises(RigError, match=r"said what cannot be read: .*\"late\", \"la$"):
+    with EmulatedRig(tmp_path) as rig, pytest.raises(RigError, match=r"sent an unreadable line: .*\"late\", \"la$"):
         end = time.monotonic() + 10
         while time.monotonic() < end:
             rig.position()

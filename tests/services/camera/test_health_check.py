@@ -17,7 +17,7 @@ BOARD = np.kron(np.indices((8, 8)).sum(0) % 2 * 255, np.ones((16, 16))).astype(n
 
 @pytest.mark.parametrize(
     ("picture", "words"),
-    [(BOARD, ""), (BOARD // 255, "is it lit?"), (BOARD * 0 + 128, "is the lens covered?"), (None, "is no camera")],
+    [(BOARD, ""), (BOARD // 255, "is it lit?"), (BOARD * 0 + 128, "is the lens covered?"), (None, "is not a camera")],
     ids=["good", "dark", "grey", "none"],
 )
 def test_a_picture_is_judged(
@@ -26,9 +26,9 @@ def test_a_picture_is_judged(
     path = tmp_path / "picture.png"
     if picture is not None:
         cv2.imwrite(str(path), picture)
-    said = check(str(path), ok=not words)
-    assert words in said.get("reason", "") + said.get("error", "")
-    assert ("error" in said) == (picture is None)
+    result = check(str(path), ok=not words)
+    assert words in result.get("reason", "") + result.get("error", "")
+    assert ("error" in result) == (picture is None)
 
 
 def check(source: str, ok: bool) -> dict[str, Any]:
@@ -41,9 +41,9 @@ def check(source: str, ok: bool) -> dict[str, Any]:
         "--height=128",
     ]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
-    said: dict[str, Any] = json.loads(result.stdout)
-    assert (result.returncode, said["ok"]) == (int(not ok), ok), said
-    return said
+    result: dict[str, Any] = json.loads(result.stdout)
+    assert (result.returncode, result["ok"]) == (int(not ok), ok), result
+    return result
 
 
 @pytest.mark.usefixtures("rpicam")
@@ -52,7 +52,7 @@ def check(source: str, ok: bool) -> dict[str, Any]:
     [
         ("lit", ""),
         ("dark", "is it lit?"),
-        ("frozen", "has shown one and the same picture for 5 s"),
+        ("frozen", "has shown the same picture for 5 s"),
         ("lost", "rpicam-vid ended with code 1"),
     ],
 )

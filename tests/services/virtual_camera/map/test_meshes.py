@@ -108,12 +108,12 @@ def test_a_cone_on_a_plate_has_two_convex_parts_and_a_box_one(obj, cube_obj):
 BAD = [
     ("", "has no faces"),
     ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "has no faces"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "can be read"),
-    ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "can be read"),
+    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "not a readable OBJ file"),
+    ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not a readable OBJ file"),
     ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite numbers"),
     ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "no face of the OBJ file has an area"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n", "count vertices from the file's beginning"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 50_001, "50001 triangles are more than the 50000"),
+    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n", "count vertices by negative numbers"),
+    ("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 50_001, "50001 triangles, expected at most 50000"),
 ]
 
 

@@ -1,4 +1,4 @@
-"""A way through points: where a vehicle is at a time, how it is turned and how it moves.
+"""A trajectory through points: where a vehicle is at a time, its heading and its velocity.
 
 World: metres, z up, heading counter-clockwise from the x axis. Between two way points position and heading change
 evenly, the heading by the shorter way round (at exactly half a turn: to the left).
@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 
-class WayError(ValueError):
-    """Way points that make no way; one sentence with their place."""
+class TrajectoryError(ValueError):
+    """Way points that make no trajectory; one sentence with their place."""
 
 
 @dataclass(frozen=True)
@@ -54,18 +54,18 @@ class _Knot:
     yaw: float
 
 
-class Way:
+class Trajectory:
     """Poses over time, from two way points or more.
 
     Before the first point's time the vehicle stands there. After the last point's it stands there, or drives on as
-    between the last two where the way is ``endless``.
+    between the last two where the trajectory is ``endless``.
     """
 
     def __init__(self, points: Sequence[Point], speed: float, endless: bool = False) -> None:
-        """``speed`` (m/s) makes the times where the points have none; raises WayError."""
+        """``speed`` (m/s) makes the times where the points have none; raises TrajectoryError."""
         if len(points) < 2:
             place = f"{points[0].place}: " if points else ""
-            raise WayError(f"{place}a way needs two way points or more")
+            raise TrajectoryError(f"{place}expected two way points or more")
         yaws = [p.yaw for p in points]
         turned = [y for y in yaws if y is not None] if None not in yaws else headings(points)
         timed = _timed(points) if points[0].time is not None else _at_speed(points, speed)
@@ -93,13 +93,13 @@ def wrapped(angle: float) -> float:
 def headings(points: Sequence[Point]) -> list[float]:
     """The heading (rad) at each point of a vehicle that looks where it goes.
 
-    It is half-way between the directions of the parts before and after the point. Raises WayError when all points
-    are at one place.
+    It is half-way between the directions of the parts before and after the point. Raises TrajectoryError when all
+    points are at one place.
     """
     parts = [math.atan2(b.y - a.y, b.x - a.x) if (a.x, a.y) != (b.x, b.y) else None for a, b in pairwise(points)]
     known = next((part for part in parts if part is not None), None)
     if known is None:
-        raise WayError(f"{points[-1].place}: all way points are at one place, so the vehicle needs yaw to look along")
+        raise TrajectoryError(f"{points[-1].place}: all way points are at one place: give a yaw")
     directions = []
     for part in parts:  # standing still it looks as before
         known = known if part is None else part
@@ -111,10 +111,10 @@ def headings(points: Sequence[Point]) -> list[float]:
 def _timed(points: Sequence[Point]) -> list[float]:
     times = [p.time for p in points if p.time is not None]
     if times[0] < 0:
-        raise WayError(f"{points[0].place}: time: {times[0]:g} is before the start")
+        raise TrajectoryError(f"{points[0].place}: time: {times[0]:g} is before the start")
     for before, now, point in zip(times, times[1:], points[1:], strict=False):
         if now <= before:
-            raise WayError(f"{point.place}: time: {now:g} is not after {before:g}, that of the point before")
+            raise TrajectoryError(f"{point.place}: time: {now:g} is not after {before:g}, the time of the point before")
     return times
 
 
@@ -123,9 +123,7 @@ def _at_speed(points: Sequence[Point], speed: float) -> list[float]:
     for a, b in pairwise(points):
         length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
         if length == 0:
-            raise WayError(
-                f"{b.place}: the same place as the point before, so a way with a speed ends there; give times"
-            )
+            raise TrajectoryError(f"{b.place}: the same place as the point before: give times instead of a speed")
         times.append(times[-1] + length / speed)
     return times
 
@@ -142,9 +140,9 @@ def _standing(knot: _Knot) -> Pose:
     return Pose(knot.x, knot.y, knot.z, wrapped(knot.yaw))
 
 
-def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Way:
-    """A straight way from a place along ``yaw`` (rad), without end where it has no ``length`` (m)."""
+def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Trajectory:
+    """A straight trajectory from a place along ``yaw`` (rad), without end where it has no ``length`` (m)."""
     begin = Point("the start", x, y, z, yaw)
     reach = length or 1.0
     end = replace(begin, x=x + reach * math.cos(yaw), y=y + reach * math.sin(yaw))
-    return Way([begin, end], speed, endless=length is None)
+    return Trajectory([begin, end], speed, endless=length is None)

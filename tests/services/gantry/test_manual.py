@@ -1,0 +1,69 @@
+"""Manual control of the rig, as a process against a rig on a pseudo terminal."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.services.gantry.fake_rig import FakeRig
+from tests.services.process import ROOT
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[FakeRig]:
+    with FakeRig(tmp_path / "rig") as one:
+        yield one
+
+
+def manual(rig: FakeRig, *words: str, code: int = 0) -> dict[str, Any]:
+    command = [sys.executable, "-m", "services.gantry.manual", f"--serial={rig.path}", *words]
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    assert process.returncode == code, process.stdout + process.stderr
+    result: dict[str, Any] = json.loads(process.stdout)
+    return result
+
+
+def test_status_moves_nothing(rig: FakeRig) -> None:
+    result = manual(rig, "status")
+    assert (result["status"], result["word"], result["x"], result["y"]) == (0, "idle", 0.1, -0.1)
+    assert not rig.commands("GOTO") and not rig.commands("CALIBRATE") and rig.last() == "STOP"
+
+
+def test_it_goes_and_stops_at_the_end(rig: FakeRig) -> None:
+    result = manual(rig, "goto", "-0.5", "0.25", "90")
+    assert [result["x"], result["y"], result["yaw"]] == pytest.approx([-0.5, 0.25, 90], abs=0.01)
+    assert rig.last() == "STOP"
+    assert manual(rig, "home")["x"] == pytest.approx(-0.9, abs=0.01)
+
+
+@pytest.mark.parametrize("words", [("goto", "2", "0", "0"), ("--range-x=0.5", "goto", "0", "0", "0")])
+def test_out_of_the_ranges_nothing_moves(rig: FakeRig, words: tuple[str, ...]) -> None:
+    assert "out of the rig's ranges" in manual(rig, *words, code=2)["error"]
+    assert not rig.received
+
+
+@pytest.mark.parametrize("words", [(), ("dance",), ("goto", "1"), ("goto", "nan", "0", "0"), ("--cid=x", "status")])
+def test_usage(rig: FakeRig, words: tuple[str, ...]) -> None:
+    assert manual(rig, *words, code=2)["error"]
+    assert not rig.received
+
+
+def test_uncalibrated(rig: FakeRig) -> None:
+    rig.calibrated = False
+    assert manual(rig, "status")["word"] == "not calibrated"
+    assert "is not calibrated" in manual(rig, "goto", "0", "0", "0", code=1)["error"]
+    assert not rig.commands("GOTO")
+    assert manual(rig, "calibrate")["status"] == 0
+
+
+def test_check_of_a_good_rig_and_of_one_that_loses_steps(rig: FakeRig) -> None:
+    rig.homes_slowly, rig.at = True, [-0.85, -0.65, -2.5]
+    result = manual(rig, "check")
+    assert result["ok"] and {c["name"] for c in result["checks"]} >= {"answers", "latency", "homing x", "homing yaw"}
+    rig.homes_slowly, rig.lost = False, 0.01
+    result = manual(rig, "check", code=1)
+    assert result["reason"].startswith("homing x is ")
