@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.emit.output_folder import write_text
+from dodo_dsl import atomic
 
 PAGE = Path(__file__).parents[1] / "docs" / "faults.md"
 FAULTS = (
@@ -92,5 +92,5 @@ class Book:
         assert fault in FAULTS, f"'{fault}' is not among the faults of the page"
         if self.update:
             others = [r for r in read() if (r.fault, r.backend) != (fault, backend)]
-            write_text(PAGE, page([*others, row]))
+            atomic.write_text(PAGE, page([*others, row]))
         assert row in read(), f"scripts/make-faults brings docs/faults.md up to date: {row.markdown()}"

@@ -1,40 +1,19 @@
-"""Generated files on disk: each is written beside its place and renamed, and what is stale goes."""
+"""Generated files on disk: written one by one, each as a whole, compared with what is there, stale ones removed."""
 
 import difflib
 import filecmp
-import functools
 import json
-import os
 import shutil
-import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from dodo_dsl import atomic
 from dodo_dsl.emit.render import File, render_plan
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.test_files import Copy
 
 PLAN_FILE = "test.json"
 FILES = "files"
-
-
-def replace_file(path: Path, fill: Callable[[Path], object]) -> None:
-    """``fill`` writes a new file beside ``path``, which is then renamed onto it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        fill(temporary)
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
-def write_text(path: Path, text: str) -> None:
-    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def pipeline_folder(out: Path) -> str:
@@ -60,32 +39,26 @@ def _update(out: Path, files: Iterable[File]) -> None:
     for file in files:
         path = out / file.path
         if not path.is_file() or path.read_bytes() != file.text.encode():
-            write_text(path, file.text)
+            atomic.write_text(path, file.text)
 
 
 def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[Copy]) -> None:
-    """A test that is not there yet: its folder is filled beside its place and renamed as a whole."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    stage = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name[:40]}."))
-    try:
-        stage.chmod(0o755)
+    """A new test: its folder appears as a whole."""
+    with atomic.new_folder(folder) as stage:
         for name, text in files:
             (stage / name).write_text(text, encoding="utf-8")
         for parent in sorted({(stage / FILES / copy.target).parent for copy in copies}):
             parent.mkdir(parents=True, exist_ok=True)
         for copy in copies:
             shutil.copyfile(copy.source, stage / FILES / copy.target)
-        stage.rename(folder)
-    except BaseException:
-        shutil.rmtree(stage, ignore_errors=True)
-        raise
 
 
 def _write_copies(folder: Path, wanted: Sequence[Copy]) -> None:
     for copy in wanted:
         target = folder / copy.target
         if not target.is_file() or not filecmp.cmp(copy.source, target, shallow=False):
-            replace_file(target, functools.partial(shutil.copyfile, copy.source))
+            with atomic.replacing(target) as part:
+                shutil.copyfile(copy.source, part)
     for path in _surplus(folder, wanted):
         path.unlink()
 

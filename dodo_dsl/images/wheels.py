@@ -1,15 +1,14 @@
 """Wheels for an image build without a package index: pip downloads them here, for the base image's Python."""
 
+import contextlib
 import hashlib
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl import package_data
+from dodo_dsl import atomic, package_data
 from dodo_dsl.images import docker_command
 from dodo_dsl.images.build_context import CONSTRAINTS, REQUIREMENTS
 
@@ -72,14 +71,8 @@ def provide(python: Python, cache: Path) -> Path:
         digest.update(file.read_bytes())
     folder = cache / digest.hexdigest()[:16]
     if not folder.is_dir():
-        cache.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(prefix="part-", dir=cache))
-        try:
+        with contextlib.suppress(FileExistsError), atomic.new_folder(folder) as part:  # another build may be faster
             _download(python, requirements, constraints, part)
-            if not folder.is_dir():
-                part.rename(folder)
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
     return folder
 
 

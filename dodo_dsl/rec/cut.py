@@ -17,4 +17,3 @@ def write(recording: Recording, rows: Numbers, path: Path, progress: Callable[[i
         for batch in recording.batches(rows):
             writer.write_frames(batch.frames())
             progress(writer.frames)
-        writer.flush_to_disk()

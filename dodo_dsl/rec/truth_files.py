@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
+from dodo_dsl import atomic
 from dodo_dsl.rec import truth
-from dodo_dsl.rec.outputs import new_file
 from dodo_dsl.rec.truth import Mark, TruthError
 
 if TYPE_CHECKING:
@@ -41,8 +41,7 @@ class TruthFiles:
             _write_picture(self.picture, picture)
         if marks:
             _write_picture(self.marked, truth.drawn(picture, marks))
-            with new_file(self.truth) as path:
-                path.write_text(truth.text(marks, self.picture.name, width, height), encoding="utf-8")
+            atomic.write_text(self.truth, truth.text(marks, self.picture.name, width, height))
 
 
 def given(path: Path) -> bytes:
@@ -70,5 +69,4 @@ def _write_picture(target: Path, picture: "Picture") -> None:
     import cv2
 
     _, png = cv2.imencode(".png", picture)
-    with new_file(target) as path:
-        path.write_bytes(png.tobytes())
+    atomic.write_bytes(target, png.tobytes())

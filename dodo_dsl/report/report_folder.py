@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.emit.output_folder import replace_file, write_text
+from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import html, junit, metrics, results
@@ -72,7 +72,7 @@ def write_report(
     """
     outcomes = [results.writable(outcome) for outcome in outcomes]
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     problems = []
     for outcome in outcomes:
         if outcome.slug in tests:
@@ -83,7 +83,8 @@ def write_report(
     (folder / TIMES).unlink(missing_ok=True)
     if times:
         try:
-            replace_file(folder / TIMES, lambda path: draw_times(times, platform.node() or "this machine", path))
+            with atomic.replacing(folder / TIMES) as part:
+                draw_times(times, platform.node() or "this machine", part)
         except Exception as error:  # noqa: BLE001  (as above)
             problems.append(f"the times of these tests cannot be drawn: {error}")
     write_summaries(folder, outcomes)
@@ -95,13 +96,14 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
     pictures = {o.slug: _pictures(folder, o) for o in outcomes}
     attachments = {slug: f"{_shown(folder)}/{found[0].path}" for slug, found in pictures.items() if found}
     times = TIMES if (folder / TIMES).is_file() else ""
-    write_text(folder / results.FILE_NAME, results.to_json(outcomes))
-    replace_file(folder / "junit.xml", lambda path: junit.write(path, outcomes, attachments))
-    write_text(folder / "metrics.txt", metrics.to_text(outcomes))
+    atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    with atomic.replacing(folder / "junit.xml") as part:
+        junit.write(part, outcomes, attachments)
+    atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
     files = html.Files(
         pictures, _logs(folder, outcomes), _recordings(folder, outcomes), _specs(folder, outcomes), times
     )
-    write_text(folder / "index.html", html.render(outcomes, files))
+    atomic.write_text(folder / "index.html", html.render(outcomes, files))
 
 
 def _pictures(folder: Path, outcome: Outcome) -> list[html.Picture]:
@@ -148,4 +150,5 @@ def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
         return
     from dodo_dsl.report.trajectory_plot import draw
 
-    replace_file(folder / TRAJECTORY, lambda path: draw(drive, outcome, path))
+    with atomic.replacing(folder / TRAJECTORY) as part:
+        draw(drive, outcome, part)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.state_folder import NoStateFolder, state_path
 
@@ -88,9 +89,7 @@ class History:
 
     def _shorten(self) -> None:
         lines = self.path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
-        part = self.path.with_suffix(f".{os.getpid()}.part")
-        part.write_text("".join(lines[len(lines) // 2 :]), encoding="utf-8")
-        part.replace(self.path)
+        atomic.write_text(self.path, "".join(lines[len(lines) // 2 :]))
 
 
 def _read(path: Path) -> Iterator[Run]:

@@ -17,7 +17,6 @@ def test_frames_are_there_before_the_end(tmp_path: Path) -> None:
         writer.write_frames(encode_frame(ENVELOPE._replace(sample_time=time)) for time in range(9))
         assert [e.sample_time for e in read_envelopes(path)] == [3, *range(9)]
         assert (writer.frames, writer.size) == (10, path.stat().st_size)
-        writer.flush_to_disk()
 
 
 def test_what_is_there_is_kept(tmp_path: Path) -> None:

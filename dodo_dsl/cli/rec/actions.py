@@ -9,6 +9,7 @@ from typing import TextIO
 
 import numpy as np
 
+from dodo_dsl import atomic
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.progress_bar import bar
 from dodo_dsl.cli.rec.message_sets import messages_for
@@ -19,7 +20,7 @@ from dodo_dsl.rec import coco, contents, csv_table, cut, labels
 from dodo_dsl.rec.contents_text import contents_text
 from dodo_dsl.rec.excerpt import NothingSelected, Selection
 from dodo_dsl.rec.frames import IMAGE
-from dodo_dsl.rec.outputs import new_file, new_folder, refuse_existing
+from dodo_dsl.rec.outputs import refuse_existing
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,10 @@ def _cut(job: _Job) -> None:
         raise NothingSelected(f"{output} is the recording itself; name another file with -o")
     refuse_existing([output], job.options.force)
     rows = job.rows()
-    with new_file(output) as place, bar(job.stderr, f"writing {output.name}", len(rows)) as progress:
+    with (
+        atomic.replacing(output, durable=True) as place,
+        bar(job.stderr, f"writing {output.name}", len(rows)) as progress,
+    ):
         cut.write(job.recording, rows, place, progress)
     job.stdout.write(f"{output}: {len(rows)} of {len(job.recording)} messages\n")
 
@@ -101,7 +105,7 @@ def _csv(job: _Job) -> None:
         raise NothingSelected(f"nothing is known of the messages in {recording.path}; name their .odvd by --messages")
     names = csv_table.names(recording, messages, known)
     refuse_existing([folder / name for name in names], job.options.force)
-    with new_folder(folder) as place, bar(job.stderr, "writing tables", len(known)) as progress:
+    with atomic.files_into(folder) as place, bar(job.stderr, "writing tables", len(known)) as progress:
         undecodable = csv_table.write(recording, messages, known, place, progress)
     for id_, count in undecodable.items():
         job.tell(f"{count} payloads of {messages.name(id_)} cannot be decoded and have no row")
@@ -128,7 +132,7 @@ def _coco(job: _Job) -> None:
     if not boxes and not options.all:
         raise NothingSelected(f"{recording.path} holds no detections with a box; --all exports frames without them")
     refuse_existing([folder / coco.ANNOTATIONS], options.force)
-    with new_folder(folder) as place, bar(job.stderr, "decoding frames", len(images)) as progress:
+    with atomic.files_into(folder) as place, bar(job.stderr, "decoding frames", len(images)) as progress:
         export = coco.Export(place, options.pictures, options.all, progress, job.tell)
         result = export.write(recording, images, boxes)
     if result.lost:

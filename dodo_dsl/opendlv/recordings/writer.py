@@ -1,6 +1,5 @@
 """Writing recordings so that whatever ends the writer, the file holds all frames written so far."""
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
@@ -40,10 +39,6 @@ class RecordingWriter:
                 pending, size = [], 0
         if pending:
             self._append(pending)
-
-    def flush_to_disk(self) -> None:
-        """Wait until the disk has it, for what must outlive a loss of power."""
-        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """End the recording."""

@@ -1,15 +1,14 @@
 """Copies files out of a container, from the stream that the engine sends, with one chunk at a time in memory."""
 
 import errno
-import functools
 import io
 import shutil
 import tarfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from dodo_dsl.emit.output_folder import replace_file
+from dodo_dsl import atomic
 
 MAX_BYTES = 4 << 30
 
@@ -26,14 +25,10 @@ def copy_out(container: Any, folder: str, target: Path, max_bytes: int = MAX_BYT
             for member in tar:
                 name = Path(member.name).name
                 if member.isfile() and name not in ("", ".", "..") and (content := tar.extractfile(member)):
-                    replace_file(target / name, functools.partial(_fill, content))
+                    with atomic.replacing(target / name) as part, part.open("xb") as file:
+                        shutil.copyfileobj(content, file)
     except tarfile.TarError as error:
         raise OSError(errno.EIO, f"the archive from the engine is damaged ({error})") from error
-
-
-def _fill(content: IO[bytes], path: Path) -> None:
-    with path.open("wb") as file:
-        shutil.copyfileobj(content, file)
 
 
 class _Stream(io.RawIOBase):

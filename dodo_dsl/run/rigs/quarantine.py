@@ -2,11 +2,11 @@
 
 import contextlib
 import json
-import os
 import re
 import time
 from pathlib import Path
 
+from dodo_dsl import atomic
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.state_folder import NoStateFolder, state_path
 
@@ -49,12 +49,9 @@ def all_quarantined() -> dict[str, str]:
 def quarantine(rig: str, reason: str) -> None:
     """Puts a rig into quarantine: tests on it end in error from now on. Raises RigProblem."""
     path = _file(rig)
-    part = path.with_suffix(f".{os.getpid()}.part")
     record = json.dumps({"rig": rig, "reason": reason, "when": int(time.time())})
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(record + "\n", encoding="utf-8")
-        part.replace(path)
+        atomic.write_text(path, record + "\n", durable=True)
     except OSError as error:
         raise RigProblem(f"its quarantine cannot be written to '{path}': {error.strerror} ({reason})") from error
 

@@ -1,0 +1,129 @@
+"""Files and folders that appear whole or not at all: written beside their place under a hidden name, then renamed.
+
+A reader, another writer and a killed process see the old content or the new, never a part, and a failure leaves no
+temporary file. A symlink in the place of the target is replaced; what it points to stays. A new file has the
+permissions that the umask leaves it, one that is replaced keeps its own.
+
+A rename does not wait for the disk. ``durable`` does, before and after it: for what must outlive a loss of power,
+as a recording cut from another or a rig's quarantine. What can be made again is not worth the wait.
+"""
+
+import contextlib
+import errno
+import os
+import secrets
+import shutil
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_MOST_NAME = 40
+"""Characters of the target's name in a temporary one, which with the rest stays below the 255 bytes of a name."""
+
+
+@contextmanager
+def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
+    """The name of a file for the block to make, which takes the place of ``path`` when it ends well.
+
+    The folder is made where there is none. Raises OSError that names ``path``, also for what fails in the block with
+    the temporary file.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = _beside(path)
+    with _naming(path, part):
+        try:
+            yield part
+            _keep_permissions(path, part)
+            if durable:
+                _flush(part)
+            part.replace(path)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+        if durable:
+            _flush(path.parent)
+
+
+def write_bytes(path: Path, content: bytes, durable: bool = False) -> None:
+    """Replaces the file by one with this content; raises OSError."""
+    with replacing(path, durable) as part, part.open("xb") as file:
+        file.write(content)
+
+
+def write_text(path: Path, text: str, durable: bool = False) -> None:
+    """Replaces the file by one with this text in UTF-8; raises OSError."""
+    write_bytes(path, text.encode(), durable)
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """An empty folder to fill, which becomes ``path`` when the block ends well.
+
+    Raises FileExistsError where ``path`` is there by then and not an empty folder, and OSError.
+    """
+    with _stage(path) as stage:
+        yield stage
+        try:
+            stage.rename(path)
+        except OSError as error:
+            if error.errno in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
+            raise
+
+
+@contextmanager
+def files_into(target: Path) -> Iterator[Path]:
+    """An empty folder to fill, whose files go to the folder ``target`` one by one when the block ends well.
+
+    What ``target`` holds besides them stays. Raises OSError.
+    """
+    with _stage(target) as stage:
+        yield stage
+        for source in sorted(path for path in stage.rglob("*") if path.is_file()):
+            place = target / source.relative_to(stage)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with _naming(place, source):
+                source.replace(place)
+
+
+@contextmanager
+def _stage(path: Path) -> Iterator[Path]:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    stage = _beside(path)
+    with _naming(path, stage):
+        try:
+            stage.mkdir()
+            yield stage
+        finally:
+            shutil.rmtree(stage, ignore_errors=True)
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name[:_MOST_NAME]}.{secrets.token_hex(8)}{path.suffix[:_MOST_NAME]}")
+
+
+def _keep_permissions(path: Path, part: Path) -> None:
+    with contextlib.suppress(FileNotFoundError):
+        mode = path.lstat().st_mode
+        if stat.S_ISREG(mode):
+            part.chmod(stat.S_IMODE(mode))
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _naming(path: Path, part: Path) -> Iterator[None]:
+    """An error of the temporary file, or of a write that names no file, names the file that is meant."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None or error.filename not in (None, str(part)):
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
