@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, NoApplication, plan
 from dodo_dsl.diagnostics import FORMATS, Diagnostic, has_errors, ordered
@@ -39,15 +40,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    try:
-        checked = selection.select(options.path, (), options.application)
-    except selection.NoSuchTest as error:
-        stderr.write(f"dodo compile: {error}\n")
-        return Exit.USAGE
+    checked = selection.select(options.path, (), options.application)
     (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
     if options.check:
         return _check(checked, options, stdout, stderr)
-    return _write(checked, options, stdout, stderr)
+    return _write(checked, options, stdout)
 
 
 def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
@@ -95,15 +92,14 @@ def _names(names: Sequence[str]) -> str:
     return ", ".join(names[:_MOST_NAMES]) + more
 
 
-def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int:
     if not checked.ok:
         _show(list(checked.diagnostics), options.format, stdout)
         return Exit.USAGE
     try:
         made = plan(checked, options.output)
     except NoApplication:
-        stderr.write("dodo compile: no application; name its compose file with --application or in dodo.yml\n")
-        return Exit.USAGE
+        raise UsageError(NO_APPLICATION) from None
     diagnostics = ordered([*checked.diagnostics, *made.problems])
     _show(diagnostics, options.format, stdout)
     if has_errors(diagnostics):

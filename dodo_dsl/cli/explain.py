@@ -9,6 +9,7 @@ from typing import TextIO
 from dodo_dsl.check import catalogue
 from dodo_dsl.check.explanation import Asked, Explanation, Line, explain
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import did_you_mean, format_text, printable
 
@@ -40,8 +41,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         checked = selection.select([options.word], (), options.application)
     except selection.NoSuchTest as error:
         near = did_you_mean(options.word, rules) if "-" in options.word else ""
-        stderr.write(f"dodo explain: {error}" + (f"; or the rule: {near}" if near else "") + "\n")
-        return Exit.USAGE
+        raise UsageError(f"{error}" + (f"; or the rule: {near}" if near else "")) from None
     found = [explain(test) for test in checked.tests]
     stdout.write(json.dumps([asdict(e) for e in found], indent=2) + "\n" if options.json else _text(found))
     stderr.write(selection.left_out(checked) + format_text(checked.diagnostics))

@@ -5,11 +5,12 @@ import tempfile
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.images import build_context, docker_command, wheels
-from dodo_dsl.images.names import Image, NoSuchImage, choose, known
-from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.images.names import Image, choose, known
+from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
 EXAMPLES = """examples:
@@ -19,10 +20,6 @@ EXAMPLES = """examples:
   dodo images push --prefix registry.example.org/dodo
 """
 _INDEX_HINT = "where a build cannot reach the package index, --offline-wheels lets this machine download the packages"
-
-
-class _Usage(Exception):
-    """A sentence for the user; the exit code is 2."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -49,26 +46,15 @@ def _action(
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    deployment, found = load_deployment(find_deployment(Path.cwd()))
-    if has_errors(found):
-        stderr.write(format_text(found))
-        return Exit.USAGE
-    try:
-        images = _chosen(options, deployment)
-        docker_command.require_engine()
-        return _build(options, images, stdout) if options.action == "build" else _push(images, stdout)
-    except (NoSuchImage, _Usage) as error:
-        stderr.write(f"dodo images: {error}\n")
-        return Exit.USAGE
-    except (docker_command.DockerError, wheels.WheelsError) as error:
-        stderr.write(f"dodo images: {error}\n")
-        return Exit.ERROR
+    images = _chosen(options, selection.checked_deployment())
+    docker_command.require_engine()
+    return _build(options, images, stdout) if options.action == "build" else _push(images, stdout)
 
 
 def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     prefix = (options.prefix or deployment.image_prefix).rstrip("/")
     if options.action == "push" and prefix == Deployment.image_prefix:
-        raise _Usage("to which registry? name it with --prefix, or as images.prefix in dodo.yml")
+        raise UsageError("to which registry? name it with --prefix, or as images.prefix in dodo.yml")
     names = known(load_manifests()[0].values())
     return choose(options.name, names, prefix, options.tag or deployment.image_tag)
 
@@ -106,7 +92,7 @@ def _push(images: list[Image], stdout: TextIO) -> int:
     missing = [image for image in images if not docker_command.is_local(image.reference)]
     if missing:
         names = " ".join(image.name for image in missing)
-        raise _Usage(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
+        raise UsageError(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
     for number, image in enumerate(images, 1):
         stdout.write(f"[{number}/{len(images)}] {image.reference}\n")
         code, output = docker_command.show(("push", image.reference), stdout)

@@ -6,6 +6,7 @@ import shlex
 from typing import TextIO
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, printable, shown_path
@@ -30,7 +31,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     everything = load([])
     if options.services:
-        return _explain(everything, options.services, stdout, stderr)
+        return _explain(everything, options.services, stdout)
     of_services = options.services is not None
     rows = _services(everything) if of_services else _tests(everything)
     if options.json:
@@ -74,11 +75,10 @@ def _services(checked: Checked) -> list[dict[str, str]]:
     ]
 
 
-def _explain(checked: Checked, name: str, stdout: TextIO, stderr: TextIO) -> int:
+def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
     manifest = checked.manifests.get(name)
     if manifest is None:
-        stderr.write(f"dodo list: there is no service '{name}'; {did_you_mean(name, checked.manifests)}\n")
-        return Exit.USAGE
+        raise UsageError(f"there is no service '{name}'; {did_you_mean(name, checked.manifests)}")
     stdout.write(f"{manifest.name} ({', '.join(manifest.layers)}): {manifest.description}\n\nparameters:\n")
     for parameter in manifest.parameters.values():
         default = "" if parameter.default in (None, []) else f", default {parameter.default}"

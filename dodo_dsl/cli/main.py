@@ -1,4 +1,4 @@
-"""``dodo``: parses the command line, calls one command and decides the exit code of what escapes it."""
+"""``dodo``: parses the command line, calls one command, and turns every error into a sentence and an exit code."""
 
 import argparse
 import os
@@ -14,6 +14,7 @@ from dodo_dsl.cli import explain as explain_command
 from dodo_dsl.cli import images as images_command
 from dodo_dsl.cli import list as list_command
 from dodo_dsl.cli import report as report_command
+from dodo_dsl.cli.errors import exit_code, sentence
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.new import command as new_command
 from dodo_dsl.cli.rec import command as rec_command
@@ -52,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     top.add_argument("--version", action="version", version=f"dodo {__version__}")
-    commands = top.add_subparsers(metavar="COMMAND", required=True)
+    commands = top.add_subparsers(metavar="COMMAND", dest="command", required=True)
     for name, module in COMMANDS.items():
         summary = (module.__doc__ or "").splitlines()[0].split(": ", 1)[1]
         command = commands.add_parser(
@@ -68,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
-    """Runs one command; argparse leaves through SystemExit, which is an exit code here."""
+    """Runs one command. What it cannot do is one sentence here, and an exit code; so is argparse's SystemExit."""
     try:
         options = parser().parse_args(argv)
     except SystemExit as stop:
@@ -81,12 +82,13 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
         # the reader of a pipe left (`dodo list | head`): nothing to say, and nothing more to flush
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.OK
-    except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        stderr.write(f"dodo: {place}{error.strerror or error}\n")
-        return Exit.ERROR
     except Exception as error:
+        code = exit_code(error)
+        if code is not None:
+            stderr.write(f"dodo {options.command}: {sentence(error)}\n")
+            return code
         if os.environ.get(DEBUG):
             raise
-        stderr.write(f"dodo: a fault of DoDo itself: {type(error).__name__}: {error}\n{DEBUG}=1 shows where\n")
+        said = f"internal error: {type(error).__name__}: {error}"
+        stderr.write(f"dodo {options.command}: {said}\n{DEBUG}=1 shows where\n")
         return Exit.ERROR

@@ -18,11 +18,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    try:
-        outcomes = results.load(options.folder / results.FILE_NAME)
-    except results.ResultsError as error:
-        stderr.write(f"dodo report: {error}\n")
-        return Exit.USAGE
+    outcomes = results.load(options.folder / results.FILE_NAME)
     write_summaries(options.folder, outcomes)
     stdout.write(f"report: {options.folder / 'index.html'}\n")
     return Exit.OK

@@ -6,15 +6,25 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
-from dodo_dsl.diagnostics import did_you_mean
+from dodo_dsl.diagnostics import did_you_mean, format_text, has_errors
+from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.settings import Settings
 
 
-class NoSuchTest(Exception):
-    """A name, pattern or path that means no test."""
+class NoSuchTest(UsageError):
+    """A name, pattern or path that matches no test."""
+
+
+def checked_deployment() -> Deployment:
+    """The nearest ``dodo.yml``; raises UsageError with all its problems."""
+    deployment, problems = load_deployment(find_deployment(Path.cwd()))
+    if has_errors(problems):
+        raise UsageError(f"{FILE_NAME} has problems:\n{format_text(problems)}")
+    return deployment
 
 
 def add_application(parser: argparse.ArgumentParser) -> None:

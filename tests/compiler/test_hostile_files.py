@@ -54,7 +54,7 @@ def compiled(folder: Path) -> tuple[int, str]:
     )
     assert files(folder.parent) == before
     assert "Traceback" not in result.stderr
-    assert "fault of DoDo" not in result.stderr
+    assert "internal error" not in result.stderr
     return result.returncode, result.stdout + result.stderr
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import package_data
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.new import scaffold
-from dodo_dsl.cli.new.scaffold import New, NoStart
+from dodo_dsl.cli.new.scaffold import New
 from dodo_dsl.cli.new.shipped_copy import copied_files
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import shown_path
@@ -38,13 +39,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    try:
-        if options.deployment:
-            return _deployment(options, stdout)
-        return _test(options, stdout)
-    except NoStart as error:
-        stderr.write(f"dodo new: {error}\n")
-        return Exit.USAGE
+    return _deployment(options, stdout) if options.deployment else _test(options, stdout)
 
 
 def _test(options: argparse.Namespace, stdout: TextIO) -> int:
@@ -55,14 +50,14 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
     note = ""
     if options.extends:
         if options.level or options.kind:
-            raise NoStart("a test that extends another has its level and kind; write no --level or --kind")
+            raise UsageError("a test that extends another has its level and kind; write no --level or --kind")
         files, note = _from_another(options, checked, root)
     else:
         level, kind = options.level or "sil", options.kind or "closed-loop"
         files = scaffold.test_files(options.name, level, kind, _registry(checked.deployment), root)
     there = [file.path for file in files if file.path.exists()]
     if there:
-        raise NoStart(f"there is a file '{shown_path(str(there[0]))}' already; nothing was written")
+        raise UsageError(f"there is a file '{shown_path(str(there[0]))}' already; nothing was written")
     _write(files, stdout)
     stdout.write(note)
     spec = shown_path(str(files[0].path))
@@ -78,7 +73,9 @@ def _from_another(options: argparse.Namespace, checked: Checked, root: Path) -> 
     base = scaffold.base_test(options.extends, [*own, *others])
     if not package_data.is_shipped(base.location.root, root):
         if not base.location.root.resolve().is_relative_to(root):
-            raise NoStart(f"'{options.extends}' lies outside of this repository; a test extends tests of its registry")
+            raise UsageError(
+                f"'{options.extends}' lies outside of this repository; a test extends tests of its registry"
+            )
         return scaffold.extending_files(options.name, base, root), ""
     instances = [spec for spec in others if spec.path == base.path]
     files = copied_files(options.name, instances, shipped.manifests, _registry(checked.deployment), root)
@@ -88,17 +85,17 @@ def _from_another(options: argparse.Namespace, checked: Checked, root: Path) -> 
 def _registry(deployment: Deployment) -> Path:
     """The first registry that belongs to the repository itself, and not to a DoDo that is installed in it."""
     if deployment.file is None:
-        raise NoStart(f"there is no {FILE_NAME} here or above; dodo new --deployment writes one")
+        raise UsageError(f"there is no {FILE_NAME} here or above; dodo new --deployment writes one")
     root = deployment.root.resolve()
     for registry in deployment.registry:
         if registry.resolve().is_relative_to(root) and not package_data.is_shipped(registry, root):
             return registry
-    raise NoStart(f"{shown_path(str(deployment.file))} names no folder of this repository under 'registry'")
+    raise UsageError(f"{shown_path(str(deployment.file))} names no folder of this repository under 'registry'")
 
 
 def _deployment(options: argparse.Namespace, stdout: TextIO) -> int:
     if options.level or options.kind or options.extends:
-        raise NoStart("--level, --kind and --extends belong to a test; write no --deployment beside them")
+        raise UsageError("--level, --kind and --extends belong to a test; write no --deployment beside them")
     files = scaffold.deployment_files(Path.cwd())
     there = [file for file in files if file.path.exists()]
     _write([file for file in files if file not in there], stdout)

@@ -10,6 +10,7 @@ import jinja2
 
 from dodo_dsl import package_data
 from dodo_dsl.check.rules.names import KEYWORDS
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
@@ -28,10 +29,6 @@ _SHIPPED = {
     "hil-perception": "hil-camera",
 }
 """Shipped tests to copy, where a test needs a recording or true boxes that cannot be made up."""
-
-
-class NoStart(Exception):
-    """A test that cannot be begun like that; one sentence."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +54,14 @@ def _filled(template: str, **values: str) -> bytes:
 
 
 def check_name(name: str, taken: list[str]) -> None:
-    """Raises NoStart for a name that no test may have, or that one has already."""
+    """Raises UsageError for a name that no test may have, or that one has already."""
     if not _NAME.fullmatch(name) or len(name) > _LONGEST:
         expected = "lower-case letters and digits in words joined by single hyphens, at most 60 characters"
-        raise NoStart(f"'{name}' cannot name a test, expected {expected}")
+        raise UsageError(f"'{name}' cannot name a test, expected {expected}")
     if name in KEYWORDS:
-        raise NoStart(f"'{name}' is a keyword of GitLab's pipelines and cannot name a job")
+        raise UsageError(f"'{name}' is a keyword of GitLab's pipelines and cannot name a job")
     if name in taken:
-        raise NoStart(f"there is a test '{name}' already; names are unique over all registries")
+        raise UsageError(f"there is a test '{name}' already; names are unique over all registries")
 
 
 def test_files(name: str, level: str, kind: str, registry: Path, root: Path) -> list[New]:
@@ -88,13 +85,13 @@ def _template(name: str, level: str, kind: str) -> str:
         return template
     if (level, kind) == ("dil", "closed-loop"):
         reason = "a dil test cannot be closed-loop: what was recorded does not react to the application"
-        raise NoStart(f"{reason}; dodo new {name} --level dil --kind open-loop begins another")
+        raise UsageError(f"{reason}; dodo new {name} --level dil --kind open-loop begins another")
     shipped = _SHIPPED.get(f"{level}-{kind}")
     if shipped is None:
         reason = f"a {level} test begins closed-loop; {kind} ones are sil or dil"
-        raise NoStart(f"{reason}: dodo new {name} --kind {kind} begins one")
+        raise UsageError(f"{reason}: dodo new {name} --kind {kind} begins one")
     needs = "a recording" if level == "dil" else "the true boxes of its pictures"
-    raise NoStart(
+    raise UsageError(
         f"a {level} test of kind {kind} needs {needs}; copy one that has: dodo new {name} --extends {shipped}"
     )
 
@@ -107,12 +104,12 @@ def extending_files(name: str, base: Spec, root: Path) -> list[New]:
 
 
 def base_test(name: str, specs: list[Spec]) -> Spec:
-    """The test to extend; raises NoStart when there is none."""
+    """The test to extend; raises UsageError when there is none."""
     for spec in specs:
         if spec.name == name:
             return spec
     hint = did_you_mean(name, [s.name for s in specs if s.name])
-    raise NoStart(f"there is no test '{name}' to extend" + (f"; {hint}" if hint else ""))
+    raise UsageError(f"there is no test '{name}' to extend" + (f"; {hint}" if hint else ""))
 
 
 def spec_files(name: str, folder: Path, root: Path, text: bytes) -> list[New]:

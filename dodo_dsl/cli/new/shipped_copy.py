@@ -6,8 +6,9 @@ from pathlib import Path
 
 import yaml
 
-from dodo_dsl.cli.new.scaffold import New, NoStart, spec_files
-from dodo_dsl.plan.test_files import FilesError, copies
+from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.new.scaffold import New, spec_files
+from dodo_dsl.plan.test_files import copies
 from dodo_dsl.source import Mapping as Written
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import extends
@@ -37,7 +38,7 @@ def _text(name: str, base: Spec) -> bytes:
         return _NAME.sub(f"name: {name}", _EDITOR.sub("", text)).encode()
     resolved = extends.resolve(node, base.path, base.location.root)[0] if node else None
     if not isinstance(resolved, Written):
-        raise NoStart(f"'{base.name}' cannot be read, so it cannot be copied")
+        raise UsageError(f"'{base.name}' cannot be read, so it cannot be copied")
     written = plain(resolved)
     rest = {key: value for key, value in written.items() if key not in ("dodo", "name", *LAYERS)}
     keys = {"dodo": 1, "name": name, **rest, **{key: written[key] for key in LAYERS if key in written}}
@@ -51,11 +52,7 @@ def _files(instances: Sequence[Spec], manifests: Mapping[str, Manifest], registr
         root = instances[0].location.root.resolve()
         if (registry / path.relative_to(root)).exists():
             continue
-        try:
-            found = copies(path, root)
-        except FilesError as error:
-            raise NoStart(str(error)) from error
-        yield from (New(registry / copy.target, copy.source.read_bytes()) for copy in found)
+        yield from (New(registry / copy.target, copy.source.read_bytes()) for copy in copies(path, root))
 
 
 def _paths(spec: Spec, manifests: Mapping[str, Manifest]) -> Iterator[Path]:
@@ -67,6 +64,6 @@ def _paths(spec: Spec, manifests: Mapping[str, Manifest]) -> Iterator[Path]:
             try:
                 value = convert(parameters[key], entry.value, spec.location.root)
             except ValueProblem as problem:
-                raise NoStart(problem.diagnostic.message) from problem
+                raise UsageError(problem.diagnostic.message) from problem
             if value.path is not None:
                 yield value.path

@@ -10,7 +10,6 @@ from typing import TextIO
 import numpy as np
 
 from dodo_dsl import atomic
-from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.progress_bar import bar
 from dodo_dsl.cli.rec.message_sets import messages_for
 from dodo_dsl.opendlv.messages.message_set import MessageSet
@@ -52,8 +51,8 @@ def _tell(stderr: TextIO, text: str) -> None:
     stderr.write(f"dodo rec: {text}\n")
 
 
-def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    """Carry out one action; raises what `dodo rec` turns into a sentence."""
+def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
+    """Carries out one action; raises OSError and what else ``cli.errors`` has a sentence for."""
     path: Path = options.file
     with bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
         recording = Recording(path, progress)
@@ -68,7 +67,6 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
             _csv(job)
         else:
             _coco(job)
-    return Exit.OK
 
 
 def _info(job: _Job, version: str) -> None:

@@ -2,10 +2,10 @@
 
 import argparse
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl.cli.errors import files_of_the_user
 from dodo_dsl.cli.exits import Exit
 
 EXAMPLES = """examples:
@@ -101,22 +101,6 @@ def _seconds(text: str) -> float:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     from dodo_dsl.cli.rec import actions
 
-    return _without_traceback(lambda: actions.run(options, stdout, stderr), stderr)
-
-
-def _without_traceback(work: Callable[[], int], stderr: TextIO) -> int:
-    """What is wrong with the command is one sentence and exit code 2."""
-    from dodo_dsl.opendlv.odvd.parser import OdvdError
-    from dodo_dsl.opendlv.recordings.recording import RecordingError
-    from dodo_dsl.rec.coco import LabelError
-    from dodo_dsl.rec.excerpt import NothingSelected
-    from dodo_dsl.rec.outputs import OutputExists
-    from dodo_dsl.rec.truth import TruthError
-
-    try:
-        return work()
-    except (RecordingError, NothingSelected, LabelError, OutputExists, OdvdError, TruthError) as error:
-        stderr.write(f"dodo rec: {error}\n")
-    except (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError) as error:
-        stderr.write(f"dodo rec: {error.filename}: {error.strerror}\n")
-    return Exit.USAGE
+    with files_of_the_user():
+        actions.run(options, stdout, stderr)
+    return Exit.OK

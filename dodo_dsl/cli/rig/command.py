@@ -6,15 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.rig import truth_command
-from dodo_dsl.diagnostics import format_text, has_errors
-from dodo_dsl.run import leases
 from dodo_dsl.run.rigs import quarantine
 from dodo_dsl.run.rigs.access import MANUAL, query_exclusively
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment import FILE_NAME, Deployment
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.values import ValueProblem, convert
@@ -59,26 +59,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
 
 
-class _Usage(Exception):
-    """A sentence for the user; the exit code is 2."""
-
-
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     def say(text: str) -> None:
         stderr.write(f"{text}\n")
 
-    try:
-        deployment, chosen = _chosen(options)
-        if options.action == "truth":
-            stdout.write(truth_command.make(options, deployment, chosen[0], say) + "\n")
-            return Exit.OK
-        results = [_one(options, rig, say) for rig in chosen]
-    except (_Usage, *truth_command.PROBLEMS) as error:
-        stderr.write(f"dodo rig: {error}\n")
-        return Exit.USAGE
-    except (RigProblem, leases.LeaseTimeout) as problem:
-        stderr.write(f"dodo rig: {problem}\n")
-        return Exit.USAGE if isinstance(problem, RigProblem) and problem.usage else Exit.ERROR
+    deployment = selection.checked_deployment()
+    chosen = _chosen(options, deployment)
+    if options.action == "truth":
+        stdout.write(truth_command.make(options, deployment, chosen[0], say) + "\n")
+        return Exit.OK
+    results = [_one(options, rig, say) for rig in chosen]
     if options.json:
         stdout.write(json.dumps(results, indent=2) + "\n")
     else:
@@ -90,16 +80,13 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return Exit.PROBLEMS if any(result["quarantine"] for result in results) else Exit.OK
 
 
-def _chosen(options: argparse.Namespace) -> tuple[Deployment, list[Rig]]:
-    deployment, problems = load_deployment(find_deployment(Path.cwd()))
-    if has_errors(problems):
-        raise _Usage(f"dodo.yml has problems:\n{format_text(problems)}")
+def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Rig]:
     if options.rig is None:
-        return deployment, list(deployment.rigs.values())
+        return list(deployment.rigs.values())
     rig = deployment.rig(options.rig)
     if rig is None:
-        raise _Usage(f"there is no rig '{options.rig}', expected one of {', '.join([EMULATED, *deployment.rigs])}")
-    return deployment, [rig]
+        raise UsageError(f"there is no rig '{options.rig}', expected one of {', '.join([EMULATED, *deployment.rigs])}")
+    return [rig]
 
 
 def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
@@ -112,7 +99,7 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
         result["quarantine"] = quarantine.quarantined(rig.name)
     if rig.entry("serial") is None:
         if options.action != "status":
-            raise _Usage(f"rig '{rig.name}' has no serial port: nothing of it moves")
+            raise UsageError(f"rig '{rig.name}' has no serial port: nothing of it moves")
         return result
     try:
         return {**result, **_moved(options, rig, say)}
@@ -129,7 +116,7 @@ def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) ->
 
 
 def _flags(rig: Rig) -> list[str]:
-    """The rig's port and ranges as the gantry's flags; raises _Usage for a range that is none."""
+    """The rig's port and ranges as the gantry's flags; raises UsageError for a range that is none."""
     flags = []
     for key, flag, unit in (("serial", "serial", ""), *((f"limits.{a}", f"range-{a}", "m") for a in "xy"), YAW):
         entry = rig.entry(key)
@@ -147,7 +134,7 @@ def _number(value: Scalar, flag: str, unit: str) -> str:
     try:
         return convert(Parameter(name=flag, type="number", unit=unit, help=""), value, Path.cwd()).text
     except ValueProblem as problem:
-        raise _Usage(f"{flag}: {problem}") from None
+        raise UsageError(f"{flag}: {problem}") from None
 
 
 def _sentence(result: dict[str, Any]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 from dodo_dsl.cli import selection
 from dodo_dsl.rec import truth
-from dodo_dsl.rec.outputs import OutputExists, refuse_existing
+from dodo_dsl.rec.outputs import refuse_existing
 from dodo_dsl.rec.truth import Mark, TruthError
 from dodo_dsl.rec.truth_files import TruthFiles, decoded, given
 from dodo_dsl.run.rigs import camera
@@ -32,8 +32,6 @@ EXAMPLES = """examples:
 
 It writes FILE.json (COCO, in pixels), FILE.png (the snapshot) and FILE-boxes.png, which shows the boxes: look at it.
 """
-PROBLEMS = (TruthError, OutputExists, selection.NoSuchTest)
-"""What is wrong with the command line; one sentence each."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -51,7 +49,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Callable[[str], None]) -> str:
-    """Writes truth and pictures, and says what became of it; raises one of PROBLEMS, RigProblem and LeaseTimeout."""
+    """Writes truth and pictures; a sentence about them.
+
+    Raises TruthError, OutputExists, RigProblem and LeaseTimeout.
+    """
     files = TruthFiles.beside(options.output)
     manifests, spec = _test(options.test, deployment)
     is_new = options.picture is None or options.picture.resolve() != files.picture.resolve()

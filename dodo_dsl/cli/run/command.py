@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TextIO, cast
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast
-from dodo_dsl.cli.run.jobs import Usage, prepare
+from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.uninterrupted import Robust, more_descriptors, stop_like_interrupt, undisturbed
 from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
@@ -93,13 +94,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     stdout = cast(TextIO, Robust(stdout))
     reap_folders()
     with work_folder() as folder:
-        try:
-            jobs, deployment = prepare(options, folder.path, stdout)
-            _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-            runner = _runner(options, jobs, deployment, stdout, folder.lease.descriptor)
-        except (Usage, selection.NoSuchTest) as error:
-            stderr.write(f"dodo run: {error}\n")
-            return Exit.USAGE
+        jobs, deployment = prepare(options, folder.path, stdout)
+        _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
+        runner = _runner(options, jobs, deployment, stdout, folder.lease.descriptor)
         outcomes, is_reported = _run(runner, jobs, options.report, stdout)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
@@ -110,7 +107,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 def _refuse_to_keep(plans: Sequence[Plan]) -> None:
     for plan in plans:
         if is_real(plan):
-            raise Usage(f"{plan.name} runs on rig '{plan.rig}', which --keep would leave driven: run it without")
+            raise UsageError(f"{plan.name} runs on rig '{plan.rig}', which --keep would leave driven: run it without")
 
 
 def _runner(
@@ -131,12 +128,12 @@ def _backends(
 ) -> Backends:
     if backend == "docker":
         if options.compiled and options.isolation not in (None, plans[0].isolation):
-            raise Usage(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
+            raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
         return Containers(subnets(deployment.subnets))
     without = sorted({s.name for p in plans for s in p.application.services if not s.process})
     if without:
         way = "write for example 'x-dodo-process: [python, main.py]' at it, or run with --backend docker"
-        raise Usage(f"application service '{without[0]}' has no 'x-dodo-process', which processes need; {way}")
+        raise UsageError(f"application service '{without[0]}' has no 'x-dodo-process', which processes need; {way}")
     return Processes(deployment.cids, options.isolation, (descriptor,))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.compiler import NoApplication, plan
 from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.output_folder import PLAN_FILE, write
@@ -19,16 +20,12 @@ from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deploymen
 from dodo_dsl.spec.settings import Settings
 
 
-class Usage(Exception):
-    """A sentence for the user; the exit code is 2."""
-
-
 def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
     """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
     settings = Settings(options.clock, options.isolation, options.seed, options.wall_timeout, options.repeat)
     if options.compiled:
         if options.test or options.level or options.application:
-            raise Usage("--compiled runs a test as it was compiled: no TEST, --level or --application beside it")
+            raise UsageError("--compiled runs a test as it was compiled: no TEST, --level or --application beside it")
         plans, deployment = [_compiled(options.compiled, settings)], _deployment(stdout)
         folders = {plans[0].slug: options.compiled.resolve()}
     else:
@@ -44,9 +41,9 @@ def _compiled(folder: Path, settings: Settings) -> Plan:
     """The Plan of a compiled test, whose clock and isolation are settled."""
     plan = _load_plan(folder, settings)
     if settings.clock not in (None, plan.clock):
-        raise Usage(f"this test is compiled for clock {plan.clock}; compile it again for another")
+        raise UsageError(f"this test is compiled for clock {plan.clock}; compile it again for another")
     if settings.isolation == "network" and is_real(plan):
-        raise Usage(f"rig '{plan.rig}' is reached through the host, not with --isolation network")
+        raise UsageError(f"rig '{plan.rig}' is reached through the host, not with --isolation network")
     return plan
 
 
@@ -55,7 +52,7 @@ def _deployment(stdout: TextIO) -> Deployment:
     deployment, problems = load_deployment(find_deployment(Path.cwd()))
     stdout.write(format_text(problems))
     if has_errors(problems):
-        raise Usage("dodo.yml has errors, so its CIDs and subnets are unknown")
+        raise UsageError("dodo.yml has errors, so its CIDs and subnets are unknown")
     return deployment
 
 
@@ -64,12 +61,12 @@ def _usable(report: Path, slugs: Sequence[str]) -> Path:
     try:
         report.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise Usage(f"'{report}' cannot take the report: {error.strerror}") from error
+        raise UsageError(f"'{report}' cannot take the report: {error.strerror}") from error
     for slug in slugs:
         if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
-            raise Usage(f"'{report}' holds tests; name another folder with --report")
+            raise UsageError(f"'{report}' holds tests; name another folder with --report")
     if not os.access(report, os.W_OK):
-        raise Usage(f"'{report}' cannot take the report: it may not be written")
+        raise UsageError(f"'{report}' cannot take the report: it may not be written")
     return report.resolve()
 
 
@@ -77,9 +74,9 @@ def _load_plan(folder: Path, settings: Settings) -> Plan:
     try:
         return from_json((folder / PLAN_FILE).read_text(encoding="utf-8"), settings)
     except OSError as error:
-        raise Usage(f"there is no compiled test at '{folder}': {error.strerror}") from error
+        raise UsageError(f"there is no compiled test at '{folder}': {error.strerror}") from error
     except (PlanError, UnicodeDecodeError) as error:
-        raise Usage(f"{folder / PLAN_FILE}: {error}") from error
+        raise UsageError(f"{folder / PLAN_FILE}: {error}") from error
 
 
 def _kept_clock(names: Sequence[str]) -> str:
@@ -96,19 +93,19 @@ def _compile(
     checked = selection.select(options.test, options.level, options.application, settings)
     stdout.write(selection.left_out(checked))
     if not checked.specs:
-        raise Usage("there is no test to run")
+        raise UsageError("there is no test to run")
     if settings.clock:
         stdout.write(_kept_clock([s.title for s in checked.specs if s.clock != settings.clock]))
     if not checked.ok:
         stdout.write(format_text(checked.diagnostics))
-        raise Usage("the tests above cannot be compiled")
+        raise UsageError("the tests above cannot be compiled")
     try:
         made = plan(checked, folder)
     except NoApplication:
-        raise Usage("no application; name its compose file with --application or in dodo.yml") from None
+        raise UsageError(NO_APPLICATION) from None
     problems = ordered([*checked.diagnostics, *made.problems])
     stdout.write(format_text(problems))
     if has_errors(problems):
-        raise Usage("the tests above cannot be compiled")
+        raise UsageError("the tests above cannot be compiled")
     write(made.compiled, made.pipeline, folder)
     return list(made.compiled.suite.plans), checked.deployment

@@ -1,0 +1,65 @@
+"""What a command ends with when it cannot go on: one sentence and an exit code, whichever part of DoDo raised it."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from dodo_dsl.cli.exits import Exit
+
+
+class UsageError(Exception):
+    """A command line or a file that it names is wrong; one sentence, exit code 2."""
+
+
+NO_APPLICATION = "no application; name its compose file with --application or in dodo.yml"
+
+
+@contextmanager
+def files_of_the_user() -> Iterator[None]:
+    """A file or folder of the command line that is missing or refused is a UsageError."""
+    try:
+        yield
+    except (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError) as error:
+        raise UsageError(sentence(error)) from error
+
+
+def exit_code(error: Exception) -> Exit | None:
+    """The exit code of an error that its own sentence explains; None for one that nobody foresaw."""
+    if isinstance(error, UsageError):
+        return Exit.USAGE
+    if isinstance(error, _usage_errors()) or getattr(error, "usage", False):
+        return Exit.USAGE
+    return Exit.ERROR if isinstance(error, (OSError, *_machine_errors())) else None
+
+
+def sentence(error: Exception) -> str:
+    """What is wrong; of the system's errors without their number."""
+    if not isinstance(error, OSError):
+        return str(error).rstrip("\n")
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror or error}"
+
+
+def _usage_errors() -> tuple[type[Exception], ...]:
+    """Errors of the user's files and words."""
+    from dodo_dsl.images.names import NoSuchImage
+    from dodo_dsl.opendlv.odvd.parser import OdvdError
+    from dodo_dsl.opendlv.recordings.recording import RecordingError
+    from dodo_dsl.plan.test_files import FilesError
+    from dodo_dsl.rec.coco import LabelError
+    from dodo_dsl.rec.excerpt import NothingSelected
+    from dodo_dsl.rec.outputs import OutputExists
+    from dodo_dsl.rec.truth import TruthError
+    from dodo_dsl.report.results import ResultsError
+
+    recordings = (RecordingError, OdvdError, NothingSelected, LabelError, OutputExists, TruthError)
+    return (*recordings, FilesError, NoSuchImage, ResultsError)
+
+
+def _machine_errors() -> tuple[type[Exception], ...]:
+    """Errors of the machine, its engine and its rigs; a rig's may be the user's, which its ``usage`` says."""
+    from dodo_dsl.images.docker_command import DockerError
+    from dodo_dsl.images.wheels import WheelsError
+    from dodo_dsl.run.leases import LeaseTimeout
+    from dodo_dsl.run.rigs.problems import RigProblem
+
+    return DockerError, WheelsError, LeaseTimeout, RigProblem
