@@ -13,8 +13,12 @@ EXAMPLES = """examples:
 """
 
 
+REPORT = Path("dodo-report")
+"""Where reports go unless a command line names another folder."""
+
+
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", metavar="DIR", type=Path, nargs="?", default=Path("dodo-report"))
+    parser.add_argument("folder", metavar="DIR", type=Path, nargs="?", default=REPORT)
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from dodo_dsl.plan.model import READY_S, Flag, Plan, Service
+from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, Service
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
@@ -30,7 +30,7 @@ class Container:
 
 def containers(plan: Plan, layer: str) -> list[Container]:
     """The containers of a layer, each waiting for the layers before it."""
-    earlier = {"environment": (), "action": ("environment",), "evaluation": ("environment", "action")}[layer]
+    earlier = LAYERS[: LAYERS.index(layer)]
     after = [(s.name, "service_healthy") for name in earlier for s in plan.layer(name)]
     if plan.isolation == "network":
         after.insert(0, ("sandbox", "service_started"))

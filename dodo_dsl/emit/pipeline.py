@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.plan.model import Plan, Suite
+from dodo_dsl.spec.model import LEVELS
+from dodo_dsl.spec.rig import EMULATED
 
 CHILD = "child.gitlab-ci.yml"
-EMULATED = "emulated"
 RULE = "pipeline-limit"
 
 MAX_NAME = 255
@@ -18,7 +19,6 @@ MAX_BYTES = 5 << 20
 MAX_JOBS_FREE = 500
 MAX_JOBS_PARSED = 850
 
-_STAGES = ("sil", "dil", "hil")
 _SPARE_MINUTES = 10
 
 
@@ -50,7 +50,7 @@ def pipeline(suite: Suite, folder: str) -> Pipeline:
     """The jobs of a suite; ``folder`` is the output folder's name, as the parent's artifact has it."""
     levels = {plan.level for plan in suite.plans}
     gate = _gated(suite)
-    stages = [stage for stage in _STAGES if stage in levels]
+    stages = [stage for stage in LEVELS if stage in levels]
     if gate:
         stages.insert(stages.index("hil"), "gate")
     jobs = tuple(_job(plan, gate, folder) for plan in suite.plans)

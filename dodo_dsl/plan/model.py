@@ -4,10 +4,12 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from dodo_dsl.spec import model as spec_model
+
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0
 """How long every service may take to get ready."""
-LAYERS = ("environment", "action", "evaluation", "application")
+LAYERS = (*spec_model.LAYERS, "application")
 
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
 

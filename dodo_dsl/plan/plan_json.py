@@ -19,10 +19,11 @@ from dodo_dsl.plan.model import (
     Service,
     is_device,
 )
+from dodo_dsl.spec.matrix import SLUG
+from dodo_dsl.spec.model import LEVELS
 from dodo_dsl.spec.settings import Settings
 
 FORMAT = 1
-_SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -68,9 +69,9 @@ def _problem(plan: Plan) -> str:
     texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.rig, plan.application.folder)
     services: list[Service | ApplicationService] = [*plan.services, *plan.application.services]
     rules = {
-        "slug": isinstance(plan.slug, str) and bool(_SLUG.fullmatch(plan.slug)),
+        "slug": isinstance(plan.slug, str) and bool(SLUG.fullmatch(plan.slug)),
         "a string": all(isinstance(text, str) and "\0" not in text for text in texts),
-        "level": plan.level in ("sil", "dil", "hil"),
+        "level": plan.level in LEVELS,
         "isolation": plan.isolation in ("network", "host"),
         "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
         "cid": isinstance(plan.cid, int) and 1 <= plan.cid <= 254,

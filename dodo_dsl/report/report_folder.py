@@ -3,7 +3,6 @@
 import contextlib
 import os
 import platform
-import re
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,20 +11,19 @@ from pathlib import Path
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.recorder_service import RECORDING, SNAPSHOT
 from dodo_dsl.report import html, junit, metrics, results
 from dodo_dsl.report.duration_plot import Times
 from dodo_dsl.report.duration_plot import draw as draw_times
 from dodo_dsl.report.trajectory import read_drive
+from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.registry import SUFFIX
 
-RECORDING = "test.rec"
 TRAJECTORY = "trajectory.png"
-SNAPSHOT = "snapshot.png"
 TIMES = "times.png"
 LOGS, ATTEMPTS = "logs", "attempts"
 SANDBOX_LOG = "sandbox.log"
 _LONGEST_PATH = 1000
-SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 
 
 @dataclass(frozen=True)

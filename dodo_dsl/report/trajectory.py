@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.plan.model import Plan
@@ -41,7 +42,7 @@ def read_drive(plan: Plan, folder: Path, recording: Path) -> Drive | None:
     if not path:
         return None
     flags = {f.name: f.value for s in plan.services for f in s.flags if s.judge or f.name == "map-path"}
-    ground = read_ground(folder / "files" / flags["map-path"]) if "map-path" in flags else Ground()
+    ground = read_ground(folder / FILES / flags["map-path"]) if "map-path" in flags else Ground()
     length, width = (float(flags.get(name, 0.0)) for name in ("length", "width"))
     return Drive(path, ground, length, width, flags.get("goal", ""))
 

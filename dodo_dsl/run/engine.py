@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.plan.model import READY_S, Plan
+from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Noted, Overrun
 from dodo_dsl.run.run_state import Ended, RunState
 
-ORDER = ("environment", "action", "evaluation", "application")
 READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
 BEGIN_PATIENCE_S = 2.0
@@ -77,7 +76,7 @@ class Engine:
         start = self._now()
         self.say("setting up")
         await self.backend.open()
-        for layer in ORDER:
+        for layer in LAYERS:
             names = await self.backend.start(layer)
             self.state.layer_of.update(dict.fromkeys(names, layer))
             self.say(f"waiting for {layer}")

@@ -15,6 +15,8 @@ MAX_SLUG = 180
 _PLACEHOLDER = re.compile(r"\$\{matrix\.(?P<name>[a-z][a-z0-9-]*)\}")
 _ATTEMPT = re.compile(r"\$\{\s*matrix\b[^}]*\}?")
 _NOT_SLUG = re.compile(r"[^a-z0-9]+")
+SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
+"""The slug of any test or instance."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,9 @@ from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.schema import validate
 
 LAYERS = ("environment", "action", "evaluation")
+"""Of services, in the order in which they are set up; the application comes after them."""
+LEVELS = ("sil", "dil", "hil")
+KINDS = ("perception", "open-loop", "closed-loop")
 _MAPPINGS = (*LAYERS, matrix.KEY, "record")
 MAX_SERVICES = 100
 """Of a layer, as the schema has it."""

@@ -14,6 +14,7 @@ from dodo_dsl.cli.new.shipped_copy import copied_files
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.spec.deployment import FILE_NAME, Deployment
+from dodo_dsl.spec.model import KINDS, LEVELS
 
 EXAMPLES = """examples:
   dodo new sil-my-curve                                a closed-loop simulation that compiles at once
@@ -23,16 +24,13 @@ EXAMPLES = """examples:
   dodo new --deployment                                dodo.yml, application and pipeline for this folder
 """
 
-_LEVELS = ("sil", "dil", "hil")
-_KINDS = ("perception", "open-loop", "closed-loop")
-
 
 def add(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("name", nargs="?", metavar="NAME", help="the new test's name")
     what.add_argument("--deployment", action="store_true", help="what a repository with tests needs, in this folder")
-    parser.add_argument("--level", choices=_LEVELS, help="of the new test (default: sil)")
-    parser.add_argument("--kind", choices=_KINDS, help="of the new test (default: closed-loop)")
+    parser.add_argument("--level", choices=LEVELS, help="of the new test (default: sil)")
+    parser.add_argument("--kind", choices=KINDS, help="of the new test (default: closed-loop)")
     parser.add_argument(
         "--extends", metavar="TEST", help="the test that the new one changes; one that ships with DoDo is copied"
     )

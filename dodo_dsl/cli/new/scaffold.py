@@ -12,6 +12,7 @@ from dodo_dsl import package_data
 from dodo_dsl.check.rules.names import KEYWORDS
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.diagnostics import did_you_mean
+from dodo_dsl.spec.deployment import FILE_NAME
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
 
@@ -134,7 +135,7 @@ def deployment_files(root: Path) -> list[New]:
     pipelines = sorted((package_data.templates() / "gitlab").iterdir())
     schemas = [package_data.schemas() / f"{name}.schema.json" for name in ("deployment", "dodo")]
     return [
-        New(root / "dodo.yml", _filled("deployment/dodo.yml", application=application)),
+        New(root / FILE_NAME, _filled("deployment/dodo.yml", application=application)),
         New(root / application, _filled("deployment/docker-compose.yml")),
         New(root / "tests" / "README.md", _filled("deployment/tests.md")),
         New(root / ".gitlab-ci.yml", _filled("deployment/gitlab-ci.yml")),

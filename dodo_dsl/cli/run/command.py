@@ -10,6 +10,7 @@ from typing import TextIO, cast
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast
 from dodo_dsl.cli.run.jobs import prepare
@@ -26,6 +27,7 @@ from dodo_dsl.run.runner import Policy, Runner, default_backend
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.model import LEVELS
 
 EXAMPLES = """examples:
   dodo run                                     all tests of the deployment
@@ -44,7 +46,7 @@ _MOST_SECONDS = 864_000.0
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
-    parser.add_argument("--level", action="append", choices=("sil", "dil", "hil"), default=[], help="may be repeated")
+    parser.add_argument("--level", action="append", choices=LEVELS, default=[], help="may be repeated")
     parser.add_argument("--backend", choices=("process", "docker"), help="default: process when the application can")
     parser.add_argument(
         "-j", "--jobs", type=_positive, metavar="N", help="tests at once (default: as many as the cores carry)"
@@ -52,7 +54,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--clock", choices=("realtime", "lockstep"), help="instead of the specs'")
     parser.add_argument("--wall-timeout", type=_seconds, metavar="S", help="most wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="instead of the specs'")
-    parser.add_argument("--report", type=Path, default=Path("dodo-report"), metavar="DIR", help="default: dodo-report")
+    parser.add_argument("--report", type=Path, default=REPORT, metavar="DIR", help="default: dodo-report")
     parser.add_argument("--seed", type=_seed, metavar="N", help="instead of the specs'")
     parser.add_argument("--repeat", type=_positive, default=1, metavar="N", help="run every test N times")
     parser.add_argument("--fail-fast", action="store_true", help="begin no further test when one did not pass")

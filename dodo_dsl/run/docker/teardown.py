@@ -4,12 +4,11 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.emit.containers import REPORT
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.archive import copy_out
 from dodo_dsl.run.docker.cleanup import remove_project, stop_project
 from dodo_dsl.run.docker.client import engine_error
-
-_REPORT = "/dodo/report"
 
 
 def writers(plan: Plan) -> set[str]:
@@ -44,6 +43,6 @@ def _copy_report(container: Any, name: str, folder: Path, note: Callable[[str], 
     from docker.errors import DockerException
 
     try:
-        copy_out(container, f"{_REPORT}/.", folder)
+        copy_out(container, f"{REPORT}/.", folder)
     except (DockerException, OSError) as error:
         note(f"the report misses files of {name}: {engine_error(error)}")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dodo_dsl import package_data
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
+from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.plan.model import ApplicationService, Flag, Plan, Service
 from dodo_dsl.run.process.environment import base_environment, dotenv, expanded, interpolate
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
@@ -49,7 +50,7 @@ class Commands:
             "DODO_SERVICE": service.name,
             "DODO_READY_FILE": ready_file(self.slot.name, service.name),
             SLOT_VARIABLE: self.slot.name,
-            "DODO_ODVD": os.pathsep.join(str(self.folder / "files" / path) for path in self.plan.messages),
+            "DODO_ODVD": os.pathsep.join(str(self.folder / FILES / path) for path in self.plan.messages),
             **self.plan.variables,
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
@@ -58,7 +59,7 @@ class Commands:
 
     def _flag(self, flag: Flag) -> str:
         values: dict[str, Callable[[], str]] = {
-            "path": lambda: str(self.folder / "files" / flag.value),
+            "path": lambda: str(self.folder / FILES / flag.value),
             "report": lambda: str(self.report / flag.value),
             "memory": lambda: memory_name(flag.value, self.slot.memory_prefix),
             "memories": lambda: ",".join(memory_name(m, self.slot.memory_prefix) for m in flag.value.split(",")),
