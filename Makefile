@@ -1,11 +1,16 @@
 # The developer's front door. `make demo` and `make test` set up what they need.
 DODO := .venv/bin/dodo
+# One worker more than there are cores, as many tests wait for something
+WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
+PYTEST := .venv/bin/pytest --quiet --numprocesses $(WORKERS) --dist loadgroup
 
-.PHONY: help demo test lint bench firmware format goldens schema clean
+.PHONY: help demo check test dev style types quick-tests tools lint bench firmware format goldens schema clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
-	@echo "make test     set up, then every check: format, lint, types, imports, tests"
+	@echo "make check    format, lint, types, imports, and the tests that need only Python: a minute and a half"
+	@echo "make test     set up, then every check and every test: ten minutes"
+	@echo "make lint     format, lint, types, imports"
 	@echo "make bench    measure, beside a peer in the same run"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
 	@echo "make format   format the sources"
@@ -18,19 +23,32 @@ demo:
 	$(DODO) compile
 	$(DODO) run --level sil --level dil --level hil $(shell scripts/have-rig || echo "'sil-*' 'dil-*' 'hil-camera*'")
 
-lint:
+dev:
 	@scripts/setup dev
-	.venv/bin/ruff format --check .
-	.venv/bin/ruff check .
-	.venv/bin/mypy
+
+style: dev
+	.venv/bin/ruff format --check --quiet .
+	.venv/bin/ruff check --quiet .
 	PYTHONPATH=. .venv/bin/lint-imports
 
-test: lint
-	@scripts/install-compose
-	@scripts/install-gitlab-ci-local
-	@scripts/start-engine
-	@scripts/install-firmware-tools
-	.venv/bin/pytest
+types: dev
+	.venv/bin/mypy
+
+quick-tests: dev
+	$(PYTEST) -m "not slow"
+
+tools:
+	@scripts/install-test-tools
+
+lint:
+	@$(MAKE) --no-print-directory -j 2 style types
+
+check:
+	@$(MAKE) --no-print-directory -j 3 style types quick-tests
+
+test:
+	@$(MAKE) --no-print-directory -j 3 style types tools
+	$(PYTEST) --durations=15
 
 bench:
 	@scripts/setup dev
