@@ -2,7 +2,10 @@
 
 import asyncio
 import json
+import os
+import secrets
 import subprocess
+import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +17,7 @@ from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.run.backends import Containers, Job
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
+from tests.run.desk import ROOT
 from tests.run.helpers import READY, STARTED, WAIT, Bench, Recorded
 
 IMAGE = f"dodo/base:{__version__}"
@@ -34,7 +38,7 @@ class Crate:
         judge: str = READY + WAIT,
         application: str = WAIT,
         environment: str = READY + WAIT,
-        timeout_s: float = 60.0,
+        timeout_s: float = 300.0,
         report: Path | None = None,
         **app: Any,
     ) -> Job:
@@ -80,6 +84,18 @@ class Crate:
         runner = Runner(self.progress, Containers(SUBNETS), schedule(len(jobs), lambda job: 1.0), Policy())
         return {o.slug.removeprefix(f"{self.mark}-"): o for o in asyncio.run(runner.run(jobs))}
 
+    def start(self, job: Job, *flags: str, **variables: str) -> "subprocess.Popen[str]":
+        """``dodo run`` of one test."""
+        words = ["run", "--backend", "docker", "--compiled", str(job.folder), "--report", str(job.report.parent)]
+        return subprocess.Popen(
+            [sys.executable, "-m", "dodo_dsl", *words, *flags],
+            cwd=ROOT,
+            env={**os.environ, "DODO_LEASES": str(self.bench.folder / "leases"), **variables},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
     def log(self, slug: str) -> str:
         """What the application of a test logged."""
         logs = self.bench.folder / "report" / f"{self.mark}-{slug}" / "logs"
@@ -89,6 +105,12 @@ class Crate:
         """Containers, networks and volumes of these tests, and leases."""
         names = [name for words in _LISTS for name in _docker(*words) if f"dodo-{self.mark}-" in name]
         return names + [path.name for path in (self.bench.folder / "leases").glob("*.json")]
+
+
+def new_crate(folder: Path) -> Crate:
+    """One with a mark that is like no other."""
+    folder.chmod(0o777)
+    return Crate(Bench(folder), f"fault-{secrets.token_hex(3)}")
 
 
 _LISTS = (

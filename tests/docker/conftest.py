@@ -1,20 +1,23 @@
 """The images that compiled tests name by default, built from the base image that needs no registry."""
 
-import shutil
-import subprocess
-import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from tests.images.conftest import base_image  # noqa: F401
-from tests.images.dockerfile import ROOT
+from tests.docker.compose import Crate, new_crate
+from tests.images.conftest import base_image, built  # noqa: F401
 
 
 @pytest.fixture(scope="session")
-def images(base_image: str) -> None:  # noqa: F811
-    """DoDo's images of this version under their default names; the gantry's holds the emulated rig where it can be."""
-    if shutil.which("avr-gcc"):
-        subprocess.run(["make", "-s", "-C", ROOT / "firmware", "firmware", "emulator"], check=False)
-    command = [sys.executable, "-m", "dodo_dsl", "images", "build", "--offline-wheels", "--base-image", base_image]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=600)
-    assert result.returncode == 0, result.stdout[-4000:] + result.stderr
+def images(built: dict[str, str]) -> None:  # noqa: F811
+    """They are there."""
+
+
+@pytest.fixture
+def crate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Crate]:
+    """Tests with a mark of their own; nothing of them is left at the end."""
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    made = new_crate(tmp_path)
+    yield made
+    assert made.left() == []

@@ -1,27 +1,22 @@
 """Faults around tests in containers: the outcome, its sentence, nothing left, and an unharmed neighbour."""
 
-import os
 import re
-import secrets
 import signal
 import subprocess
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.run import engine
-from dodo_dsl.run.backends import Job
 from tests.docker.broken_registry import BrokenRegistry
-from tests.docker.compose import Crate
+from tests.docker.compose import IMAGE, Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
-from tests.run.desk import ROOT, wait_for
-from tests.run.helpers import BEGUN, DRIVES, PASS, READY, WAIT, Bench
+from tests.run.desk import wait_for
+from tests.run.helpers import BEGUN, DRIVES, PASS, READY, WAIT
 from tests.run.test_faults import FAULTS, NEIGHBOUR
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("images")]
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("host"), pytest.mark.usefixtures("images")]
 
 HUNGRY = """
 held = []
@@ -42,36 +37,16 @@ KINDS = {
     **{slug: (fault.name, fault.outcome, fault.sentence) for slug, fault in SCRIPTED.items()},
 }
 
-
-@pytest.fixture
-def crate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Crate]:
-    """Tests with a mark of their own; nothing of them is left at the end."""
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    made = new_crate(tmp_path)
-    yield made
-    assert made.left() == []
-
-
-def new_crate(folder: Path) -> Crate:
-    folder.chmod(0o777)
-    return Crate(Bench(folder), f"fault-{secrets.token_hex(3)}")
-
-
-def start(crate: Crate, job: Job, **variables: str) -> "subprocess.Popen[str]":
-    words = ["run", "--backend", "docker", "--compiled", str(job.folder), "--report", str(job.report.parent)]
-    return subprocess.Popen(
-        [sys.executable, "-m", "dodo_dsl", *words],
-        cwd=ROOT,
-        env={**os.environ, "DODO_LEASES": str(crate.bench.folder / "leases"), **variables},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+ENDS = {
+    "ends": ("failed", "application service 'app' ended with exit code 0 after"),
+    "ends-early": ("failed", "application service 'app' ended with exit code 7 after"),
+    "no-program": ("error", "service 'app' could not be started: "),
+}
 
 
 def told(process: "subprocess.Popen[str]", result: str) -> str:
     """The reason in the last lines of a run of one test."""
-    out, _ = process.communicate(timeout=200)
+    out, _ = process.communicate(timeout=600)
     assert "Traceback" not in out
     (reason,) = re.findall(rf"^{result} +\S+  (.*?)(?: \(set-up .*\))?$", out, re.MULTILINE)
     return str(reason)
@@ -81,6 +56,9 @@ def test_faults_at_once(crate: Crate, book: Book) -> None:
     jobs = [crate.job(slug, f.judge, f.application, f.environment) for slug, f in FAULTS.items()]
     jobs.append(crate.job("hungry", application=HUNGRY, mem_limit="64m", memswap_limit="64m"))
     jobs.append(crate.job("missing", image=MISSING))
+    jobs.append(crate.job("ends", application="sys.exit(0)\n"))
+    jobs.append(crate.job("ends-early", application="sys.exit(7)\n"))
+    jobs.append(crate.job("no-program", entrypoint=["no-such-program"]))
     with BrokenRegistry(is_forgetful=True) as registry:
         jobs.append(crate.job("pull", image=registry.image))
         outcomes = crate.run(*jobs)
@@ -88,6 +66,8 @@ def test_faults_at_once(crate: Crate, book: Book) -> None:
     assert f"pulling {registry.image}: the connection broke, the engine tries again" in said
     assert outcomes["neighbour"].outcome == "passed", outcomes["neighbour"].reason
     for slug, (_, outcome, sentence) in KINDS.items():
+        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)
+    for slug, (outcome, sentence) in ENDS.items():
         assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)
     numbers = crate.log("many-lines").split("\n")[:-1]
     assert len(numbers) > 10_000
@@ -109,8 +89,8 @@ def test_disk_with_the_report_is_full(crate: Crate, small_disk: Path, book: Book
     """A recording that does not fit is left out as a whole, so that the report has room; its volume goes."""
     writes = 'open("/dodo/report/test.rec", "wb").write(bytes(200_000))\n'
     job = crate.job("full", judge=DRIVES, environment=writes + READY + WAIT, report=small_disk)
-    run = start(crate, job)
-    out, _ = run.communicate(timeout=200)
+    run = crate.start(job)
+    out, _ = run.communicate(timeout=600)
     assert run.returncode == 0, out
     (reason,) = re.findall(r"^PASSED +\S+  (.*?) \(set-up", out, re.MULTILINE)
     (note,) = re.findall(r"^ +note: (the report misses files of camera: .*)$", out, re.MULTILINE)
@@ -119,13 +99,13 @@ def test_disk_with_the_report_is_full(crate: Crate, small_disk: Path, book: Book
 
 
 def test_runners_without_engine_killed_and_unharmed(crate: Crate, book: Book) -> None:
-    """Three at once: what the first two cannot take down any more, the next run does."""
+    """Three at once: what the first two cannot take down any more, the next run does, and nothing of a stranger's."""
     socket = engine_socket()
     if socket is None:
         pytest.skip("the engine is not reached by a socket of this machine")
     with EngineProxy(socket, crate.bench.folder / "engine.sock") as proxy:
-        cut, killed = start(crate, crate.job("cut"), **proxy.variables), start(crate, crate.job("killed"))
-        beside = start(crate, crate.job("beside", judge=READY + BEGUN + "time.sleep(3)\n" + PASS))
+        cut, killed = crate.start(crate.job("cut"), **proxy.variables), crate.start(crate.job("killed"))
+        beside = crate.start(crate.job("beside", judge=READY + BEGUN + "time.sleep(3)\n" + PASS))
         for run in (cut, killed, beside):
             wait_for(run, "running")
         killed.kill()
@@ -135,24 +115,46 @@ def test_runners_without_engine_killed_and_unharmed(crate: Crate, book: Book) ->
     assert cut.returncode == 3
     book.record("The engine goes away in the middle of a test", "docker", "error", reason)
     book.record("Two runners at once", "docker", "passed", told(beside, "PASSED"))
+    words = ["docker", "run", "-d", "--rm", "--label", "com.docker.compose.project=stranger", IMAGE, "sleep", "600"]
+    stranger = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
     left = crate.left()
     assert all(any(f"-{slug}-" in name for name in left) for slug in ("cut", "killed"))
     assert not any("-beside-" in name for name in left)
-    again = start(crate, crate.job("again", judge=DRIVES))
+    again = crate.start(crate.job("again", judge=DRIVES))
     notes = [wait_for(again, "removed what a killed run left: ").splitlines()[-1] for _ in range(2)]
     assert told(again, "PASSED") == "it drove"
     assert {f"{crate.mark}-{slug}: 7 containers, networks and volumes" for slug in ("cut", "killed")} == {
         note.removeprefix("removed what a killed run left: ") for note in notes
     }
     note = notes[0].replace(f"{crate.mark}-cut", "test")
+    running = subprocess.run(["docker", "ps", "-q", "--no-trunc"], capture_output=True, text=True, check=True).stdout
+    subprocess.run(["docker", "rm", "-f", stranger], capture_output=True, check=True)
+    assert stranger in running.split()
     book.record("The runner is killed, and run again", "docker", "passed", note)
 
 
 def test_interrupt_does_not_wait_for_a_pull(crate: Crate) -> None:
     with BrokenRegistry() as registry:
-        run = start(crate, crate.job("interrupted", image=registry.image))
+        run = crate.start(crate.job("interrupted", image=registry.image))
         wait_for(run, "the connection broke")
         run.send_signal(signal.SIGINT)
         assert told(run, "ERROR") == "the run was interrupted"
         assert registry.breaks < 6, "the engine's last try"
     assert run.returncode == 130
+
+
+def test_interrupt_takes_everything_down(crate: Crate) -> None:
+    run = crate.start(crate.job("interrupted", environment=WAIT))
+    wait_for(run, "waiting for environment")
+    run.send_signal(signal.SIGINT)
+    assert told(run, "ERROR") == "the run was interrupted"
+    assert run.returncode == 130
+
+
+def test_kept_project_stays_until_it_is_taken_down(crate: Crate) -> None:
+    run = crate.start(crate.job("kept", judge=DRIVES), "--keep")
+    out, _ = run.communicate(timeout=600)
+    assert run.returncode == 0, out
+    (line,) = [text for text in out.splitlines() if text.startswith("take it down: ")]
+    assert len(crate.left()) == 7
+    subprocess.run(line.removeprefix("take it down: ").split(), capture_output=True, check=True)

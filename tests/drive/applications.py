@@ -4,10 +4,13 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
+
+from tests.realtime import hurry
 
 ROOT = Path(__file__).parents[2]
 KIWI = ROOT / "examples" / "kiwi"
@@ -22,13 +25,18 @@ STOPS = (
 )
 
 
-def dodo(*words: str, code: int) -> str:
-    """The output of a command that must end with an exit code."""
-    command = [sys.executable, "-m", "dodo_dsl", *words]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=180)
-    assert result.returncode == code, result.stdout + result.stderr
-    assert "Traceback" not in result.stdout + result.stderr
-    return result.stdout
+def dodo(*words: str, code: int, before: Sequence[str] = ()) -> str:
+    """The output of a command, after the words ``before`` it, that must end with an exit code."""
+    command = [*before, sys.executable, "-m", "dodo_dsl", *words]
+    process = subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    hurry(process)
+    try:
+        output, _ = process.communicate(timeout=600)
+    finally:
+        process.kill()
+    assert process.returncode == code, output
+    assert "Traceback" not in output
+    return output
 
 
 def results(report: Path) -> dict[str, dict[str, Any]]:

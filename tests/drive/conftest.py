@@ -23,5 +23,5 @@ def firmware() -> None:
 @pytest.fixture
 def rig(tmp_path: Path, firmware: None) -> Iterator[Hardware]:
     with Hardware(tmp_path / "port") as one:
-        one.until(lambda _: True, 5)
+        one.until(lambda _: True, 60)
         yield one

@@ -1,6 +1,6 @@
 """An application that steers by the brightness of what it sees, with the manners of many.
 
-python manners.py --cid=111 --name=video0.argb --manner=copies
+python manners.py --cid=111 --name=video0.argb --manner=copies           one manner, or several with commas
 
 copies        answers each picture once, with its sample time
 own-times     the same with sample times of its own
@@ -8,9 +8,7 @@ twice         says everything twice, the second time something else
 slow          takes its time every tenth picture
 restarts      replaces itself with a new process every twentieth picture
 stops         answers no more after ten pictures, and goes on looking
-leaves        ends after ten pictures
 silent        waits for nothing and says nothing
-forgets       does not say its pedal
 """
 
 import hashlib
@@ -22,7 +20,7 @@ from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
-MANNER = FLAGS["manner"]
+MANNERS = FLAGS["manner"].split(",")
 REQUESTS = ("opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest")
 
 
@@ -36,10 +34,9 @@ def attached() -> SharedMemory:
 
 def say(session: Session, sampled: int, share: float, more: float = 0.0) -> None:
     steer, pedal = (session.messages.type(name) for name in REQUESTS)
-    stamp = None if MANNER == "own-times" else sampled
+    stamp = None if "own-times" in MANNERS else sampled
     session.send(steer(groundSteering=0.03 * (share - 0.5) + more), stamp)
-    if MANNER != "forgets":
-        session.send(pedal(position=0.1 + more), stamp)
+    session.send(pedal(position=0.1 + more), stamp)
 
 
 def answer(session: Session, memory: SharedMemory, number: int) -> None:
@@ -47,23 +44,21 @@ def answer(session: Session, memory: SharedMemory, number: int) -> None:
         picture, sampled = bytes(memory.buffer), memory.sample_time()
     digest = hashlib.sha256(picture).digest()
     print(f"picture {sampled} {digest.hex()}", flush=True)
-    if MANNER == "slow" and number % 10 == 0:
+    if "slow" in MANNERS and number % 10 == 0:
         time.sleep(0.3)
-    if MANNER == "stops" and number >= 10:
+    if "stops" in MANNERS and number >= 10:
         return
-    if MANNER == "leaves" and number >= 10:
-        sys.exit(3)
     share = picture[2_000_000 % len(picture) :: 4001].count(picture[-4]) / max(1, len(picture) // 4001)
     say(session, sampled, share)
-    if MANNER == "twice":
+    if "twice" in MANNERS:
         say(session, sampled, share, 0.05)
-    if MANNER == "restarts" and number % 20 == 19:
+    if "restarts" in MANNERS and number % 20 == 19:
         os.execv(sys.executable, [sys.executable, *sys.argv])
 
 
 def main() -> None:
     with Session(int(FLAGS["cid"])) as session:
-        if MANNER == "silent":
+        if "silent" in MANNERS:
             time.sleep(600)
         with attached() as memory:
             number = 0

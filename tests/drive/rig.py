@@ -18,6 +18,7 @@ import yaml
 
 from services.gantry.emulator import START
 from tests.drive.applications import KIWI, ROOT
+from tests.realtime import hurry, wait_for_nobody
 
 BUILT = ROOT / "build" / "firmware"
 REST = 0.005
@@ -50,6 +51,7 @@ class Hardware:
         self._extremes: list[dict[str, Any]] = []
         words = [BUILT / "rig-emulator", "--start", START, "--link", path, BUILT / "gantry.elf"]
         self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        wait_for_nobody(self.process)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -84,7 +86,7 @@ class Hardware:
         """The largest acceleration of each axis (m/s2, m/s2, rad/s2) since the last order `extremes`."""
         known = len(self._extremes)
         self.order("extremes")
-        self.until(lambda _: len(self._extremes) > known, 5)
+        self.until(lambda _: len(self._extremes) > known, 60)
         return [float(ramp) for ramp in self._extremes[-1]["ramp"]]
 
     @property
@@ -157,16 +159,17 @@ def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
         stderr=subprocess.STDOUT,
         text=True,
     )
+    hurry(runner)
     try:
         yield Run(folder, rig, runner)
     finally:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            runner.communicate(timeout=30)
+            runner.communicate(timeout=60)
         runner.kill()
         runner.communicate()
 
 
 def on_its_way(rig: Hardware) -> Pose:
     """The pose at which it drives, after it has stood at its start."""
-    rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 40)
-    return rig.until(lambda pose: pose.vx > 0.2, 20)
+    rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 120)
+    return rig.until(lambda pose: pose.vx > 0.2, 120)

@@ -26,7 +26,8 @@ from services.virtual_camera.draw.scene import load_scene
 ROOT = Path(__file__).parents[2]
 MAPS = ROOT / "tests_registry" / "maps"
 FRAME, STEP = 100_000, 10_000  # us: camera at 10 Hz, action layer at 100 Hz
-STARTS = [(0.0, 0.0), (-0.05, -8.0), (-0.05, 8.0), (0.05, -8.0), (0.05, 8.0)]  # m to the right, deg to the left
+STARTS = [(-0.05, -8.0), (-0.05, 8.0), (0.05, -8.0), (0.05, 8.0)]
+"""m to the right, deg to the left; from the middle the tests of the registry drive."""
 
 
 def program(name: str) -> ModuleType:
@@ -113,9 +114,8 @@ def test_the_car_reaches_the_finish_with_room_to_spare(name: str, right: float, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("right", "yaw"), [(0.0, 0.0), (0.05, -8.0)])
-def test_the_car_drives_a_lap(right: float, yaw: float) -> None:
-    verdict = Loop("kiwi-track", right, yaw).run()
+def test_the_car_drives_a_lap() -> None:
+    verdict = Loop("kiwi-track", 0.05, -8.0).run()
     assert verdict.outcome == "passed", verdict.reason
     assert margin(verdict) > 0.06
 
@@ -127,7 +127,7 @@ def test_a_slow_application_still_reaches_it(name: str) -> None:
     assert verdict.outcome == "passed", verdict.reason
 
 
-@pytest.mark.parametrize(("right", "yaw"), [(0.02, 4.0), *STARTS[1:]])
+@pytest.mark.parametrize(("right", "yaw"), [(0.02, 4.0), *STARTS])
 def test_reversed_steering_hits_a_wall(right: float, yaw: float) -> None:
     verdict = Loop("straight", right, yaw, reverse=True).run()
     assert verdict.outcome == "failed"

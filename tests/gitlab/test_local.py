@@ -54,7 +54,7 @@ def pipeline(folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder / ".leases")}
     command = ["gitlab-ci-local", "--home", str(folder / ".home"), "--concurrency", "1", *words]
     return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=900
     )
 
 

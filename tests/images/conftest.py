@@ -1,5 +1,6 @@
-"""All images, built once for these tests from the base image that needs no registry."""
+"""All images, built once for all tests from the base image that needs no registry."""
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -9,19 +10,19 @@ import pytest
 from tests.images.dockerfile import ROOT
 
 BASE = "dodo-test-base"
-PREFIX, TAG = "dodo-test", "images"
+SOURCE = "https://git.example.org/dodo"
 
 
 def docker(*words: str, check: bool = True) -> str:
     """Standard output of a docker command; its standard error is in the failure."""
-    result = subprocess.run(["docker", *words], capture_output=True, text=True, check=False, timeout=300)
+    result = subprocess.run(["docker", *words], capture_output=True, text=True, check=False, timeout=900)
     assert not check or result.returncode == 0, f"docker {' '.join(words)}: {result.stderr}"
     return result.stdout.strip()
 
 
 def engine_answers() -> bool:
     try:
-        return subprocess.run(["docker", "info"], capture_output=True, check=False, timeout=30).returncode == 0
+        return subprocess.run(["docker", "info"], capture_output=True, check=False, timeout=120).returncode == 0
     except FileNotFoundError:
         return False
 
@@ -37,17 +38,22 @@ def base_image() -> str:
     return BASE
 
 
-@pytest.fixture(scope="session")
-def built(base_image: str) -> Iterator[dict[str, str]]:
-    """References of all images by name, built as a user would; the names are taken away afterwards."""
-    command = [sys.executable, "-m", "dodo_dsl", "images", "build", "--offline-wheels", "--base-image", base_image]
-    command += ["--prefix", PREFIX, "--tag", TAG, "--source", "https://git.example.org/dodo"]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=600)
+def build(base_image: str, *words: str) -> dict[str, str]:
+    """References by name of images built as a user would."""
+    command = [sys.executable, "-m", "dodo_dsl", "images", "build", *words, "--offline-wheels"]
+    command += ["--base-image", base_image, "--source", SOURCE]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=1800)
     assert result.returncode == 0, result.stdout[-4000:] + result.stderr
     lines = [line.split() for line in result.stdout.splitlines() if line.startswith("built ")]
-    references = {line[1].rpartition("/")[2].rpartition(":")[0]: line[1] for line in lines}
-    yield references
-    docker("image", "rm", "--force", *references.values())
+    return {line[1].rpartition("/")[2].rpartition(":")[0]: line[1] for line in lines}
+
+
+@pytest.fixture(scope="session")
+def built(base_image: str) -> dict[str, str]:
+    """All images under the names that compiled tests ask for; the gantry's holds the emulated rig where it can be."""
+    if shutil.which("avr-gcc"):
+        subprocess.run(["make", "-s", "-C", ROOT / "firmware", "firmware", "emulator"], check=False)
+    return build(base_image)
 
 
 @pytest.fixture

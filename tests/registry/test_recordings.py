@@ -16,6 +16,8 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
 
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("recordings")]
+
 COMMITTED = Path(__file__).parents[2] / "tests_registry" / "recordings"
 MESSAGES = MessageSet.standard()
 IMAGE = MESSAGES.id("opendlv.proxy.ImageReading")

@@ -1,4 +1,4 @@
-"""An application that harms whom it can reach, and drives nobody.
+"""An application that harms whom it can reach, and drives nobody, until there is a file /stop/now.
 
 python3 hostile.py --cid=111 --name=video0.argb --harm=flood|groups|memory|tmp
 """
@@ -9,6 +9,7 @@ import socket
 import sys
 import time
 from pathlib import Path
+from threading import Thread
 
 import sysv_ipc
 
@@ -76,4 +77,9 @@ def tmp() -> None:
 
 
 print(f"hostile: {FLAGS['harm']}", flush=True)
-{"flood": flood, "groups": groups, "memory": memory, "tmp": tmp}[FLAGS["harm"]]()
+harm = {"flood": flood, "groups": groups, "memory": memory, "tmp": tmp}[FLAGS["harm"]]
+thread = Thread(target=harm, daemon=True)
+thread.start()
+while not Path("/stop/now").exists() and thread.is_alive():
+    time.sleep(0.1)
+sys.exit(0 if thread.is_alive() else 1)
