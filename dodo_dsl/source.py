@@ -53,7 +53,7 @@ class Sequence:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A key's place and its value."""
+    """The place of a key, and its value."""
 
     key: Span
     value: "Node"
@@ -83,7 +83,7 @@ def plain(node: Node) -> Any:
 
 
 def walk(node: Node) -> Iterator[Node]:
-    """The node and all below it."""
+    """The node and everything below it."""
     yield node
     children: Iterator[Node] = iter(())
     if isinstance(node, Mapping):
@@ -104,9 +104,9 @@ def resolve(text: str) -> Plain:
 
 
 class _Stop(Exception):
-    def __init__(self, diagnostic: Diagnostic) -> None:
-        super().__init__(diagnostic.message)
-        self.diagnostic = diagnostic
+    def __init__(self, span: Span, rule: str, message: str) -> None:
+        super().__init__(message)
+        self.diagnostic = Diagnostic(span, rule, message)
 
 
 @dataclass
@@ -143,13 +143,13 @@ class _Builder:
     def report(self, span: Span, rule: str, message: str, hint: str = "") -> None:
         self.diagnostics.append(Diagnostic(span, rule, message, hint))
         if len(self.diagnostics) == MAX_PROBLEMS:
-            raise _Stop(Diagnostic(span, "too-large", f"{MAX_PROBLEMS} problems so far; the rest is not read"))
+            raise _Stop(span, "too-large", f"{MAX_PROBLEMS} problems found, the rest of the file is not read")
 
     def feed(self, event: Any) -> None:
         if isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
-                raise _Stop(Diagnostic(self.span(event), "yaml-syntax", "a second document; one file holds one"))
+                raise _Stop(self.span(event), "yaml-syntax", "a second YAML document, expected one per file")
         elif isinstance(event, yaml.ScalarEvent):
             self._scalar(event)
         elif isinstance(event, yaml.AliasEvent):
@@ -162,7 +162,7 @@ class _Builder:
     def _grow(self, span: Span, weight: int) -> None:
         self.count += weight
         if self.count > MAX_NODES:
-            raise _Stop(Diagnostic(span, "too-large", f"more than {MAX_NODES} values, aliases counted"))
+            raise _Stop(span, "too-large", f"more than {MAX_NODES} values, including those that aliases repeat")
 
     def _scalar(self, event: Any) -> None:
         span = self.span(event)
@@ -177,7 +177,9 @@ class _Builder:
     def _alias(self, event: Any) -> None:
         span = self.span(event)
         if event.anchor not in self.anchors:
-            raise _Stop(Diagnostic(span, "yaml-syntax", f"alias '*{event.anchor}' has no finished anchor before it"))
+            raise _Stop(
+                span, "yaml-syntax", f"alias '*{event.anchor}' refers to an anchor that is missing or incomplete"
+            )
         node, weight, depth = self.anchors[event.anchor]
         self._check_depth(span, len(self.stack) + depth)
         self._add(node, weight, None, span, depth)
@@ -185,7 +187,7 @@ class _Builder:
     @staticmethod
     def _check_depth(span: Span, depth: int) -> None:
         if depth > MAX_DEPTH:
-            raise _Stop(Diagnostic(span, "too-large", f"nested deeper than {MAX_DEPTH} levels, aliases counted"))
+            raise _Stop(span, "too-large", f"nested deeper than {MAX_DEPTH} levels, including aliases")
 
     def _open(self, event: Any) -> None:
         span = self.span(event)
@@ -211,7 +213,7 @@ class _Builder:
                 if isinstance(source, Mapping):
                     entries = {**source.entries, **entries}
                 else:
-                    self.report(source.span, "yaml-syntax", "'<<' merges mappings, and this is none")
+                    self.report(source.span, "yaml-syntax", "expected a mapping or a list of mappings after '<<'")
         return entries
 
     def _add(self, node: Node, weight: int, anchor: str | None, at: Span | None = None, depth: int = 0) -> None:
@@ -235,7 +237,7 @@ class _Builder:
 
     def _as_key(self, node: Node, span: Span) -> Scalar:
         if not isinstance(node, Scalar):
-            raise _Stop(Diagnostic(span, "yaml-syntax", "a key must be a plain word, not a list or a mapping"))
+            raise _Stop(span, "yaml-syntax", "this key is a list or a mapping, expected a string")
         return node
 
     def _entry(self, top: _Open, key: Scalar, node: Node) -> None:
@@ -243,7 +245,7 @@ class _Builder:
             top.merged.append(node)
         elif key.text in top.entries:
             first = top.entries[key.text].key
-            message = f"key '{key.text}' is written twice; the first is at line {first.line}"
+            message = f"duplicate key '{key.text}', first defined in line {first.line}"
             self.report(key.span, "duplicate-key", message)
         else:
             top.entries[key.text] = Entry(key.span, node)
@@ -267,7 +269,7 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
     context = getattr(error, "context", None) or ""
     if "simple key" in context and begin:
         key = Span(file, begin.line + 1, begin.column + 1)
-        return Diagnostic(key, "yaml-syntax", "not YAML: expected 'key: value', with a blank after the colon")
+        return Diagnostic(key, "yaml-syntax", "not YAML: expected 'key: value', with a space after the colon")
     span = Span(file, mark.line + 1, mark.column + 1)
     line = lines[mark.line] if mark.line < len(lines) else ""
     indent = line[: len(line) - len(line.lstrip())]
@@ -276,15 +278,15 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
         return Diagnostic(
             Span(file, span.line, column),
             "yaml-tab",
-            "a tab character indents this line",
-            "YAML takes spaces only",
+            "this line is indented with a tab",
+            "indent with spaces",
         )
-    where = f" {context} that begins at line {begin.line + 1}" if context and begin else ""
+    where = f" {context} that begins in line {begin.line + 1}" if context and begin else ""
     return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}{where}")
 
 
 def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:
-    """The document of a text, and what is wrong with it; None for an empty or unreadable one."""
+    """The document that a string holds, and its problems; None for an empty or unreadable one."""
     builder = _Builder(file)
     try:
         for event in yaml.parse(text, Loader=_LOADER):
@@ -297,7 +299,7 @@ def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:
 
 
 def path_of(folder: Path, text: str) -> Path | None:
-    """The path that a text means, links followed; None for what no path is: NUL, too long, links in a circle."""
+    """The resolved path of a string; None if that is not a path: it contains NUL, is too long or is a symlink loop."""
     try:
         path = (folder / text).resolve()
         path.exists()
@@ -311,7 +313,7 @@ def read(path: Path) -> tuple[Node | None, list[Diagnostic]]:
     file = str(path)
     try:
         if path.exists() and not path.is_file():
-            return None, [Diagnostic(Span(file), "unreadable-file", "this is no plain file")]
+            return None, [Diagnostic(Span(file), "unreadable-file", "not a regular file")]
         with path.open("rb") as stream:
             raw = stream.read(MAX_BYTES + 1)
     except OSError as error:

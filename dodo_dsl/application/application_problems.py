@@ -1,4 +1,4 @@
-"""What is wrong with an application as a whole: missing files, dependency cycles, and no service that takes a CID."""
+"""Problems of an application as a whole: missing files, dependency cycles, and no service that takes a CID."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -18,8 +18,8 @@ INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 def application_problems(application: ApplicationSource, first: Span) -> Iterator[Diagnostic]:
     """Everything wrong with the services and their references; ``first`` is the place of the first service written."""
     if not application.services:
-        message = "no service starts, for each one waits for a profile"
-        yield Diagnostic(first, "application-file", message, "give one service no 'profiles'")
+        message = "no service starts, because each one has a profile or is scaled to 0"
+        yield Diagnostic(first, "application-file", message, "remove 'profiles' from one service")
         return
     volumes = plain(application.rest["volumes"]) if "volumes" in application.rest else {}
     found: list[Diagnostic] = []
@@ -38,12 +38,12 @@ def _missing_files(service: ComposeService, folder: Path) -> Iterator[Diagnostic
     for file in service.env_files:
         is_local = not file.path.startswith(("/", "~")) and "$" not in file.path
         if file.required and is_local and not (folder / file.path).is_file():
-            hint = "write it, or {path: ..., required: false}"
-            yield Diagnostic(file.span, "application-file", f"there is no file '{file.path}' beside this one", hint)
+            hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
+            yield Diagnostic(file.span, "application-file", f"there is no file '{file.path}'", hint)
 
 
 def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
-    """A script of ``x-dodo-process`` that is not there; other programs may be built later, or lie in the PATH."""
+    """A missing script of ``x-dodo-process``; other programs may be built later, or be in the PATH."""
     process = service.node.get("x-dodo-process")
     words = process.items if isinstance(process, source.Sequence) else ()
     if len(words) < 2 or plain(words[0]) not in INTERPRETERS:
@@ -51,14 +51,14 @@ def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnost
     script = words[1]
     name = script.text if isinstance(script, source.Scalar) else ""
     if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
-        message = f"there is no file '{name}' beside this one for {plain(words[0])} to run"
+        message = f"there is no file '{name}' for {plain(words[0])} to run"
         beside = [path.name for path in folder.iterdir() if path.suffix == Path(name).suffix]
         hint = did_you_mean(Path(name).name, beside) or "without it the application starts in containers only"
         yield Diagnostic(script.span, "application-file", message, hint, "warning")
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Services that wait for themselves, directly or through others."""
+    """Services that depend on themselves, directly or through others."""
     containers = dict(application.containers)
     needs = {
         name: {other for _, other in references(plain(s.node), containers) if other in application.services}
@@ -71,14 +71,13 @@ def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
             wanted_by[other].add(name)
     cycle = [name for name in _never_ready(wanted_by) if name in waiting]
     if cycle:
-        message = f"services wait for one another: {', '.join(cycle[:6])}{', ...' if len(cycle) > 6 else ''}"
-        yield Diagnostic(
-            application.services[cycle[0]].span, "application-file", message, "one of them must start first"
-        )
+        message = f"services depend on one another: {', '.join(cycle[:6])}{', ...' if len(cycle) > 6 else ''}"
+        hint = "remove one of the dependencies, so that one service can start first"
+        yield Diagnostic(application.services[cycle[0]].span, "application-file", message, hint)
 
 
 def _never_ready(needs: Mapping[str, set[str]]) -> Iterator[str]:
-    """Those that wait for themselves, or for such a one."""
+    """Those that depend on themselves, or on such a service."""
     left = {name: len(others) for name, others in needs.items()}
     wanted_by: dict[str, list[str]] = {}
     for name, others in needs.items():
@@ -107,7 +106,7 @@ def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
     if any(map(_takes_cid, application.services.values())):
         return
     first = next(iter(application.services.values())).span
-    message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so each test runs with the one built in"
+    message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
     yield Diagnostic(first, "application-cid", message, "add --cid=111 to its command", "warning")
 
 

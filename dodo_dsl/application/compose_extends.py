@@ -1,4 +1,4 @@
-"""``extends``: a service laid over another one, of the same file or of another."""
+"""``extends``: a service merged over another one, of the same file or of another."""
 
 import os
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Service:
 
 
 def extended(files: Files, service: Service, node: Node, chain: tuple[Service, ...] = ()) -> Node:
-    """The service with what it extends below it."""
+    """The service merged over what it extends."""
     if not isinstance(node, source.Mapping) or "extends" not in node.entries or files.full:
         return node
     own = source.Mapping(node.span, {k: e for k, e in node.entries.items() if k != "extends"}, node.tag)
@@ -37,7 +37,9 @@ def _base(files: Files, entry: Entry, chain: tuple[Service, ...]) -> Node | None
     words = entry.value.entries if isinstance(entry.value, source.Mapping) else {"service": entry}
     word, where = (words[key].value if key in words else None for key in ("service", "file"))
     if not isinstance(word, Scalar) or not (where is None or isinstance(where, Scalar)):
-        files.problem(entry.key, "'extends' names no service", "extends: {file: common.yml, service: base}")
+        files.problem(
+            entry.key, "'extends' does not name a service", "for example extends: {file: common.yml, service: base}"
+        )
         return None
     file = files.other(where, chain[-1].folder) if where else chain[-1].file
     document = files.document(file) if file else None
@@ -56,16 +58,17 @@ def _found(
         files.problem(word.span, f"there is no service '{base.name}' to extend", did_you_mean(base.name, entries))
         return None
     if base in chain or len(chain) > MAX_DEPTH:
-        way = " extends ".join(f"'{service.name}'" for service in (*chain, base))
-        files.problem(word.span, way if base in chain else f"'{chain[0].name}' extends more than {MAX_DEPTH} services")
+        names = " extends ".join(f"'{service.name}'" for service in (*chain, base))
+        long = f"the chain of services that '{chain[0].name}' extends is longer than {MAX_DEPTH}"
+        files.problem(word.span, f"a service extends itself: {names}" if base in chain else long)
         return None
     node = compose_merge.settled(extended(files, base, entries[base.name].value, chain))
     return moved(node, base.folder, chain[-1].folder)
 
 
 def moved(service: Node, folder: Path, to: Path) -> Node:
-    """A service of one folder as it is written in another."""
+    """A service of one folder with its paths as seen from another."""
     if not isinstance(service, source.Mapping) or folder == to:
         return service
-    way = Path(os.path.relpath(folder, to)).as_posix()
-    return compose_paths.mapped_service(service, lambda path: compose_paths.rebased(path, way))
+    base = Path(os.path.relpath(folder, to)).as_posix()
+    return compose_paths.mapped_service(service, lambda path: compose_paths.rebased(path, base))

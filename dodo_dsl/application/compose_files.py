@@ -1,4 +1,4 @@
-"""The files of an application, each read once; what is wrong with them gathers on the way."""
+"""The files of an application, each read once, with their problems."""
 
 import os
 from collections.abc import Mapping
@@ -26,17 +26,19 @@ class Files:
 
     @property
     def full(self) -> bool:
-        """Whether there is too much already."""
+        """Whether the files hold more values than are read."""
         return self._nodes > MAX_NODES
 
     def grow(self, node: Node, span: Span) -> bool:
-        """Counts what is read and what ``extends`` makes of it; False with a problem when it is too much."""
+        """Counts the values of files and of what ``extends`` makes; False, with a problem, when they are too many."""
         for part in source.walk(node):
             self._nodes += 1
             long = isinstance(part, Scalar) and len(part.text) > MAX_TEXT
             if self._nodes <= MAX_NODES and not long:
                 continue
-            what = f"a text of more than {MAX_TEXT} characters" if long else f"more than {MAX_NODES} values in all"
+            what = (
+                f"a string of more than {MAX_TEXT} characters" if long else f"more than {MAX_NODES} values in all files"
+            )
             self.problems.append(Diagnostic(part.span if long else span, "too-large", what))
             return False
         return True
@@ -50,7 +52,7 @@ class Files:
             if node is None and not found:
                 found = [Diagnostic(Span(str(file)), "application-file", "the file is empty, expected a compose file")]
             if node is not None and not isinstance(node, source.Mapping):
-                message = "the file holds no mapping, expected a compose file with services"
+                message = "the file is not a mapping, expected a compose file with services"
                 found = [*found, Diagnostic(node.span, "wrong-type", message)]
             self.problems.extend(found)
             fits = isinstance(node, source.Mapping) and self.grow(node, Span(str(file)))
@@ -58,32 +60,34 @@ class Files:
         return self._documents[file]
 
     def other(self, word: Scalar, folder: Path) -> Path | None:
-        """The file that another one names from ``folder``; None with a problem when not every machine has it."""
+        """The file that another one in ``folder`` names; None, with a problem, when it is not one of the repository."""
         text = word.text
         if "$" in text or "://" in text or text.startswith(("/", "~", "git@", "oci:")):
-            hint = "name a file of the repository, relative to this one"
-            self.problem(word.span, f"'{text}' is not the same on every machine, expected a relative path", hint)
+            hint = "name a file of the repository, relative to this file"
+            self.problem(word.span, f"'{text}' may differ between machines, expected a relative path", hint)
             return None
         file = Path(os.path.normpath(folder / text))
         if file.is_symlink() or not file.is_file():
-            kind = "a symbolic link" if file.is_symlink() else "no file"
-            self.problem(word.span, f"'{text}' is {kind}, expected a file beside this one")
+            link = f"'{text}' is a symbolic link, expected a regular file"
+            self.problem(word.span, link if file.is_symlink() else f"there is no file '{text}'")
             return None
         if len(self._documents) >= MAX_FILES:
-            self.problem(word.span, f"this is one of more than {MAX_FILES} files, which is too many")
+            self.problem(word.span, f"the application has more than {MAX_FILES} files")
             return None
         return file
 
     def gather(self, file: Path | None, span: Span) -> None:
-        """Takes the variables of an ``.env`` file, if there is one."""
+        """Adds the variables of an ``.env`` file, if there is one."""
         for name, value in variables_of(file).items() if file else ():
             if self.variables.setdefault(name, value) != value:
-                message = f"variable {name} has another value in '{file.name if file else ''}' than in an earlier file"
-                self.problem(span, message, "a test has one .env, so give the variable one value")
+                message = (
+                    f"variable '{name}' has another value in '{file.name if file else ''}' than in an earlier file"
+                )
+                self.problem(span, message, "a test has one .env file, so give the variable one value")
 
 
 def variables_of(file: Path) -> Mapping[str, str]:
-    """The variables that a plain file sets; links are not followed."""
+    """The variables that a regular file sets; symlinks are not followed."""
     if file.is_symlink() or not file.is_file():
         return {}
     with file.open("rb") as stream:

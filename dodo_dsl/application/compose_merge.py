@@ -12,17 +12,17 @@ _OUTSIDE = ("",)
 
 
 def merged(base: Node, over: Node) -> Node:
-    """Two files; what is written in ``over`` wins, and lists grow."""
+    """Two files as one; ``over`` takes precedence, and its lists are appended."""
     return _merge(base, over, ())
 
 
 def merged_service(base: Node, over: Node) -> Node:
-    """Two writings of one service."""
+    """Two definitions of one service as one."""
     return _merge(base, over, ("services", ""))
 
 
 def settled(node: Node) -> Node:
-    """A file by itself: ``!reset`` takes a key away, and ``!override`` means nothing more."""
+    """A file after all merges: without the keys that ``!reset`` removes, and without ``!override``."""
     tag = "" if node.tag == "!override" else node.tag
     if isinstance(node, Mapping):
         kept = {k: e for k, e in node.entries.items() if e.value.tag != "!reset"}
@@ -72,7 +72,7 @@ def _appended(base: Sequence, over: Sequence, place: Path) -> tuple[Node, ...]:
 
 
 def _target(item: Node) -> str:
-    """Where in the container a mount, device, secret or config stands."""
+    """The path of a mount, device, secret or config in the container."""
     value = plain(item)
     if isinstance(value, dict):
         return str(value.get("target", value.get("source")))
@@ -101,7 +101,7 @@ def _as_list(node: Node) -> Node:
 
 
 def _as_hosts(node: Node) -> Node:
-    """``{name: address}`` as ``[name:address]``, for a name may have several."""
+    """``{name: address}`` as ``[name:address]``, as a name may have several."""
     if not isinstance(node, Mapping):
         return node
     texts = [(e.key, f"{k}:{e.value.text if isinstance(e.value, Scalar) else ''}") for k, e in node.entries.items()]

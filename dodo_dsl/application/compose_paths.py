@@ -1,4 +1,4 @@
-"""Relative paths in a compose file: where they stand, and what they are called from another folder."""
+"""Relative paths in a compose file: where they occur, and how they are written from another folder."""
 
 import os
 import re
@@ -18,10 +18,10 @@ _REMOTE = ("/", "~", "git@", "github.com/", "service:", "target:")
 
 
 def rebased(path: str, base: str) -> str:
-    """A path as seen from the folder for which ``base`` is the path's own folder.
+    """A path as seen from another folder, from which ``base`` is the path's own folder.
 
-    Absolute paths, addresses and variables stay; ``${PWD}`` is the folder of the compose file, in which compose is
-    started, and a variable's default is a path as well.
+    Absolute paths, URLs and variables stay; ``${PWD}`` is the compose file's folder, where compose is started, and a
+    variable's default is a path too.
     """
     path = _HERE.sub(".", path, count=1) if path.startswith("$") else path
     if path.startswith(_REMOTE) or "://" in path:
@@ -34,7 +34,7 @@ def rebased(path: str, base: str) -> str:
 
 
 def _as_relative(path: str) -> str:
-    """A path that begins with a variable, but surely not with a folder's: ``${CAR:-kiwi}.env`` lies beside the file."""
+    """A path whose variable is part of a file's name, after ``./``: ``${CAR:-kiwi}.env`` is beside the compose file."""
     if not path.startswith("$") or "://" in path or _HERE.match(path):
         return path
     end = interpolation.end_of_variable(path, 0)
@@ -49,7 +49,7 @@ def is_path(text: str) -> bool:
 
 
 def mapped_service(service: source.Mapping, change: Change) -> source.Mapping:
-    """A service with ``change`` done to each of its paths."""
+    """A service with ``change`` applied to each of its paths."""
     return _mapped(service, _SERVICE, change)
 
 

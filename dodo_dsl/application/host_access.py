@@ -1,4 +1,4 @@
-"""What of a machine a service asks for: its hardware, and what no test can have to itself."""
+"""Access of a service to its host: to hardware, and to what tests cannot have separately."""
 
 import posixpath
 import re
@@ -54,14 +54,14 @@ def is_shared_memory(found: Mount) -> bool:
 
 
 def is_hardware(found: Mount) -> bool:
-    """A mount of devices, or of the kernel's settings of them."""
+    """A mount of devices, or of their settings in the kernel."""
     if is_shared_memory(found) or found.source in _PLAIN_DEVICES:
         return False
     return found.below("/dev") or (found.below("/sys") and not found.read_only)
 
 
 def is_machine(found: Mount) -> bool:
-    """A mount through which a service reaches the machine itself, or other tests' containers."""
+    """A mount that gives access to the host itself, or to other tests' containers."""
     is_process_table = found.below("/proc") and not found.read_only
     return found.source in _WHOLE or is_process_table or bool(_SOCKET.search(found.source))
 
@@ -75,7 +75,7 @@ def is_true(value: object) -> bool:
 
 
 def reference(value: object) -> tuple[str, str]:
-    """``service:x`` and ``container:x`` as kind and name; two empty texts for other values."""
+    """``service:x`` and ``container:x`` as kind and name; two empty strings for other values."""
     kind, sign, name = str(value or "").partition(":")
     return (kind, name) if sign and kind in ("service", "container") else ("", "")
 
@@ -89,7 +89,7 @@ def borrowed(entry: object) -> tuple[str, str, str]:
 
 
 def references(service: dict[str, Any], containers: dict[str, str]) -> Iterator[tuple[str, str]]:
-    """The services that a service needs, by the key that says so; containers of the application are its services."""
+    """The services that a service needs, each with its key; containers of the application count as its services."""
     for key in NAMESPACES:
         kind, name = reference(service.get(key))
         if kind == "service" or name in containers:

@@ -1,4 +1,4 @@
-"""Variables in compose files, ``${NAME:-default}``, found without giving them values; and ``.env`` files."""
+"""Variables in compose files, ``${NAME:-default}``, found without substituting them; and ``.env`` files."""
 
 import re
 
@@ -8,7 +8,7 @@ _ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "$": "$$"}
 
 
 def end_of_variable(text: str, start: int) -> int:
-    """Where the variable that begins at the ``$`` of ``start`` ends; braces nest, ``$$`` is no variable."""
+    """Where the variable that begins at the ``$`` of ``start`` ends; braces nest, ``$$`` is not a variable."""
     if text[start + 1 : start + 2] == "$":
         return start + 2
     if text[start + 1 : start + 2] != "{":
@@ -23,7 +23,7 @@ def end_of_variable(text: str, start: int) -> int:
 
 
 def split_outside(text: str, sign: str) -> list[str]:
-    """Parts of a text between signs that stand in no variable: ``${A:-b:c}:d`` has two between colons."""
+    """A string split at a sign, but not within variables: ``${A:-b:c}:d`` has two parts at the colons."""
     parts, begin, place = [], 0, 0
     while place < len(text):
         if text[place] == "$":
@@ -37,7 +37,7 @@ def split_outside(text: str, sign: str) -> list[str]:
 
 
 def names(text: str) -> set[str]:
-    """The variables that a text speaks of, those in defaults included."""
+    """The variables in a string, those in defaults included."""
     found: set[str] = set()
     place = text.find("$")
     while place >= 0:
@@ -50,9 +50,9 @@ def names(text: str) -> set[str]:
 
 
 def dotenv(text: str) -> dict[str, str]:
-    """The variables of a ``.env`` file as compose reads it; a ``$`` that is meant as one is doubled.
+    """The variables of a ``.env`` file as compose reads it; a literal ``$`` is doubled.
 
-    Names without a value, and lines that mean nothing, are passed over.
+    Names without a value, and lines that cannot be read, are skipped.
     """
     found, place = {}, 0
     while place < len(text):
@@ -70,7 +70,7 @@ def _or_end(text: str, place: int) -> int:
 
 
 def _value(text: str, start: int, line_end: int) -> tuple[str, int]:
-    """A value and where the next line begins."""
+    """A value, and the position where the next line begins."""
     quote = text[start : start + 1]
     if quote not in ("'", '"'):
         return re.split(r"(?:^|\s)#", text[start:line_end], maxsplit=1)[0].strip(), line_end + 1
@@ -83,7 +83,7 @@ def _value(text: str, start: int, line_end: int) -> tuple[str, int]:
 
 
 def _character(text: str, place: int, quote: str) -> tuple[str, int]:
-    """What stands for the character at a place inside quotes, and how long that was written."""
+    """The character at a position inside quotes, and the number of characters that it is written with."""
     character, following = text[place], text[place + 1 : place + 2]
     if quote == "'":
         return ("'", 2) if text[place : place + 2] == "\\'" else ("$$" if character == "$" else character, 1)

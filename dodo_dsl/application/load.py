@@ -1,4 +1,4 @@
-"""All files of an application merged into one document: several files, and what they extend and include."""
+"""All files of an application merged into one document, with what they extend and include."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -61,12 +61,12 @@ def _included(
         words = {key: entry.value for key, entry in item.entries.items()}
     names = scalars(words.get("path"))
     if not names:
-        files.problem(item.span, "'include' names no file", "include: [sensors.yml]")
+        files.problem(item.span, "'include' does not name a file", "for example include: [sensors.yml]")
         return document
     found = [file for name in names if (file := files.other(name, folder))]
     circle = next((name for name, file in zip(names, found, strict=False) if file in chain), None)
     if circle:
-        files.problem(circle.span, f"'{circle.text}' is included in a circle")
+        files.problem(circle.span, f"'{circle.text}' includes itself, directly or through other files")
     if circle or len(found) < len(names):
         return document
     place = words.get("project_directory")
@@ -81,9 +81,9 @@ def _included(
 def _joined(
     files: Files, document: source.Mapping, part: source.Mapping, project: Path, folder: Path
 ) -> source.Mapping:
-    way = Path(os.path.relpath(project, folder)).as_posix()
+    base = Path(os.path.relpath(project, folder)).as_posix()
     named = {key: entry.value for key, entry in part.entries.items() if key in _NAMED}
-    for key, node in compose_paths.mapped_rest(named, lambda path: compose_paths.rebased(path, way)).items():
+    for key, node in compose_paths.mapped_rest(named, lambda path: compose_paths.rebased(path, base)).items():
         mine = document.get(key)
         document = _with(document, key, compose_merge.merged(node, mine) if mine else node)
     services, own = part.get("services"), document.get("services")
@@ -91,7 +91,7 @@ def _joined(
     ours = own.entries if isinstance(own, source.Mapping) else {}
     for name in sorted(set(ours) & set(theirs)):
         included = Path(theirs[name].key.file).name
-        files.problem(ours[name].key, f"'{name}' is a service of the included '{included}' too", "rename one of them")
+        files.problem(ours[name].key, f"the included '{included}' also has a service '{name}'", "rename one of them")
     joined = {name: Entry(e.key, moved(e.value, project, folder)) for name, e in theirs.items()}
     return _with(document, "services", source.Mapping(document.span, {**joined, **ours}))
 

@@ -1,4 +1,4 @@
-"""The application as its team wrote it, and which messages its services declare to produce and to consume."""
+"""The application as it is written, and the messages that its services declare to produce and to consume."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ Word = tuple[str, Span]
 
 @dataclass(frozen=True)
 class Declared:
-    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp``, with its place. No ``readers`` is 0."""
+    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp`` with its place. ``readers`` may be 0."""
 
     inputs: tuple[Word, ...]
     outputs: tuple[Word, ...]
@@ -53,11 +53,11 @@ class ComposeService:
 
 @dataclass(frozen=True)
 class ApplicationSource:
-    """Compose files, merged, read once: rules and the planner see nothing else of the application.
+    """The merged compose files, which are all that rules and the planner see of the application.
 
     ``services`` are those that start, by name; ``rest`` has every other top-level key. Paths are relative to
-    ``folder``. ``dropped`` says why a service does not start, ``containers`` which service has a ``container_name``,
-    ``variables`` what the files' ``.env`` sets.
+    ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the services by their
+    ``container_name``, ``variables`` those of the files' ``.env``.
     """
 
     path: Path
@@ -73,7 +73,7 @@ class ApplicationSource:
 
     @property
     def declared(self) -> Mapping[str, Declared | None]:
-        """What each service declares, by its name."""
+        """The declarations of each service, by its name."""
         return {name: service.declared for name, service in self.services.items()}
 
 
@@ -87,7 +87,7 @@ def plain(node: Node) -> Any:
 
 
 def _number(value: int, written: str) -> int | float:
-    """A whole number; beyond 64 bits compose knows it as a float only."""
+    """A whole number; beyond 64 bits a float, as for compose."""
     if written[:1] == "0" and set(written) <= set("01234567"):
         value = int(written, 8)
     return value if -(1 << 63) <= value < 1 << 64 else float(value)
@@ -109,7 +109,7 @@ def environment(raw: Any) -> dict[str, str | None]:
 
 
 def declared(service: source.Mapping) -> Declared | None:
-    """What a service declares; None without ``x-dodo``."""
+    """The declaration of a service; None without ``x-dodo``."""
     entry = service.entries.get("x-dodo")
     if entry is None or not isinstance(entry.value, source.Mapping):
         return None
@@ -121,6 +121,6 @@ def declared(service: source.Mapping) -> Declared | None:
 
 
 def scalars(node: Node | None) -> list[Scalar]:
-    """The texts of a list, or the text itself."""
+    """The strings of a list, or the single string."""
     nodes = node.items if isinstance(node, source.Sequence) else (node,)
     return [n for n in nodes if isinstance(n, Scalar) and isinstance(n.value, str)]

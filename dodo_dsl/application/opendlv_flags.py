@@ -1,4 +1,4 @@
-"""OpenDLV flags in an application's command and environment: which CID and which memories it was told to use."""
+"""OpenDLV flags in an application's command and environment: its CID and its shared memories."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,10 +20,10 @@ _ENDS = ";&|<>"
 
 
 def split(command: str) -> tuple[str, ...]:
-    """A command's words as compose splits them, with variables left as they are, each part of one word.
+    """A command's words as compose splits them, with variables unchanged, each within one word.
 
-    What comes after an unquoted ``;``, ``&``, ``|``, ``<`` or ``>`` is no part of it: compose starts no shell. Raises
-    ValueError for an open quote and for a parenthesis outside quotes.
+    The command ends at an unquoted ``;``, ``&``, ``|``, ``<`` or ``>``, as compose starts no shell. Raises ValueError
+    for an unclosed quote and for a parenthesis outside quotes.
     """
     words: list[str] = []
     word: str | None = None
@@ -42,7 +42,7 @@ def split(command: str) -> tuple[str, ...]:
         elif quote or not (character.isspace() or character in _ENDS + "()"):
             part = character
         elif character in "()":
-            raise ValueError("a parenthesis outside quotes; no shell reads this")
+            raise ValueError("parenthesis outside quotes, but compose starts no shell")
         elif character in _ENDS:
             break
         else:
@@ -51,12 +51,12 @@ def split(command: str) -> tuple[str, ...]:
             continue
         word, place = (word or "") + part, end
     if quote:
-        raise ValueError("a quotation mark is not closed")
+        raise ValueError("unclosed quotation mark")
     return (*words, *(() if word is None else (word,)))
 
 
 def _end_of_dollar(command: str, place: int) -> int:
-    """The end of a variable, or of what is in parentheses behind ``$``."""
+    """The end of a variable, or of the parentheses after ``$``."""
     end = end_of_variable(command, place)
     if command[end : end + 1] == "(":
         closing = command.find(")", end)
@@ -70,7 +70,7 @@ def _map_flag(argv: Sequence[str], flag: str, change: Callable[[str], str]) -> t
 
 
 def takes_cid(argv: Iterable[str], environment: Mapping[str, object]) -> bool:
-    """Whether a CID can be told: by flag, also within a shell's string, or by variable."""
+    """Whether a CID can be set: by flag, also within a shell's string, or by variable."""
     return any(_CID.search(w) or w == "--cid" or names(w) & {*CID_VARIABLES} for w in argv) or any(
         variable in environment for variable in CID_VARIABLES
     )
@@ -86,7 +86,7 @@ def with_cid(argv: Sequence[str], cid: int) -> tuple[str, ...]:
 
 
 def with_cid_text(text: str, cid: int) -> str:
-    """As ``with_cid`` in a command that is one text, be it compose's or a shell's."""
+    """As ``with_cid``, for a command that is a single string."""
     return _CID.sub(lambda match: f"{match['flag'] or match['words']}{cid}", text)
 
 

@@ -1,4 +1,4 @@
-"""``read_application``: compose files as DoDo understands them, and what is wrong with them."""
+"""``read_application``: compose files as DoDo reads them, and their problems."""
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +23,7 @@ _OURS = ("services", "version", "name", "networks", "include")
 
 
 def read_application(path: Path | Sequence[Path]) -> tuple[ApplicationSource | None, list[Diagnostic]]:
-    """An application from one compose file, or from several that are merged in order, and what is wrong with it."""
+    """An application from one compose file, or from several that are merged in order, and its problems."""
     paths = [path] if isinstance(path, Path) else list(path)
     files = Files()
     document = load(files, paths)
@@ -32,7 +32,9 @@ def read_application(path: Path | Sequence[Path]) -> tuple[ApplicationSource | N
     if isinstance(services, source.Mapping):
         found.extend(itertools.chain.from_iterable(unknown_keys(e.value) for e in services.entries.values()))
         if len(services.entries) > MAX_SERVICES:
-            found.append(Diagnostic(services.span, "too-large", f"more than {MAX_SERVICES} services"))
+            found.append(
+                Diagnostic(services.span, "too-large", f"the application has more than {MAX_SERVICES} services")
+            )
     if document is not None and not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
         found.extend(validate(document, "application"))
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
@@ -71,7 +73,7 @@ def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:
 
 
 def _used_cid_variables(services: Iterable[source.Mapping]) -> list[str]:
-    """The CID variables that something in the file interpolates."""
+    """The CID variables that the services interpolate."""
     texts = (node.text for service in services for node in source.walk(service) if isinstance(node, source.Scalar))
     used = {name for text in texts for name in names(text)}
     return [variable for variable in opendlv_flags.CID_VARIABLES if variable in used]
@@ -80,6 +82,6 @@ def _used_cid_variables(services: Iterable[source.Mapping]) -> list[str]:
 def _why_dropped(service: dict[str, Any]) -> str:
     profiles = [str(p) for p in service.get("profiles") or ()]
     if profiles:
-        return f"it waits for profile {' or '.join(profiles)}"
+        return f"it needs profile {' or '.join(profiles)}"
     deploy = service.get("deploy") or {}
     return "it is scaled to 0" if 0 in (service.get("scale"), deploy.get("replicas")) else ""

@@ -1,4 +1,4 @@
-"""Variables of a service: which files set some, and which of them carry the CID."""
+"""A service's variables: the one for its image, the files that set others, and those that carry the CID."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -12,7 +12,7 @@ from dodo_dsl.source import Scalar
 
 
 def image_variable(service: str) -> str:
-    """The variable by which a pipeline hands a service's image."""
+    """The variable with which a pipeline sets a service's image."""
     return "DODO_IMAGE_" + re.sub(r"[^A-Z0-9_]", "_", service.upper())
 
 

@@ -1,7 +1,7 @@
-"""What keeps a compose file from being an application: names, words, references, and what cannot be isolated.
+"""Problems of a service in a compose file: its name, commands, references, and what cannot be isolated.
 
-``application-isolation``: something of the machine that tests would share. ``application-hardware``: hardware that is
-not there without a rig, so it is left out. ``application-cid``: no service takes a CID.
+``application-isolation``: access to the host that tests would share. ``application-hardware``: hardware, which is left
+out of tests without a rig.
 """
 
 import functools
@@ -16,12 +16,12 @@ from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.source import Node, Scalar
 
 _SOCKET_HINT = "give the service a profile, so that it starts with 'docker compose --profile' and not in a test"
-_WITHOUT = "is left out of sil and dil tests, where there is no hardware"
+_WITHOUT = "is left out of sil and dil tests, which have no hardware"
 
 
 @dataclass(frozen=True)
 class Written:
-    """A service with what else there is; ``others`` are all services that start, ``dropped`` says why some do not."""
+    """A service in its application; ``others`` are all services that start, ``dropped`` has why others do not."""
 
     name: str
     node: source.Mapping
@@ -43,7 +43,7 @@ class Written:
         return value
 
     def place(self, key: str, item: int | None = None) -> Span:
-        """Where a key stands, or where an item of its list does."""
+        """The place of a key's value, or of an item of its list."""
         entry = self.node.entries[key]
         if item is None:
             return entry.value.span if isinstance(entry.value, Scalar) and entry.value.text else entry.key
@@ -59,13 +59,13 @@ def problems(written: Written) -> Iterator[Diagnostic]:
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
-    """Keys for DoDo that DoDo does not know."""
+    """Unknown keys that begin like DoDo's."""
     for word, entry in service.entries.items() if isinstance(service, source.Mapping) else ():
         if word.startswith("x-dodo") and word not in KEYS:
             hint = did_you_mean(word, KEYS)
-            yield Diagnostic(entry.key, "unknown-key", f"DoDo knows no key '{word}'", hint)
+            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint)
         elif word not in KEYS and word.startswith("x-do") and did_you_mean(word, KEYS).startswith("did"):
-            message = f"the key '{word}' says nothing, neither to compose nor to DoDo"
+            message = f"neither compose nor DoDo uses the key '{word}'"
             yield Diagnostic(entry.key, "unknown-key", message, did_you_mean(word, KEYS), "warning")
 
 
@@ -74,7 +74,7 @@ def _name(written: Written) -> Iterator[Diagnostic]:
     if name == SANDBOX or name.startswith("dodo-"):
         yield _bad(written.key, f"the name '{name}' is reserved for DoDo's own services")
     if not any(written.plain.get(key) for key in ("image", "build", "x-dodo-process")):
-        yield _bad(written.key, f"'{name}' has neither 'image' nor 'build', so nothing can be started")
+        yield _bad(written.key, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
 
 
 def _words(written: Written) -> Iterator[Diagnostic]:
@@ -84,7 +84,7 @@ def _words(written: Written) -> Iterator[Diagnostic]:
             try:
                 opendlv_flags.split(value)
             except ValueError as error:
-                yield _bad(written.place(key), f"{key} of '{written.name}': {error}")
+                yield _bad(written.place(key), f"'{key}' of '{written.name}': {error}")
 
 
 def _references(written: Written) -> Iterator[Diagnostic]:
@@ -96,9 +96,8 @@ def _references(written: Written) -> Iterator[Diagnostic]:
             yield _bad(written.place(key), message)
         else:
             hint = did_you_mean(name, written.others)
-            yield _bad(
-                written.place(key), f"{key} of '{written.name}' names '{name}', which is not a service of it", hint
-            )
+            message = f"'{key}' of '{written.name}' names the unknown service '{name}'"
+            yield _bad(written.place(key), message, hint)
 
 
 def _namespaces(written: Written) -> Iterator[Diagnostic]:
@@ -106,11 +105,15 @@ def _namespaces(written: Written) -> Iterator[Diagnostic]:
     for key in host_access.NAMESPACES:
         kind, name = host_access.reference(service.get(key))
         if kind == "container" and name not in written.containers:
-            yield _shared(written.place(key), f"{key} joins the container '{name}', which is not of this application")
+            yield _shared(
+                written.place(key), f"'{key}' joins the container '{name}', which is not part of the application"
+            )
     if service.get("pid") == "host":
-        yield _shared(written.place("pid"), "'pid: host' shows the processes of all tests", "remove it")
+        yield _shared(written.place("pid"), "'pid: host' gives access to the processes of all tests", "remove it")
     if host_access.is_true(service.get("use_api_socket", False)):
-        yield _shared(written.place("use_api_socket"), "'use_api_socket' hands over the Docker engine", _SOCKET_HINT)
+        yield _shared(
+            written.place("use_api_socket"), "'use_api_socket' gives access to the Docker engine", _SOCKET_HINT
+        )
 
 
 def _mounts(written: Written) -> Iterator[Diagnostic]:
@@ -119,22 +122,24 @@ def _mounts(written: Written) -> Iterator[Diagnostic]:
         place = written.place("volumes", item)
         about = written.volumes.get(found.source)
         if host_access.is_machine(found):
-            message = f"'{found.source}' is the whole machine's, so tests would share it"
+            message = f"'{found.source}' belongs to the host, so tests would share it"
             yield _shared(place, message, _SOCKET_HINT)
         elif isinstance(about, dict) and host_access.is_true(about.get("external", False)) and not found.read_only:
-            hint = "mount it read-only (:ro), or let compose make it by removing 'external'"
+            hint = "mount it read-only (:ro), or remove 'external', so that compose creates it"
             yield _shared(place, f"volume '{found.source}' is external, so tests would share it", hint)
 
 
 def _external(written: Written) -> Iterator[Diagnostic]:
     for item, link in enumerate(written.plain.get("external_links") or ()):
-        message = f"'{link}' is a container outside of this application"
+        message = f"'{link}' is a container outside the application"
         yield _shared(written.place("external_links", item), message, "make it a service of the application")
     for item, entry in enumerate(written.plain.get("volumes_from") or ()):
         kind, name, _ = host_access.borrowed(entry)
         if kind == "container" and name not in written.containers:
             place = written.place("volumes_from", item)
-            yield _shared(place, f"the container '{name}' is not of this application", "make it a service of it")
+            yield _shared(
+                place, f"the container '{name}' is not part of the application", "make it a service of the application"
+            )
 
 
 def _hardware(written: Written) -> Iterator[Diagnostic]:
@@ -151,7 +156,7 @@ def _hardware(written: Written) -> Iterator[Diagnostic]:
             yield _absent(written.place("volumes", item), f"'{found.source}' of '{written.name}' {_WITHOUT}")
     for item, word in enumerate(service.get("cap_add") or ()):
         if host_access.capability(word) in host_access.MACHINE_CAPABILITIES:
-            yield _absent(written.place("cap_add", item), f"capability {word} of '{written.name}' {_WITHOUT}")
+            yield _absent(written.place("cap_add", item), f"capability '{word}' of '{written.name}' {_WITHOUT}")
 
 
 def _single(written: Written) -> Iterator[Diagnostic]:
@@ -159,7 +164,7 @@ def _single(written: Written) -> Iterator[Diagnostic]:
     deploy = service.get("deploy") or {}
     for key, value in (("scale", service.get("scale")), ("deploy", deploy.get("replicas"))):
         if isinstance(value, int) and value > 1:
-            message = f"'{written.name}' starts {value} times, but only once in a test"
+            message = f"'{written.name}' has {value} replicas, but starts once in a test"
             yield Diagnostic(written.place(key), "application-file", message, "", "warning")
 
 

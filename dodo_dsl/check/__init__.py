@@ -1,4 +1,4 @@
-"""The rules: each is a module with one question, in one explicit list."""
+"""The rules: each is a module with one concern, in one explicit list."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -59,7 +59,7 @@ def check(
 
 
 def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[Diagnostic]:
-    """The problems of a file's instances, each once; those that only some have say which."""
+    """The problems of a file's instances, each once; those that only some instances have name one of them."""
     having: dict[Diagnostic, dict[str, None]] = {}
     for spec, found in group:
         for diagnostic in found:

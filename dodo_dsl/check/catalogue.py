@@ -1,6 +1,6 @@
-"""The rule catalogue: of each rule what it says, why, an example that breaks it and one that does not.
+"""The rule catalogue: for each rule a summary, its reason, an example that violates it and one that does not.
 
-``catalogue.yml`` is the one place; docs/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are made of it.
+docs/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are generated from ``catalogue.yml``.
 """
 
 import functools
@@ -16,12 +16,13 @@ FILE = Path(__file__).with_name("catalogue.yml")
 _INTRODUCTION = """\
 # Rules
 
-What `dodo compile` can find, by the name in square brackets; `dodo explain RULE` shows the same on a terminal.
+The rules that `dodo compile` checks, by the name that it prints in square brackets; `dodo explain RULE` shows the same
+in a terminal.
 
-An example shows what it changes in a test `example.dodo.yml` that is fine otherwise. A line such as `# dodo.yml` begins
-another file. Each first example gives its rule and each second one is silent: the tests run them.
+Each example has only the keys that differ from a valid test `example.dodo.yml`. A line such as `# dodo.yml` begins
+another file. The first example of a rule violates it, the second does not; DoDo's own tests check both.
 
-This page is made of `dodo_dsl/check/catalogue.yml` by `scripts/make-rules`.
+`scripts/make-rules` generates this page from `dodo_dsl/check/catalogue.yml`.
 """
 
 
@@ -56,7 +57,7 @@ def text(page: Page) -> str:
     parts = (
         f"{page.name}: {page.summary}",
         textwrap.fill(page.why, 100),
-        "This gives the error, or the warning:",
+        "This violates the rule:",
         textwrap.indent(page.bad, "    "),
         "This does not:",
         textwrap.indent(page.good, "    "),
@@ -65,7 +66,7 @@ def text(page: Page) -> str:
 
 
 def markdown() -> str:
-    """The whole of docs/rules.md."""
+    """The text of docs/rules.md."""
     return "\n".join((_INTRODUCTION, *_contents(), *_sections()))
 
 
@@ -92,5 +93,5 @@ def _sections() -> Iterator[str]:
 
 
 def write(file: Path) -> None:
-    """Makes docs/rules.md again."""
+    """Generates docs/rules.md."""
     file.write_text(markdown(), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What a rule sees, and the shape of a rule."""
+"""The input of a rule, and its signature."""
 
 import functools
 from collections.abc import Iterator, Mapping
@@ -20,7 +20,7 @@ from dodo_dsl.spec.rig import Rig
 
 @dataclass(frozen=True)
 class Context:
-    """One instance with everything around it; ``by_name`` has one instance of each file by the test's name."""
+    """One instance with its deployment and application; ``by_name`` has one instance of each file by its name."""
 
     test: ResolvedTest
     manifests: Mapping[str, Manifest]
@@ -60,7 +60,7 @@ def known_messages(own: tuple[Path, ...]) -> frozenset[str]:
         try:
             names.update(d.name for d in parser.load(path))
         except parser.OdvdError:
-            continue  # the deployment's own diagnostic
+            continue  # reported with the deployment
     return frozenset(names)
 
 

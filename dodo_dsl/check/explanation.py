@@ -1,4 +1,4 @@
-"""An instance explained: where the values of its services come from, its wiring, and what it requires."""
+"""An instance explained: the origin of its services' values, its wiring, and what it requires."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class ServiceExplained:
 
 @dataclass(frozen=True)
 class Line:
-    """A message or memory with its producers and consumers; services of the application are marked."""
+    """A message or memory with its producers and its consumers; services of the application are marked."""
 
     kind: str
     port: str
@@ -43,7 +43,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Asked:
-    """What the application has to produce, or only may where ``required`` is false."""
+    """What the application must produce, or may produce where ``required`` is false."""
 
     kind: str
     port: str
@@ -126,25 +126,26 @@ def _shown(end: End) -> str:
 
 
 def _lines(wiring: Wiring) -> Iterator[Line]:
-    hearers = (*wiring.consumed, *wiring.application_consumes)
-    says: dict[Port, list[End]] = {}
+    consumers = (*wiring.consumed, *wiring.application_consumes)
+    produced: dict[Port, list[End]] = {}
     for end in (*wiring.produced, *wiring.application_produces):
-        says.setdefault(end.port, []).append(end)
-    for port, ends in says.items():
-        by = {_shown(h): None for h in hearers if h.port.consumes(port) and (port.name != ANYTHING or _only(wiring, h))}
-        name = "any message of it" if port.name == ANYTHING else str(port)
+        produced.setdefault(end.port, []).append(end)
+    for port, ends in produced.items():
+        anything = port.name == ANYTHING
+        by = {_shown(c): None for c in consumers if c.port.consumes(port) and (not anything or _only(wiring, c))}
+        name = "any message of it" if anything else str(port)
         yield Line(port.kind, name, tuple(map(_shown, ends)), tuple(by))
-    unsaid: dict[str, list[End]] = {}
-    for end in hearers:
-        if not any(end.port.consumes(port) for port in says):
-            unsaid.setdefault(f"{end.port.kind} {end.port}", []).append(end)
-    for ends in unsaid.values():
+    unsatisfied: dict[str, list[End]] = {}
+    for end in consumers:
+        if not any(end.port.consumes(port) for port in produced):
+            unsatisfied.setdefault(f"{end.port.kind} {end.port}", []).append(end)
+    for ends in unsatisfied.values():
         yield Line(ends[0].port.kind, str(ends[0].port), (), tuple(map(_shown, ends)))
 
 
 def _only(wiring: Wiring, end: End) -> bool:
-    """Whether nobody says by name what the end hears."""
-    return all(said.port.name == ANYTHING for said in wiring.producers(end.port))
+    """Whether no service of the test produces by name what the end consumes."""
+    return all(producer.port.name == ANYTHING for producer in wiring.producers(end.port))
 
 
 def _asked(wiring: Wiring) -> Iterator[Asked]:

@@ -1,4 +1,4 @@
-"""Lockstep derived from a test's wiring: the rate of its steps, and the messages that answer a frame."""
+"""Lockstep, derived from a test's wiring: the rate of its steps, and the messages that answer a frame."""
 
 from collections.abc import Iterable, Mapping
 from decimal import Decimal
@@ -8,13 +8,13 @@ from dodo_dsl.spec.arguments import ResolvedService
 
 DEFAULT_HZ = 10.0
 DETECTIONS = "opendlv.logic.perception.Detection"
-"""Messages of which any number belongs to a frame, also none, so that they cannot complete an answer."""
+"""Prefix of messages that a frame may have any number of, so that they cannot complete an answer."""
 
 _CLOSE = Decimal("1e-6")
 
 
 def cameras_of(wiring: Wiring) -> set[str]:
-    """The services that make pictures."""
+    """The services that produce frames."""
     return {end.service for end in wiring.produced if end.port.kind == "memory"}
 
 
@@ -41,8 +41,8 @@ def rates_fit(rate: float, step: float) -> bool:
 
 
 def answers(wiring: Wiring) -> list[str]:
-    """The messages that answer a frame, each once: what the application declares, else what drives the vehicle, else
-    what is judged. Empty where none of these is known."""
+    """The messages that answer a frame, each once: those that the application declares, else those that drive the
+    vehicle, else those that are judged; empty without any."""
     declared = _names(wiring.answers)
     expected = [end for end in _from_application(wiring) if _is_expected(end, wiring)]
     driving = _names(end for end in expected if end.layer == "action")
@@ -57,7 +57,7 @@ def other_inputs(wiring: Wiring) -> list[str]:
 
 
 def _from_application(wiring: Wiring) -> list[End]:
-    """What services consume that the application may produce and no other service does."""
+    """The ends that consume what the application may produce, and no service of the test does."""
     return [
         end
         for end in wiring.consumed
@@ -74,7 +74,7 @@ def _is_expected(end: End, wiring: Wiring) -> bool:
 
 
 def _names(ends: Iterable[End]) -> list[str]:
-    """The messages by name, each once; a name alone stands for all its sender stamps."""
+    """The messages by name, each once; a name alone means all its sender stamps."""
     ports = {end.port for end in ends}
     anybody = {port.name for port in ports if port.stamp is None}
     return sorted({str(port) for port in ports if port.stamp is None or port.name not in anybody})

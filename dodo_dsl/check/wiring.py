@@ -1,4 +1,4 @@
-"""The wiring of a test: which service produces and consumes what, and what is required of the application."""
+"""The wiring of a test: what its services produce and consume, and what is required of the application."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,7 +14,7 @@ Kind = Literal["message", "memory"]
 
 ANYTHING = "*"
 NOT_OF_THE_APPLICATION = ("opendlv.sim.", "dodo.")
-"""Packages of messages that only a simulation sends, so that none is required of an application."""
+"""Packages of messages that only a simulation sends, so that they are never required of an application."""
 
 _PARAMETER = re.compile(r"\{(?P<name>[^{}]+)\}")
 _STAMP = re.compile(r"[0-9]{1,10}")
@@ -22,9 +22,9 @@ _STAMP = re.compile(r"[0-9]{1,10}")
 
 @dataclass(frozen=True)
 class Port:
-    """A message or memory that a service produces or consumes, which it may not where it is ``optional``.
+    """A message or memory that a service produces or consumes, or only may where it is ``optional``.
 
-    ``stamp`` is a message's sender stamp; None consumes any.
+    ``stamp`` is a message's sender stamp; with None a service consumes any.
     """
 
     kind: Kind
@@ -62,8 +62,8 @@ class End:
 class Wiring:
     """Everything produced and consumed in a test.
 
-    ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are what they declare to
-    complete a frame in lockstep.
+    ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are the messages that
+    they declare to complete a frame in lockstep.
     """
 
     produced: tuple[End, ...]
@@ -80,7 +80,7 @@ class Wiring:
         return [end for end in self.produced if port.consumes(end.port)]
 
     def application_may_produce(self, port: Port) -> bool:
-        """Whether the application declares it, or could produce it as it does not declare everything."""
+        """Whether the application declares it, or could produce it because it does not declare everything."""
         if not port.can_be_required:
             return False
         open_ended = not self.has_application or bool(self.undeclared) or port.kind == "memory"
@@ -108,7 +108,7 @@ def _ports(kind: Kind, written: Sequence[str], values: Mapping[str, str], stamp:
     for text in written:
         names = {m["name"] for m in _PARAMETER.finditer(text)}
         if not names <= values.keys():
-            continue  # an optional parameter that was not given: no such port
+            continue  # an optional parameter without a value: no such port
         optional = text.endswith("?")
         filled = _PARAMETER.sub(lambda m: values[m["name"]], text.removesuffix("?"))
         if kind == "memory":
@@ -118,7 +118,7 @@ def _ports(kind: Kind, written: Sequence[str], values: Mapping[str, str], stamp:
 
 
 def message(text: str, stamp: int | None, optional: bool = False) -> Port:
-    """The port of ``name`` or ``name/senderStamp``; ``stamp`` is what a name alone means."""
+    """The port of ``name`` or ``name/senderStamp``; ``stamp`` is that of a name alone."""
     name, _, number = text.partition("/")
     return Port("message", name, int(number) if _STAMP.fullmatch(number) else stamp, optional)
 

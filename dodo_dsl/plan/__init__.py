@@ -1,1 +1,1 @@
-"""Everything decided: addresses, images, flags, files and the rewritten application of each test."""
+"""Plans: the addresses, images, flags, files and the rewritten application of each test."""

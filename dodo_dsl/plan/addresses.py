@@ -11,7 +11,7 @@ class OutOfAddresses(ValueError):
 def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
     """A CID for each test: unique while the range lasts, beyond it only tests on a network of their own share one.
 
-    Tests on the host network choose first. Raises OutOfAddresses when they alone are more than the range.
+    Tests on the host network come first. Raises OutOfAddresses when they alone are more than the range.
     """
     on_host = [i for i, isolation in enumerate(isolations) if isolation == "host"]
     if len(isolations) <= len(available):
@@ -31,7 +31,7 @@ def subnets(network: ipaddress.IPv4Network) -> list[str]:
 
 
 def subnet(index: int, network: ipaddress.IPv4Network) -> str:
-    """The ``index``-th /28 of the deployment's network; the range begins anew when it is used up."""
+    """The ``index``-th /28 of the deployment's network; the range starts again when it is used up."""
     count = 1 << (28 - network.prefixlen)
     base = int(network.network_address) + 16 * (index % count)
     return f"{ipaddress.IPv4Address(base)}/28"

@@ -76,7 +76,7 @@ def _cids(tests: Sequence[ResolvedTest], deployment: Deployment) -> list[int]:
 
 
 def isolation(spec: Spec, rig: Rig | None) -> str:
-    """What the spec writes, else what its rig needs, else a network of its own."""
+    """The isolation that the spec sets, else its rig's, else a network of its own."""
     return spec.isolation or (rig.isolation if rig else "network")
 
 
@@ -153,7 +153,7 @@ class _Builder:
 
     def _place(self, key: str, span: Span) -> None:
         if span.file == EMULATED_FILE:
-            return  # built in, nobody wrote it
+            return  # built in, so it has no place
         shown = self.shown.get(span.file)
         if shown is None:
             shown = self.shown[span.file] = self._shown(Path(span.file))
@@ -181,7 +181,7 @@ class _Builder:
         for service in services:
             if service.name in self.application.services:
                 use = next(u for u in self.spec.uses if u.name == service.name)
-                message = f"the application has a service '{service.name}' too"
+                message = f"the application also has a service '{service.name}'"
                 self.problems.append(Diagnostic(use.span, "service-taken", message, "rename the one in the test"))
 
     def _service(self, service: ResolvedService) -> Service:
@@ -234,6 +234,6 @@ def _devices(service: ResolvedService) -> tuple[str, ...]:
 
 
 def _setup_s(flags: Sequence[Flag], manifest: Manifest) -> float:
-    """How much longer than others a service may take to get ready, by the durations that its manifest marks."""
+    """The seconds beyond ``READY_S`` that a service may take to get ready: durations with ``setup-times``."""
     times = {name: parameter.setup_times for name, parameter in manifest.parameters.items()}
     return sum((times[flag.name] * float(flag.value) for flag in flags if times.get(flag.name)), 0.0)

@@ -19,7 +19,7 @@ _WALL_FACTOR, _WALL_SPARE_S = 10.0, 60.0
 def lockstep(
     spec: Spec, declared: Mapping[str, Declared | None], wall_timeout_s: float | None = None
 ) -> Lockstep | None:
-    """How a test steps, None in real time. By default its wall time may be much longer than its own."""
+    """The lockstep of a test, None in real time; its wall time is by default limited to ten timeouts and 60 s."""
     if spec.clock != "lockstep":
         return None
     readers = sum(own.readers for own in declared.values() if own)

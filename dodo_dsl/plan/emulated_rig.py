@@ -1,4 +1,4 @@
-"""What stands for a rig's hardware where the rig is emulated."""
+"""What replaces a rig's hardware where the rig is emulated."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,15 +14,15 @@ _SAME = (
     "cid",
 )  # fmt: skip
 _OTHER = {"exposure": "shutter", "scene.light": "exposure", "scene.clutter": "clutter", "scene.noise": "noise"}
-"""What the virtual camera calls otherwise."""
+"""Parameters that have another name in the virtual camera."""
 _STILL = (Flag("start-x", "0"), Flag("start-y", "0"), Flag("start-yaw", "0"))
 
 
 def hardware(service: Service, manifests: Mapping[str, Manifest], image: str) -> Service:
-    """The virtual camera in place of an emulated rig's; any other service as it is.
+    """The virtual camera for an emulated rig's camera; any other service unchanged.
 
-    It is the same camera to the application: the same memories, size, rate and place. The time that a picture is
-    exposed becomes the shutter's, and it stands at the map's origin until something moves it.
+    For the application it is the same camera, with the same memories, size, rate and pose. The exposure time becomes
+    the shutter's, and the camera is at the map's origin until something moves it.
     """
     given = {flag.name: flag for flag in service.flags}
     if service.uses != CAMERA or given.get("source") != Flag("source", SOURCE):

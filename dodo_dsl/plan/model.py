@@ -1,4 +1,4 @@
-"""The Plan: frozen, made of plain values, and final when it is built."""
+"""The Plan: frozen, of plain values, and final once it is built."""
 
 import re
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from dodo_dsl.spec import model as spec_model
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0
-"""How long every service may take to get ready."""
+"""The seconds that every service may take to get ready."""
 LAYERS = (*spec_model.LAYERS, "application")
 
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
@@ -27,8 +27,8 @@ class Flag:
 class Service:
     """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts.
 
-    ``devices`` are device files of the machine that it needs, ``setup_s`` the seconds that it may take to get ready
-    beyond those that every service has.
+    ``devices`` are the device files that it needs, ``setup_s`` the seconds that it may take to get ready beyond
+    ``READY_S``.
     """
 
     layer: str
@@ -44,7 +44,7 @@ class Service:
 
 @dataclass(frozen=True)
 class ApplicationService:
-    """A service under test; ``process`` is what starts it without containers, None when only an image can."""
+    """A service under test; ``process`` starts it without containers, None when only its image can."""
 
     name: str
     process: tuple[str, ...] | None = None
@@ -71,7 +71,7 @@ class Application:
 
 @dataclass(frozen=True)
 class Place:
-    """Where in a spec something was written; ``file`` is relative to the repository, or else to the registry."""
+    """A place in a spec; ``file`` is relative to the repository, or else to the registry."""
 
     file: str
     line: int
@@ -80,7 +80,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Lockstep:
-    """How a test in lockstep goes: how many processes read each picture, and its limit of wall time in seconds."""
+    """A test in lockstep: the number of processes that read each frame, and the limit of wall time in seconds."""
 
     readers: int
     wall_timeout_s: float
@@ -117,7 +117,7 @@ class Plan:
 
     @property
     def variables(self) -> dict[str, str]:
-        """Environment variables by which the test's services know their clock and that they are on a rig."""
+        """Environment variables that give the test's services their clock and their rig."""
         stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
         return {**stepped, **({"DODO_RIG": self.rig} if self.rig else {})}
 
@@ -134,5 +134,5 @@ class Suite:
 
 
 def is_device(path: str) -> bool:
-    """Whether a text is the path of a device file below /dev."""
+    """Whether a string is the path of a device file below /dev."""
     return bool(_DEVICE.fullmatch(path))

@@ -42,7 +42,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
     try:
         raw = json.loads(text)
         if raw.pop("dodo") != "plan" or raw.pop("version") != FORMAT:
-            raise PlanError(f"not a plan of version {FORMAT}; compile the test again")
+            raise PlanError(f"not a plan of version {FORMAT}")
         raw["services"] = tuple(_service(s) for s in raw["services"])
         application = raw["application"]
         application["services"] = tuple(_application_service(s) for s in application["services"])
@@ -60,17 +60,17 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
     except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
         raise PlanError(f"not a compiled test ({error}); compile it again") from error
     if problem:
-        raise PlanError(f"not a compiled test ({problem}); compile it again")
+        raise PlanError(f"not a compiled test (wrong {problem}); compile it again")
     return plan
 
 
 def _problem(plan: Plan) -> str:
-    """What no compiled test holds: JSON has no types of its own."""
+    """The first value that is wrong, or an empty string; JSON itself checks no types."""
     texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.rig, plan.application.folder)
     services: list[Service | ApplicationService] = [*plan.services, *plan.application.services]
     rules = {
         "slug": isinstance(plan.slug, str) and bool(SLUG.fullmatch(plan.slug)),
-        "a string": all(isinstance(text, str) and "\0" not in text for text in texts),
+        "string": all(isinstance(text, str) and "\0" not in text for text in texts),
         "level": plan.level in LEVELS,
         "isolation": plan.isolation in ("network", "host"),
         "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
@@ -78,16 +78,16 @@ def _problem(plan: Plan) -> str:
         "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
         "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
-        "a service's name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
-        "a service's layer": all(s.layer in LAYERS for s in plan.services),
-        "a flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
-        "a set-up": all(isinstance(s.setup_s, int | float) and 0 <= s.setup_s <= 86_400 for s in plan.services),
-        "a device": all(is_device(d) for s in plan.services for d in s.devices),
-        "a word": all(isinstance(w, str) for s in services for w in s.process or ())
+        "service name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
+        "service layer": all(s.layer in LAYERS for s in plan.services),
+        "flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
+        "set-up time": all(isinstance(s.setup_s, int | float) and 0 <= s.setup_s <= 86_400 for s in plan.services),
+        "device": all(is_device(d) for s in plan.services for d in s.devices),
+        "command": all(isinstance(w, str) for s in services for w in s.process or ())
         and all(isinstance(w, str) for s in plan.application.services for w in s.command),
-        "an environment": all(isinstance(s.environment, dict) for s in plan.application.services),
-        "a variable": all(isinstance(v, str) for v in plan.application.variables.values()),
-        "a file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
+        "environment": all(isinstance(s.environment, dict) for s in plan.application.services),
+        "variable": all(isinstance(v, str) for v in plan.application.variables.values()),
+        "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
 

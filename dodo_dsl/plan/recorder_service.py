@@ -18,7 +18,7 @@ _PARAMETER = re.compile(r"\{([a-z0-9.-]+)\}")
 def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> Service:
     """The recorder's service; ``record: {frames: ...}`` adds the frames of each camera.
 
-    A test on a rig has a snapshot of its first camera in any case.
+    A test on a rig always has a snapshot of its first camera.
     """
     spec = test.spec
     flags = [Flag("rec", RECORDING, "report")]
@@ -31,7 +31,7 @@ def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> Se
 
 
 def _memories(services: Iterable[ResolvedService]) -> Iterator[str]:
-    """One memory of each camera, I420 where it has that, as no colour is converted then; with its size if known."""
+    """One memory of each camera, with its size if known: I420 if there is one, which needs no conversion of colours."""
     for service in services:
         values = service.texts
         names = [_PARAMETER.sub(lambda m: values.get(m[1], ""), port) for port in _formats(service.manifest)]  # noqa: B023

@@ -1,4 +1,4 @@
-"""The Plans that a run carries out: each test as often as it is repeated."""
+"""The Plans of a run: each test as many times as it is repeated."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ from dodo_dsl.plan.model import Plan
 
 @dataclass(frozen=True)
 class Run:
-    """One repetition of a test; ``test`` is the slug that all of its repetitions share, and the compiled folder's."""
+    """One repetition of a test; ``test`` is the slug of all its repetitions, and of the compiled folder."""
 
     plan: Plan
     test: str

@@ -9,7 +9,7 @@ MAX_BYTES = 2 << 30
 
 
 class FilesError(ValueError):
-    """A path of a test holds what may not be copied."""
+    """Files of a test that cannot be copied."""
 
 
 @dataclass(frozen=True, order=True)
@@ -21,14 +21,14 @@ class Copy:
 
 
 def copies(path: Path, root: Path) -> list[Copy]:
-    """The file, or all files of the folder, below ``root``; raises FilesError for escaping links and masses."""
+    """The file, or all files of the folder, below ``root``; raises FilesError for links out of it or too many."""
     root = root.resolve()
     found: list[Copy] = []
     size = 0
     for file in _files(path):
         resolved = file.resolve()
         if not resolved.is_relative_to(root):
-            raise FilesError(f"'{file.relative_to(root)}' is a link that leaves the registry")
+            raise FilesError(f"'{file.relative_to(root)}' is a symbolic link that leaves the registry")
         size += resolved.stat().st_size
         found.append(Copy(file.relative_to(root).as_posix(), resolved))
         if len(found) > MAX_FILES or size > MAX_BYTES:

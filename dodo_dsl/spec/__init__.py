@@ -1,1 +1,1 @@
-"""What was written: specs, manifests and deployments, read with positions and checked against their schemas."""
+"""Specs, manifests and deployments, read with positions and checked against their schemas."""

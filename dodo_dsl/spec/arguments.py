@@ -1,4 +1,4 @@
-"""The arguments of a test's services: where the value of each parameter comes from, and what it is."""
+"""The arguments of a test's services: the value of each parameter, and where it comes from."""
 
 import functools
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
 class Argument:
     """A parameter's value as its flag carries it, converted once.
 
-    ``entry`` is where it is written, None for the manifest's default. ``value`` is None when nothing is given, or when
-    what is written does not fit, which ``problem`` then says.
+    ``entry`` is where it is written, None for the manifest's default. ``value`` is None when there is no value, or when
+    the written one does not fit, which ``problem`` then describes.
     """
 
     parameter: Parameter
@@ -45,7 +45,7 @@ class ResolvedService:
 
 
 def written(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Entry | None:
-    """What is written for a parameter: in its service, in another one that it is shared with, or in the rig."""
+    """The entry that sets a parameter: in its service, in another service that shares it, or in the rig."""
     own = use.parameters.get(parameter.name)
     if own is not None:
         return own

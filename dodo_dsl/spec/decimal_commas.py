@@ -10,7 +10,7 @@ _REST = re.compile(r"[0-9]{1,20}( ?[A-Za-z%][^ ]{0,10})?")
 
 
 def joined(node: Node) -> Node:
-    """The node with such values in one piece, as their author saw them."""
+    """The node with such values joined, as their author meant them."""
     if not isinstance(node, Mapping):
         return node
     entries: dict[str, Entry] = {}
@@ -29,7 +29,7 @@ def joined(node: Node) -> Node:
 
 
 def _continues(before: Scalar, key: str, entry: Entry) -> bool:
-    """Whether a key without a value stands right behind the comma of a number."""
+    """Whether a key without a value directly follows the comma of a number."""
     empty = isinstance(entry.value, Scalar) and entry.value.value is None and not entry.value.text
     place = (before.span.line, before.span.column + len(before.text) + 1)
     adjacent = (entry.key.line, entry.key.column) == place

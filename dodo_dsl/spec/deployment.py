@@ -17,7 +17,7 @@ _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<t
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
-_FROM_HERE = "paths count from the folder of dodo.yml"
+_FROM_HERE = "paths are relative to the folder of dodo.yml"
 _NETWORK = "for example 10.213.0.0/16"
 DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
@@ -89,7 +89,7 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
 
 
 def _texts(entry: Entry | None) -> Iterator[Scalar]:
-    """The texts of a list, or the one text that stands in its place."""
+    """The strings of a list, or the single string written instead of one."""
     value = entry.value if entry else None
     for item in value.items if isinstance(value, Sequence) else (value,):
         if isinstance(item, Scalar):
@@ -119,10 +119,10 @@ def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple
 
 
 def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnostic]) -> None:
-    """What keeps the deployment's messages from being used."""
+    """Problems of the deployment's ODVD files."""
     if not files or entry is None:
         return
-    from dodo_dsl.opendlv.messages.message_set import MessageSet  # not before it is needed: it takes its time to load
+    from dodo_dsl.opendlv.messages.message_set import MessageSet  # slow to load, and rarely needed
     from dodo_dsl.opendlv.odvd.parser import OdvdError
 
     try:
@@ -144,11 +144,11 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
         raw = plain(written.value)
         found = Rig(name, raw["kind"], raw["cid"], written.value)
         if name == rig.EMULATED:
-            message = f"the name '{name}' is that of the rig which every machine has"
-            problems.append(Diagnostic(written.key, "rig-name", message, "choose another"))
+            message = f"the name '{name}' is reserved for the built-in rig"
+            problems.append(Diagnostic(written.key, "rig-name", message, "choose another name"))
         elif raw["cid"] in taken or raw["cid"] in RESERVED_CIDS:
             owner = f"rig '{taken[raw['cid']]}'" if raw["cid"] in taken else "real cars"
-            message = f"CID {raw['cid']} is that of {owner}, every rig has one of its own"
+            message = f"CID {raw['cid']} is taken by {owner}, expected one that only this rig has"
             problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
         taken.setdefault(raw["cid"], name)
         rigs[name] = found
@@ -160,7 +160,7 @@ def _cids(entry: Entry | None, problems: list[Diagnostic]) -> tuple[int, ...]:
         return Deployment.cids
     low, high = (int(part) for part in entry.value.text.split("-"))
     if not 1 <= low <= high <= 254:
-        message = f"'{entry.value.text}' is no range of CIDs, expected numbers from 1 to 254, the lower one first"
+        message = f"'{entry.value.text}' is not a range of CIDs, expected numbers from 1 to 254, the lower one first"
         problems.append(Diagnostic(entry.value.span, "out-of-range", message))
         return Deployment.cids
     return tuple(cid for cid in range(low, high + 1) if cid not in RESERVED_CIDS)
@@ -172,7 +172,7 @@ def _subnets(entry: Entry | None, problems: list[Diagnostic]) -> ipaddress.IPv4N
     try:
         network = ipaddress.IPv4Network(entry.value.text)
     except ValueError as error:
-        problems.append(Diagnostic(entry.value.span, "wrong-value", f"no IPv4 network: {error}", _NETWORK))
+        problems.append(Diagnostic(entry.value.span, "wrong-value", f"not an IPv4 network: {error}", _NETWORK))
         return DEFAULT_SUBNETS
     if network.prefixlen > 28:
         message = f"'{entry.value.text}' is too small, every test needs a /28"

@@ -1,7 +1,7 @@
-"""What editors complete and explain: the services and their parameters, put into the schema of specs.
+"""What editors complete and explain: the services and their parameters, added to the schema of specs.
 
-Only `$defs.use.allOf` and the `$defs` named `with-...` are made here. DoDo drops the former when it validates, as its
-rules say the same in better words. ``scripts/make-schema`` writes the file again.
+Only `$defs.use.allOf` and the `$defs` named `with-...` are generated. DoDo validates without the former, because its
+rules give better messages. ``scripts/make-schema`` writes the file.
 """
 
 import json
@@ -30,7 +30,7 @@ def path() -> Path:
 
 
 def generate(text: str, manifests: Mapping[str, Manifest]) -> str:
-    """The text of the schema with what editors know of these services; the same for the same manifests."""
+    """The text of the schema with these services and their parameters."""
     schema = json.loads(text)
     offered = [m for _, m in sorted(manifests.items()) if _is_offered(m)]
     definitions = {k: v for k, v in schema["$defs"].items() if not k.startswith(PREFIX)}
@@ -40,13 +40,13 @@ def generate(text: str, manifests: Mapping[str, Manifest]) -> str:
 
 
 def _is_offered(manifest: Manifest) -> bool:
-    """Whether authors write the service: it is not one that DoDo adds by itself."""
+    """Whether specs use the service, as DoDo does not add it by itself."""
     node, _ = read(manifest.folder / "service.yml")
     return node is not None and not plain(node).get("automatic", False)
 
 
 def _uses(manifests: Iterable[Manifest]) -> Schema:
-    """The shipped services by name; a deployment's own have any other."""
+    """The shipped services by name, and any other name for a deployment's own."""
     known = [{"const": m.name, "description": f"{m.description} Layer: {' or '.join(m.layers)}."} for m in manifests]
     own = {"type": "string", "description": "A service of your own, from a folder under 'services' of dodo.yml."}
     return {"properties": {"uses": {"anyOf": [*known, own]}}}
@@ -92,7 +92,7 @@ def _description(parameter: Parameter) -> str:
     if parameter.required and not parameter.rig and not parameter.shared:
         facts.append("Required.")
     if parameter.rig:
-        facts.append(f"When not written, the rig's {parameter.rig}.")
+        facts.append(f"Defaults to the rig's {parameter.rig}.")
     return " ".join(facts)
 
 
@@ -103,7 +103,7 @@ def _written(parameter: Parameter, value: Any) -> Any:
 
 
 def _value(parameter: Parameter) -> Schema:
-    """What may be written: the value itself, or a choice of the matrix in its place."""
+    """The allowed values: the value itself, or a placeholder of the matrix."""
     if parameter.choices:
         return {"anyOf": [{"enum": list(parameter.choices)}, _MATRIX]}
     if parameter.type in ("number", "integer"):
@@ -137,7 +137,7 @@ def _converts(written: str, unit: str) -> bool:
 
 
 def write(file: Path | None = None) -> None:
-    """Makes the schema's file again, of the shipped services."""
+    """Generates the schema's file from the shipped services."""
     target = file or path()
     target.write_text(generate(target.read_text(encoding="utf-8"), load_manifests()[0]), encoding="utf-8")
 

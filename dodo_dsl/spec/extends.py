@@ -14,15 +14,15 @@ _USES = "uses"
 
 
 def resolve(node: Node, file: Path, root: Path) -> tuple[Node, list[Diagnostic]]:
-    """The spec with everything that it extends merged below it; spans keep the file that each value was written in.
+    """The spec merged over everything that it extends; spans keep the file that each value was written in.
 
-    ``root`` is the registry's, which no file of the chain may leave.
+    ``root`` is the registry's folder, which holds all files of the chain.
     """
     return _resolve(node, (file,), root.resolve())
 
 
 def is_text(node: Node) -> bool:
-    """Whether what is extended can be read as a path, or nothing is."""
+    """Whether the spec extends nothing, or a string that could be a path."""
     written = node.get(KEY) if isinstance(node, Mapping) else None
     return written is None or (isinstance(written, Scalar) and isinstance(written.value, str))
 
@@ -30,17 +30,17 @@ def is_text(node: Node) -> bool:
 def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, list[Diagnostic]]:
     written = node.get(KEY) if isinstance(node, Mapping) else None
     if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not is_text(node):
-        return node, []  # the schema says so
+        return node, []  # reported by the schema
     path = path_of(chain[-1].parent, written.text)
     if path is None:
-        return node, [Diagnostic(written.span, "extends-file", f"'{written.text[:60]}' is no path")]
+        return node, [Diagnostic(written.span, "extends-file", f"'{written.text[:60]}' is not a path")]
     problem = _problem(written, path, chain, root)
     if problem:
         return node, [problem]
     base, found = _read(path)
     if not isinstance(base, Mapping):
         if not found:
-            found = (Diagnostic(written.span, "extends-file", f"'{written.text}' holds no test"),)
+            found = (Diagnostic(written.span, "extends-file", f"'{written.text}' does not contain a test"),)
         return node, list(found)
     below, deeper = _resolve(base, (*chain, path), root)
     problems = [*found, *deeper]
@@ -59,12 +59,12 @@ def _read(path: Path) -> tuple[Node | None, tuple[Diagnostic, ...]]:
 def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -> Diagnostic | None:
     if not path.is_relative_to(root):
         message = f"'{written.text}' leaves the registry"
-        return Diagnostic(written.span, "path-escape", message, "a test extends tests of its own registry")
+        return Diagnostic(written.span, "path-escape", message, "a test can only extend tests of its own registry")
     if path in chain:
         names = " extends ".join(p.name for p in (*chain[chain.index(path) :], path))
         return Diagnostic(written.span, "extends-cycle", f"the test extends itself: {names}")
     if len(chain) > MAX_CHAIN:
-        return Diagnostic(written.span, "extends-cycle", f"more than {MAX_CHAIN} tests extend one another")
+        return Diagnostic(written.span, "extends-cycle", f"the chain of extended tests is longer than {MAX_CHAIN}")
     if path.is_dir():
         specs = sorted(p.name for p in path.glob("*.dodo.yml"))[:6]
         hint = f"write '{written.text}/{specs[0]}'" if len(specs) == 1 else ""
@@ -91,7 +91,7 @@ def _merge(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int
 
 
 def _merged(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int) -> Mapping:
-    """A service that uses another program than the base's starts afresh: the base's parameters are not for it."""
+    """A service with another ``uses`` replaces the base's: the base's parameters do not apply to it."""
     before, after = base.get(_USES), child.get(_USES)
     if depth == 1 and after is not None and _text(before) != _text(after):
         return child
@@ -103,5 +103,5 @@ def _text(node: Node | None) -> str | None:
 
 
 def _nothing(key: str, span: Span, base: Mapping) -> Diagnostic:
-    message = f"'{key}' is empty, which removes it, but {shown_path(base.span.file)} has none"
+    message = f"'{key}' is empty, which would remove it, but {shown_path(base.span.file)} has no such key"
     return Diagnostic(span, "extends-nothing", message, did_you_mean(key, base.entries))

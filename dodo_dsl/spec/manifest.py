@@ -1,4 +1,4 @@
-"""Service manifests: what a service is, where it may stand, its parameters and its ports."""
+"""Service manifests: a service with its layers, parameters and ports."""
 
 import functools
 from dataclasses import dataclass, field
@@ -17,10 +17,10 @@ Value = str | int | float | bool | list[str | int | float] | None
 class Parameter:
     """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number.
 
-    ``rig`` is the dotted key of what the test's rig gives when nothing is written; ``among`` names the parameter and
-    the list of a JSON file (``map-path.obstacles``) whose entries' names are the values that can stand here;
-    ``within_timeout`` marks a duration that the test's timeout must leave room for; one with ``setup_times`` may pass
-    so often before the service is ready.
+    ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names a path parameter and a list of
+    its JSON file (``map-path.obstacles``), whose entries' names are the allowed values; ``within_timeout`` marks a
+    duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
+    service is ready.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Ports:
-    """Names that a service reads (``inputs``) and writes (``outputs``); ``{parameter}`` stands for its value."""
+    """Names that a service reads (``inputs``) and writes (``outputs``); ``{parameter}`` is replaced by its value."""
 
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ class Ports:
 
 @dataclass(frozen=True)
 class Manifest:
-    """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to try it alone with, if any."""
+    """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None."""
 
     folder: Path
     name: str
@@ -71,10 +71,10 @@ def _ports(raw: dict[str, list[str]] | None) -> Ports:
 
 
 def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
-    """The manifest of a ``service.yml`` and what is wrong with it."""
+    """The manifest of a ``service.yml`` and its problems."""
     node, found = read(path)
     if node is None and not found:
-        found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected a service")]
+        found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected a service's manifest")]
     if node is not None:
         found = [*found, *validate(node, "service")]
     if isinstance(node, Mapping) and not has_errors(found):
@@ -119,11 +119,10 @@ def load_manifests(folders: tuple[Path, ...] = ()) -> tuple[dict[str, Manifest],
             found.extend(problems)
             if manifest and manifest.name in manifests:
                 other = manifests[manifest.name].folder
-                where = (
-                    "among DoDo's own" if other.parent == package_data.services() else f"in {shown_path(str(other))}"
-                )
-                message = f"the service '{manifest.name}' is {where} already"
-                found.append(Diagnostic(Span(str(path)), "name-taken", message, "give it a name of its own"))
+                is_shipped = other.parent == package_data.services()
+                owner = "a service of DoDo" if is_shipped else f"the service in {shown_path(str(other))}"
+                message = f"the name '{manifest.name}' is taken by {owner}"
+                found.append(Diagnostic(Span(str(path)), "name-taken", message, "choose another name"))
             elif manifest:
                 manifests[manifest.name] = manifest
     return manifests, tuple(found)

@@ -1,4 +1,4 @@
-"""``wrong-manifest``: what a manifest's schema cannot say, as it is about two places of the manifest at once."""
+"""``wrong-manifest``: what concerns two places of a manifest, so that its schema cannot express it."""
 
 import re
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ _DEFAULTS: dict[str, tuple[type, ...]] = {
 
 
 def problems(node: Mapping) -> Iterator[Diagnostic]:
-    """Ports, defaults, bounds and references of a manifest that its schema found nothing wrong with."""
+    """Problems of ports, defaults, bounds and references in a manifest that its schema accepts."""
     parameters = node.get("parameters")
     entries = parameters.entries if isinstance(parameters, Mapping) else {}
     types = {name: str(plain(entry.value)["type"]) for name, entry in entries.items()}
@@ -33,7 +33,7 @@ def problems(node: Mapping) -> Iterator[Diagnostic]:
             yield from _ports(written, types)
     for name, entry in entries.items():
         if name in RESERVED:
-            message = f"'--{name}' is a flag of every service, so no parameter can have its name"
+            message = f"'--{name}' is a flag of every service, so it cannot name a parameter"
             yield Diagnostic(entry.key, RULE, message, "choose another name")
         if isinstance(entry.value, Mapping):
             yield from _parameter(name, entry.value, types)
@@ -45,7 +45,7 @@ def _ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:
             continue
         for match in _PLACEHOLDER.finditer(scalar.text):
             if match["name"] not in types:
-                message = f"'{scalar.text}' names the parameter '{match['name']}', which there is not"
+                message = f"'{scalar.text}' names the unknown parameter '{match['name']}'"
                 yield Diagnostic(scalar.span, RULE, message, did_you_mean(match["name"], types))
 
 
@@ -59,7 +59,7 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
         yield _misplaced(node, "choices", f"'choices' are for strings and lists, but '{name}' is of type {kind}")
     for key in ("within-timeout", "setup-times"):
         if raw.get(key) and raw.get("unit") != "s":
-            yield _misplaced(node, key, f"'{name}' is no duration", "give it 'unit: s'")
+            yield _misplaced(node, key, f"'{name}' is not a duration", "add 'unit: s'")
     if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
         yield _misplaced(node, "minimum", f"the minimum of '{name}' is larger than its maximum")
     source = str(raw.get("among", "")).partition(".")[0]
@@ -74,14 +74,14 @@ def _default(name: str, node: Mapping, raw: dict[str, Any]) -> Iterator[Diagnost
         return
     kind, default = raw["type"], raw["default"]
     if kind == "path":
-        yield _misplaced(node, "default", f"'{name}' is a path of a test, so it can have no default")
+        yield _misplaced(node, "default", f"'{name}' is a path in a test, so it cannot have a default")
         return
     if not isinstance(default, _DEFAULTS[kind]) or (isinstance(default, bool) and kind != "boolean"):
-        yield _misplaced(node, "default", f"the default of '{name}' is no {kind}")
+        yield _misplaced(node, "default", f"the default of '{name}' is not of type {kind}")
     elif kind in _NUMBERS and not raw.get("minimum", default) <= default <= raw.get("maximum", default):
         yield _misplaced(node, "default", f"the default of '{name}' is not between its minimum and its maximum")
     elif kind == "string" and default not in raw.get("choices", [default]):
-        yield _misplaced(node, "default", f"the default of '{name}' is none of its choices")
+        yield _misplaced(node, "default", f"the default of '{name}' is not one of its choices")
 
 
 def _misplaced(node: Mapping, key: str, message: str, hint: str = "") -> Diagnostic:

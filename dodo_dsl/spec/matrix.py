@@ -1,4 +1,4 @@
-"""``matrix``: one spec, an instance for each choice of its values; ``${matrix.light}`` stands for the chosen one."""
+"""``matrix``: an instance of a spec for each choice of values, which replace placeholders as ``${matrix.light}``."""
 
 import itertools
 import re
@@ -41,9 +41,9 @@ def _slug(text: str) -> str:
 
 
 def choices(node: Node) -> tuple[list[Choice], list[Diagnostic]]:
-    """Every choice of a spec's matrix (one, empty, without a matrix), and what is wrong with its values.
+    """Every choice of a spec's matrix (one, empty, without a matrix), and the problems of its values.
 
-    What the schema finds wrong with the matrix itself is left to it.
+    Problems that the schema reports are left out.
     """
     entry = node.entries.get(KEY) if isinstance(node, Mapping) else None
     if entry is None or not isinstance(entry.value, Mapping):
@@ -64,8 +64,10 @@ def choices(node: Node) -> tuple[list[Choice], list[Diagnostic]]:
     names = tuple(dimensions)
     product = [Choice(tuple(zip(names, values, strict=True))) for values in itertools.product(*dimensions.values())]
     if product and len(product[0].slug) > MAX_SLUG:
-        message = f"names and values make folders' names longer than {MAX_SLUG} characters: '{product[0].slug[:40]}...'"
-        found.append(Diagnostic(entry.key, "matrix-size", message, "shorten them, or use fewer of them"))
+        message = (
+            f"the names of the instances' folders are longer than {MAX_SLUG} characters: '{product[0].slug[:40]}...'"
+        )
+        found.append(Diagnostic(entry.key, "matrix-size", message, "use shorter or fewer names and values"))
     return product or [Choice()], found
 
 
@@ -74,7 +76,7 @@ def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
     for value in values:
         slug = _slug(value.text)
         if not slug:
-            message = f"'{value.text}' has no letter or digit to name an instance of '{name}' by"
+            message = f"'{value.text}' has no letter or digit, so it cannot name an instance of '{name}'"
             yield Diagnostic(value.span, "matrix-value", message)
         elif slug in seen:
             message = f"'{value.text}' and '{seen[slug].text}' of '{name}' would both be called '{slug}'"
@@ -83,12 +85,12 @@ def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
 
 
 def placeholders(node: Node) -> set[str]:
-    """The dimensions that the values below a node ask for."""
+    """The dimensions that placeholders below a node name."""
     return {m["name"] for n in walk(node) if isinstance(n, Scalar) for m in _PLACEHOLDER.finditer(n.text)}
 
 
 def problems(node: Mapping) -> Iterator[Diagnostic]:
-    """Placeholders that mean no dimension, and dimensions that nothing asks for."""
+    """Placeholders of unknown dimensions, and dimensions without placeholders."""
     entry = node.entries.get(KEY)
     dimensions = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
     used: set[str] = set()
@@ -101,7 +103,7 @@ def problems(node: Mapping) -> Iterator[Diagnostic]:
                 yield from _unknown(scalar, dimensions)
     for name, dimension in dimensions.items():
         if name not in used:
-            message = f"nothing asks for ${{matrix.{name}}}, so its instances are all the same"
+            message = f"nothing uses ${{matrix.{name}}}, so its instances are all the same"
             yield Diagnostic(dimension.key, "matrix-unused", message, severity="warning")
 
 
@@ -109,15 +111,15 @@ def _unknown(scalar: Scalar, dimensions: dict[str, Entry]) -> Iterator[Diagnosti
     for attempt in _ATTEMPT.finditer(scalar.text):
         match = _PLACEHOLDER.fullmatch(attempt[0])
         if match is None:
-            message = f"'{attempt[0][:60]}' is no placeholder, expected one such as ${{matrix.light}}"
+            message = f"'{attempt[0][:60]}' is not a placeholder, expected one such as ${{matrix.light}}"
             yield Diagnostic(scalar.span, "matrix-unknown", message)
         elif match["name"] not in dimensions:
-            hint = did_you_mean(match["name"], dimensions) if dimensions else "write 'matrix:' with its values"
-            yield Diagnostic(scalar.span, "matrix-unknown", f"the matrix has no '{match['name']}'", hint)
+            hint = did_you_mean(match["name"], dimensions) if dimensions else "add it with its values under 'matrix'"
+            yield Diagnostic(scalar.span, "matrix-unknown", f"the matrix has no dimension '{match['name']}'", hint)
 
 
 def substitute(node: Node, choice: Choice) -> Node:
-    """The node with the choice's values in place of the placeholders; what has none stays the same object."""
+    """The node with the choice's values for the placeholders; nodes without placeholders stay the same objects."""
     return _substitute(node, dict(choice.values)) if choice.values else node
 
 

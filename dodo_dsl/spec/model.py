@@ -1,4 +1,4 @@
-"""A spec as it was written: fields that are missing or of a wrong type are None and stand in the diagnostics."""
+"""A spec as it was written: fields that are missing or of a wrong type are None, and diagnostics report them."""
 
 import itertools
 import math
@@ -20,7 +20,7 @@ LEVELS = ("sil", "dil", "hil")
 KINDS = ("perception", "open-loop", "closed-loop")
 _MAPPINGS = (*LAYERS, matrix.KEY, "record")
 MAX_SERVICES = 100
-"""Of a layer, as the schema has it."""
+"""In a layer, as in the schema."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
     ``isolation`` is None where the spec leaves it to the rig, ``frames_hz`` is 0 where no frames are recorded.
-    ``is_whole`` is False where services could not be read, so that what is missing says nothing.
+    ``is_whole`` is False where services could not be read, so that missing producers are not reported.
     """
 
     location: Location
@@ -77,7 +77,7 @@ class Spec:
 
 
 def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
-    """The instances of a file, as far as it can be read, and everything that its schema finds wrong."""
+    """The instances of a file, as far as it can be read, and its problems."""
     node, found = read(location.path)
     if node is None:
         if not found:
@@ -105,12 +105,12 @@ def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
 
 
 def _is_missing(diagnostic: Diagnostic, node: Node) -> bool:
-    """Whether a key is missing in the test itself, which may well stand in what it extends."""
+    """Whether a key is missing in the test itself, which the test that it extends may have."""
     return diagnostic.rule == "missing-key" and diagnostic.span == node.span
 
 
 def _only_in_parameters(node: Mapping) -> bool:
-    """Whether all placeholders stand under ``with``: rules look at those values, so one instance's schema is all's."""
+    """Whether all placeholders are under ``with``: rules check those values, so one instance's schema suffices."""
     for key, entry in node.entries.items():
         if key in LAYERS and isinstance(entry.value, Mapping):
             for use in entry.value.entries.values():
@@ -126,7 +126,7 @@ def _without_parameters(use: Mapping) -> Mapping:
 
 
 def _number(node: Node | None, unit: str) -> float | None:
-    """A quantity in its unit, or None when it is none (and the schema says so)."""
+    """A quantity in its unit, or None when it is not one, which the schema reports."""
     try:
         return float(quantity.convert(node.text, unit)) if isinstance(node, Scalar) else None
     except quantity.QuantityError:
@@ -178,12 +178,12 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
 
 
 def _has_stranger(node: Mapping) -> bool:
-    """Whether an unknown key holds a mapping, which is likely a layer with a misspelt name."""
+    """Whether an unknown key holds a mapping, most likely a layer with a misspelt name."""
     return any(k not in _MAPPINGS and isinstance(e.value, Mapping) for k, e in node.entries.items())
 
 
 def _written_services(node: Mapping) -> int:
-    """How many services are written, a layer that is no mapping being one that cannot be read."""
+    """The number of services written; a layer that is not a mapping counts as one, which cannot be read."""
     layers = [layer for name in LAYERS if (layer := node.get(name)) is not None]
     return sum(len(layer.entries) if isinstance(layer, Mapping) else 1 for layer in layers)
 

@@ -6,7 +6,7 @@ from decimal import Decimal, InvalidOperation, localcontext
 from dodo_dsl.diagnostics import did_you_mean
 
 SHARE = "1"
-"""The unit of shares: the one that is not written, 0.5 being 50 %."""
+"""The unit of shares, which need none: 0.5 is 50 %."""
 
 _PI = Decimal("3.14159265358979323846264338328")
 _FACTORS: dict[str, dict[str, Decimal]] = {
@@ -38,7 +38,7 @@ UNITS = tuple(_DIMENSION)
 
 
 class QuantityError(ValueError):
-    """A value is no quantity of the wanted unit; ``hint`` names the way out."""
+    """A value is not a quantity in the expected unit; ``hint`` suggests one."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -54,7 +54,7 @@ def _example(number: str, unit: str) -> str:
 
 
 def convert(value: object, unit: str) -> Decimal:
-    """The number of ``unit`` that a written value such as ``"9.5 cm"`` stands for.
+    """A written value such as ``"9.5 cm"`` as a number of ``unit``.
 
     Raises QuantityError for a bare number, an unknown unit and a unit of another dimension.
     """
@@ -65,7 +65,7 @@ def convert(value: object, unit: str) -> Decimal:
         raise QuantityError(f"'{text[:20]}...' is not a quantity in {unit}", _example("1", unit))
     match = _QUANTITY.fullmatch(text)
     if unit == SHARE and (not match or _DIMENSION.get(match["unit"] or SHARE) != "share"):
-        raise QuantityError(f"'{text}' is no share", "write for example 0.5 or 50 %")
+        raise QuantityError(f"'{text}' is not a share", "write for example 0.5 or 50 %")
     if not match:
         point = text.replace(",", ".", 1)
         hint = f"write '{point}', with a point" if _QUANTITY.fullmatch(point) else _example("1", unit)

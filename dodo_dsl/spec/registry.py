@@ -26,7 +26,7 @@ def _specs_below(folder: Path) -> Iterator[Path]:
 
 
 def _root_of(path: Path, registries: Sequence[Path]) -> Path:
-    """The registry that holds a spec; for a spec outside all, the folder that its own folder stands in."""
+    """The registry that holds a spec; for a spec outside all, the parent of its own folder."""
     for registry in registries:
         if path.is_relative_to(registry):
             return registry
@@ -35,7 +35,7 @@ def _root_of(path: Path, registries: Sequence[Path]) -> Path:
 
 
 def _root_below(path: Path, folder: Path, registries: Sequence[Path]) -> Path:
-    """The root of a spec that was found below a folder: the folder itself where that is higher than its own root."""
+    """The root of a spec found below a folder: the folder itself where it is above the spec's own root."""
     root = _root_of(path, registries)
     return folder if root.is_relative_to(folder) and root not in registries else root
 
@@ -43,9 +43,9 @@ def _root_below(path: Path, folder: Path, registries: Sequence[Path]) -> Path:
 def locate(
     paths: Iterable[Path], registries: Sequence[Path], others: Sequence[Path] = ()
 ) -> tuple[list[Location], list[Path]]:
-    """The specs that are or lie below ``paths`` (all ``registries`` without any), and the paths that hold none.
+    """The specs at or below ``paths`` (all ``registries`` without any), and the paths without specs.
 
-    ``others`` are registries too, whose specs are not meant by themselves.
+    ``others`` are further registries, which are only the roots of specs.
     """
     own = [r.resolve() for r in registries]
     roots = [*own, *(r.resolve() for r in others)]

@@ -30,22 +30,22 @@ class Rig:
 
     @property
     def tag(self) -> str:
-        """The GitLab runner's: the emulated rig runs wherever simulations do."""
+        """The tag of its GitLab runner; the emulated rig runs wherever simulations do."""
         return "sil" if self.is_emulated else f"hil-{self.kind}"
 
     @property
     def isolation(self) -> str:
-        """Hardware is reached through the host; what is emulated needs none of it."""
+        """``host`` for hardware, which is reached through the host, ``network`` for the emulated rig."""
         return "network" if self.is_emulated else "host"
 
     @property
     def privileged(self) -> bool:
-        """Whether the deployment lets an application's privileged services be so on this rig."""
+        """Whether services of an application may be privileged on this rig."""
         node = self.node.get("privileged")
         return isinstance(node, Scalar) and node.value is True
 
     def entry(self, key: str) -> Entry | None:
-        """What the rig has at a dotted key such as ``camera.width``."""
+        """The rig's entry at a dotted key such as ``camera.width``."""
         node: Node = self.node
         entry = None
         for part in key.split("."):

@@ -1,4 +1,4 @@
-"""JSON Schema errors as diagnostics at the line and column of the value they mean."""
+"""JSON Schema errors as diagnostics at the line and column of their value."""
 
 import functools
 import itertools
@@ -16,11 +16,11 @@ _UNIT = "x-unit"
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
     "array": "a list",
-    "string": "a text",
+    "string": "a string",
     "integer": "a whole number",
     "number": "a number",
     "boolean": "true or false",
-    "null": "nothing",
+    "null": "no value",
 }
 
 
@@ -37,7 +37,7 @@ def _validator(name: str) -> Any:
             yield ValidationError(str(error))
 
     schema = json.loads((package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
-    schema.get("$defs", {}).get("use", {}).pop("allOf", None)  # for editors; here the rules say it, and better
+    schema.get("$defs", {}).get("use", {}).pop("allOf", None)  # for editors; the rules give better messages
     return extend(Draft202012Validator, {_UNIT: is_quantity})(schema)  # type: ignore[no-untyped-call]
 
 
@@ -56,7 +56,7 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
 def _tags(node: Node) -> Iterator[Diagnostic]:
     if node.tag:
         tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-        yield Diagnostic(node.span, "yaml-tag", f"tag '{tag}' has no meaning here", "remove it; values are plain")
+        yield Diagnostic(node.span, "yaml-tag", f"tag '{tag}' is not supported", "remove the tag")
     if isinstance(node, Mapping):
         for entry in node.entries.values():
             yield from _tags(entry.value)
@@ -66,7 +66,7 @@ def _tags(node: Node) -> Iterator[Diagnostic]:
 
 
 class _Place:
-    """A node with the span that a reader expects: its own, or its key's where the value is a collection."""
+    """A node with the span to report: its own, or its key's where the value is a collection."""
 
     def __init__(self, node: Node, key: Span | None, name: str) -> None:
         self.node = node
@@ -141,7 +141,7 @@ def _quantity(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
     choices = [str(v) for v in error.validator_value]
-    message = f"{_shown(error.instance)} is no value of {place.name}, expected {', '.join(choices)}"
+    message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(choices)}"
     hint = did_you_mean(str(error.instance), choices)
     yield Diagnostic(place.span, "wrong-value", message, hint if hint.startswith("did") else "")
 
@@ -153,7 +153,7 @@ def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    expected = error.schema.get("x-expect", f"text that matches {error.schema.get('pattern')}")
+    expected = error.schema.get("x-expect", f"a string that matches {error.schema.get('pattern')}")
     span = place.span
     if "propertyNames" in error.absolute_schema_path:
         span = place.key(str(error.instance))
@@ -162,7 +162,7 @@ def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
         plain_name = re.sub(r"[^a-z0-9]+", "-", error.instance.lower()).strip("-")
         fits = re.search(error.schema.get("pattern", ""), plain_name[:40])
         hint = f"for example '{plain_name[:40]}'" if fits and plain_name not in ("", error.instance) else ""
-    yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} cannot stand here, expected {expected}", hint)
+    yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} is not allowed here, expected {expected}", hint)
 
 
 def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -172,7 +172,7 @@ def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _too_few(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    expected = "a text" if isinstance(error.instance, str) else "at least one entry"
+    expected = "a string" if isinstance(error.instance, str) else "at least one entry"
     yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected {expected}")
 
 

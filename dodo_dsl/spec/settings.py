@@ -1,4 +1,4 @@
-"""What a command line sets in place of the specs, read before anything is checked or built."""
+"""Settings of the command line, which override the specs before anything is checked or built."""
 
 from dataclasses import dataclass, replace
 
@@ -7,7 +7,7 @@ from dodo_dsl.spec.model import Spec
 
 @dataclass(frozen=True)
 class Settings:
-    """Inputs of a compilation; None keeps what the specs say.
+    """Inputs of a compilation; None keeps the value of the specs.
 
     ``wall_timeout_s`` limits the wall time of a test in lockstep, in seconds. ``repeat`` is how often each test runs.
     """
@@ -20,7 +20,7 @@ class Settings:
 
 
 def applied(spec: Spec, settings: Settings) -> Spec:
-    """The spec as it is to be checked and built; hardware keeps its clock."""
+    """The spec with the settings; a test on hardware keeps its clock."""
     if settings.clock and spec.level != "hil":
         spec = replace(spec, clock=settings.clock)
     if settings.isolation:

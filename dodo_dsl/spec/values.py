@@ -1,4 +1,4 @@
-"""A parameter's value as written in a spec, converted to what the service's flag carries."""
+"""A parameter's value as written in a spec, converted to the value of the service's flag."""
 
 import re
 from collections.abc import Callable
@@ -21,7 +21,7 @@ _MAX_TEXT = 4096
 
 @dataclass(frozen=True)
 class Value:
-    """What a flag carries: text, the absolute path of a file of the registry, or a shared memory's name."""
+    """A flag's value: a string, the absolute path of a file of the registry, or a shared memory's name."""
 
     text: str
     kind: Kind = "text"
@@ -37,12 +37,12 @@ class ValueProblem(Exception):
 
 
 def convert(parameter: Parameter, node: Node, root: Path) -> Value:
-    """The flag's value; raises ValueProblem at the place of what does not fit. Paths stay below ``root``."""
+    """The flag's value; raises ValueProblem where a value does not fit. Paths stay below ``root``."""
     return _CONVERTERS[parameter.type](parameter, node, root)
 
 
 def default_value(parameter: Parameter) -> Value | None:
-    """The manifest's default as the flag carries it."""
+    """The manifest's default as the flag's value."""
     default = parameter.default
     if default is None:
         return None
@@ -154,7 +154,7 @@ def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     for item in items:
         text = _text(parameter, item, root).text
         if "," in text:
-            message = f"{_name(parameter)}: '{text}' may not hold a comma"
+            message = f"{_name(parameter)}: '{text}' must not contain a comma"
             raise ValueProblem(item.span, "wrong-value", message, "write two items: [left, right]")
         texts.append(text)
     return Value(",".join(texts))
@@ -173,7 +173,7 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
         raise ValueProblem(scalar.span, "missing-file", message)
     if not target.is_relative_to(root.resolve()):
         message = f"{_name(parameter)}: '{scalar.text}' leaves the registry"
-        raise ValueProblem(scalar.span, "path-escape", message, "files of a test lie in its registry")
+        raise ValueProblem(scalar.span, "path-escape", message, "the files of a test must be in its registry")
     if not target.exists():
         beside = [p.name for p in target.parent.iterdir()] if target.parent.is_dir() else []
         message = f"{_name(parameter)}: there is no file or folder '{scalar.text}'"

@@ -70,7 +70,7 @@ def test_own_network(tmp_path: Path) -> None:
     }
     assert "perception: --cid=140" in application.changes
     assert "steering: OD4SESSION_CID=140" in application.changes
-    assert "steering: ports removed, nothing is published" in application.changes
+    assert "steering: ports removed, tests publish none" in application.changes
 
 
 def test_host_network_keeps_what_is_host(tmp_path: Path) -> None:

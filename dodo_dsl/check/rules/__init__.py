@@ -1,1 +1,1 @@
-"""One rule a module; each yields diagnostics under the names that its docstring explains."""
+"""One concern per module; each yields diagnostics of the rules that its docstring explains."""

@@ -20,5 +20,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _known(context: Context, name: str, span: Span) -> Iterator[Diagnostic]:
     if name and name not in context.messages:
-        hint = did_you_mean(name, context.messages) or "messages of your own: 'messages:' in dodo.yml"
+        hint = did_you_mean(name, context.messages) or "add the files of your own messages under 'messages' in dodo.yml"
         yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint)

@@ -45,4 +45,4 @@ def check(context: Context) -> Iterator[Diagnostic]:
     others = [other for other in context.by_name[spec.name] if other.path != spec.path]
     if others:
         message = f"the name '{spec.name}' is taken by {shown_path(str(others[0].path))}"
-        yield Diagnostic(spec.span("name"), "name-taken", message, "names are unique over all registries")
+        yield Diagnostic(spec.span("name"), "name-taken", message, "names are unique across all registries")

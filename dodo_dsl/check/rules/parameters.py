@@ -54,7 +54,7 @@ def _missing(context: Context, service: ResolvedService) -> Iterator[Diagnostic]
         if parameter.rig and context.rig:
             hint += f", or give the rig '{context.rig.name}' its '{parameter.rig}'"
         if len(givers) > 1:
-            hint = f"{' and '.join(givers.values())} give different values, so write the one that counts"
+            hint = f"{' and '.join(givers.values())} give different values, so write the one to use"
         yield Diagnostic(use.span, "missing-parameter", message, hint)
 
 

@@ -1,7 +1,7 @@
 """Each message or memory that a service consumes has a producer in the test, or is required of the application.
 
 ``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
-message and sender stamp or of one memory, ``application-input`` (the application consumes what nobody produces).
+message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces).
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from dodo_dsl.spec.manifest import Manifest
 def check(context: Context) -> Iterator[Diagnostic]:
     fits = all(service.use.layer in service.manifest.layers for service in context.services)
     if not context.spec.is_whole or not context.test.is_complete or not fits:
-        return  # services that are unknown or in a wrong layer are to be mended first
+        return  # unknown services and wrong layers come first
     wiring = context.wiring
     misspelt = any(e.port.name not in context.messages for e in wiring.application_produces if e.port.kind == "message")
     for end in wiring.consumed:
@@ -31,7 +31,7 @@ def _unsatisfied(context: Context, wiring: Wiring, end: End) -> Diagnostic:
     rule = "no-sample" if end.layer == "evaluation" else "no-producer"
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
-        message = f"'{end.service}' needs {what}, which no service of the test and no service of the application sends"
+        message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
         hint = "list it under x-dodo.out of the application's service that sends it"
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
@@ -42,10 +42,10 @@ def _unsatisfied(context: Context, wiring: Wiring, end: End) -> Diagnostic:
 
 
 def _who_could(context: Context, wiring: Wiring, end: End) -> str:
-    """The way out: another sender stamp that is sent, or services that send such messages."""
+    """A hint: another sender stamp that is sent, or services that send such messages."""
     stamps = sorted(str(e.port) for e in wiring.produced if e.port.name == end.port.name)
     if stamps:
-        return f"the test has {' and '.join(stamps)}"
+        return f"the test sends {' and '.join(stamps)}"
     names = sorted(m.name for m in context.manifests.values() if _sends(m, end.port.name))
     return f"add a service that sends it: {', '.join(names)}" if names else ""
 
@@ -73,5 +73,5 @@ def _unsatisfied_application(wiring: Wiring) -> Iterator[Diagnostic]:
     for end in wiring.application_consumes:
         own = any(end.port.consumes(other.port) for other in wiring.application_produces)
         if not own and not wiring.producers(end.port) and not wiring.undeclared:
-            message = f"the application's '{end.service}' consumes {end.port}, which nobody sends in this test"
+            message = f"the application's '{end.service}' consumes {end.port}, which no service of the test sends"
             yield Diagnostic(end.span, "application-input", message, severity="warning")

@@ -1,4 +1,4 @@
-"""``unknown-name``: a value that means an entry of a file (an obstacle of the map) is there.
+"""``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
 
 ``wrong-file``: that file is JSON of the shape that the manifest names. ``short-timeout``: the test's timeout leaves
 room for the longest time that an evaluator waits.
@@ -53,7 +53,7 @@ def _file(argument: Argument) -> Path | None:
 
 @functools.lru_cache(maxsize=256)
 def _names(file: Path, key: str) -> tuple[str, ...] | str:
-    """The names of the entries of a list in a JSON file, or what is wrong with the file."""
+    """The names of the entries of a list in a JSON file, or the problem of the file."""
     try:
         if file.exists() and not file.is_file():
             return "not a regular file"
@@ -75,5 +75,5 @@ def _within(context: Context, service: ResolvedService, seconds: str, entry: Ent
     if timeout is not None and float(seconds) >= timeout:
         written = entry.value.text if isinstance(entry.value, Scalar) else seconds
         message = f"'{service.use.name}' waits up to {written}, but the test's timeout of {timeout:g} s ends it first"
-        hint = "make the timeout longer, so that the evaluator can judge"
+        hint = "use a longer timeout, so that the evaluator can judge"
         yield Diagnostic(entry.value.span, "short-timeout", message, hint, "warning")

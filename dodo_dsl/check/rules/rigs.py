@@ -1,4 +1,4 @@
-"""``rig-level``: hil tests name the rig that they run on, others have none; ``unknown-rig``: the deployment has it.
+"""``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
 
 ``rig-isolation``: hardware is on the host's network.
 """
@@ -14,11 +14,11 @@ def check(context: Context) -> Iterator[Diagnostic]:
     spec = context.spec
     if spec.level == "hil" and spec.rig is None:
         message = "a hil test needs a rig to run on"
-        yield Diagnostic(spec.span("level"), "rig-level", message, "write 'rig: emulated', or name one of dodo.yml")
+        yield Diagnostic(spec.span("level"), "rig-level", message, "write 'rig: emulated', or a rig of dodo.yml")
     if spec.rig is None:
         return
     if spec.level in ("sil", "dil"):
-        message = f"a {spec.level} test needs no rig"
+        message = f"a {spec.level} test runs without a rig"
         yield Diagnostic(spec.span("rig"), "rig-level", message, "remove it, or use level hil")
     rig = context.rig
     if rig is None:

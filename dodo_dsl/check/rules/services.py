@@ -17,7 +17,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(use.uses.span, "unknown-service", f"unknown service '{use.uses.text}'", hint)
         if use.name == "sandbox" or use.name.startswith("dodo-"):
             message = f"the name '{use.name}' is reserved for DoDo's own services"
-            hint = "choose another; 'sandbox' and 'dodo-...' are reserved"
+            hint = "choose another name; 'sandbox' and 'dodo-...' are reserved"
             yield Diagnostic(use.span, "service-reserved", message, hint)
         if use.name in first_layer:
             message = f"the name '{use.name}' is already used in layer {first_layer[use.name]}"

@@ -1,1 +1,1 @@
-"""The copy of the application's compose file that a test has to itself."""
+"""A test's own copy of the application's compose file."""

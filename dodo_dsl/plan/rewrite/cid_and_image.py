@@ -9,7 +9,7 @@ from dodo_dsl.plan.rewrite.service_copy import Copy
 
 
 def assign_image(copy: Copy) -> None:
-    """The image of the file, unless a pipeline gives another one."""
+    """The image of the file, unless a pipeline sets another one."""
     service, variable = copy.service, image_variable(copy.name)
     if service.get("image") is None and "build" not in service:
         return
@@ -18,7 +18,7 @@ def assign_image(copy: Copy) -> None:
 
 
 def assign_cid(copy: Copy, in_files: tuple[str, ...]) -> None:
-    """The CID everywhere it was written, and over what ``env_file`` would set."""
+    """The CID wherever one was written, and in place of the one that ``env_file`` would set."""
     service, cid, assigned = copy.service, copy.setting.cid, []
     for key in ("entrypoint", "command"):
         before = service.get(key)
@@ -34,7 +34,7 @@ def assign_cid(copy: Copy, in_files: tuple[str, ...]) -> None:
 
 
 def _command(command: Any, cid: int) -> Any:
-    """A command with its CID, a string staying a string: compose splits it once it knows the variables."""
+    """A command with its CID, a string staying a string, which compose splits after it substitutes variables."""
     if isinstance(command, str):
         return opendlv_flags.with_cid_text(command, cid)
     before = [text(word) for word in command]

@@ -1,15 +1,15 @@
-"""Removes what a service would take of the machine: hardware, privileges, names, ports, restarts."""
+"""Removes a service's access to the host: hardware, privileges, names, ports, restarts."""
 
 from dodo_dsl.application import host_access
 from dodo_dsl.plan.rewrite.service_copy import Copy
 
 _REMOVED = {
-    "container_name": "the project names it",
+    "container_name": "compose names the container",
     "restart": "containers are not restarted",
-    "ports": "nothing is published",
+    "ports": "tests publish none",
     "cgroup_parent": "",
     "cgroup": "",
-    "pull_policy": "dodo sees to images",
+    "pull_policy": "DoDo manages images",
     "develop": "",
     "profiles": "",
     "extends": "",
@@ -18,7 +18,7 @@ _DEPLOY = ("replicas", "mode", "restart_policy", "placement", "update_config", "
 
 
 def remove_machine_settings(copy: Copy) -> None:
-    """Names, ports and policies of a machine; each service of a test runs once."""
+    """Removes names, ports and policies; each service of a test runs once."""
     for key, why in _REMOVED.items():
         copy.remove(key, why)
     scale, deploy = copy.service.pop("scale", None), copy.service.get("deploy")
@@ -31,11 +31,11 @@ def remove_machine_settings(copy: Copy) -> None:
         if not kept:
             copy.service.pop("deploy")
     if scale not in (None, 1):
-        copy.note(f"once, not {scale} times")
+        copy.note(f"starts once, not {scale} times")
 
 
 def remove_hardware(copy: Copy) -> None:
-    """Devices where there is no rig; privileges unless the rig allows them."""
+    """Removes devices without a rig, and privileges unless the rig allows them."""
     service, setting = copy.service, copy.setting
     allowed = setting.hil and setting.privileged_allowed
     if not allowed:
@@ -51,12 +51,12 @@ def remove_hardware(copy: Copy) -> None:
     if setting.hil:
         return
     for key in host_access.HARDWARE_KEYS:
-        copy.remove(key, "there is no hardware")
+        copy.remove(key, "the test has no hardware")
     kept = []
     for volume in service.get("volumes") or ():
         found = host_access.mount(volume)
         if host_access.is_hardware(found):
-            copy.note(f"{found.source} removed, there is no hardware")
+            copy.note(f"{found.source} removed, the test has no hardware")
         else:
             kept.append(volume)
     copy.keep_items("volumes", kept)

@@ -1,4 +1,4 @@
-"""``plan_application``: the application's compose file in a copy that a test has to itself."""
+"""``plan_application``: a test's own copy of the application's compose file."""
 
 import os
 from collections.abc import Callable
@@ -35,7 +35,7 @@ def plan_application(
 ) -> Application:
     """The application as a test runs it; ``folder`` is the compiled test's, ``after`` the services it waits for.
 
-    With ``hil`` devices stay; privilege stays only where ``privileged_allowed`` says so too.
+    Devices stay only with ``hil``, privileges only with ``privileged_allowed`` as well.
     """
     base = Path(os.path.relpath(application.folder, folder)).as_posix()
     names = frozenset(application.services)
@@ -69,7 +69,7 @@ def _copied(service: ComposeService, node: Node, setting: Setting, changes: list
 
 
 def _planned(service: ComposeService, cid: int) -> ApplicationService:
-    """The service as the process backend starts it."""
+    """The service as it starts without containers."""
     raw = plain(service.node)
     written = raw.get("command")
     command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
@@ -93,7 +93,7 @@ def _planned(service: ComposeService, cid: int) -> ApplicationService:
 
 
 def _carried(application: ApplicationSource, cid: int, base: str, path_variables: set[str]) -> dict[str, str]:
-    """The variables of the application's own ``.env``, with the test's CID, and paths as they are from the test."""
+    """The variables of the application's own ``.env``, with the test's CID, and paths relative to the test."""
     carried = {}
     for name, value in application.variables.items():
         if name.startswith(_NOT_CARRIED):

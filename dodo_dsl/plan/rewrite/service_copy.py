@@ -1,4 +1,4 @@
-"""One service of the copy: its content, what a test is like, and what was changed."""
+"""One service of the copy: its content, the properties of its test, and the changes made."""
 
 from collections.abc import Mapping, MutableSequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Setting:
-    """What a test is like; ``waits`` are the services of DoDo that the application starts after.
+    """Properties of a test; ``waits`` are the services of DoDo after which the application starts.
 
     ``names`` are the application's services that start, ``containers`` their names by ``container_name``.
     """
@@ -39,14 +39,14 @@ class Copy:
         self.changes.append(line if len(line) <= 200 else line[:197] + "...")
 
     def remove(self, key: str, why: str = "") -> Any:
-        """Takes a key away and says so."""
+        """Removes a key, and notes that."""
         value = self.service.pop(key, None)
         if value is not None:
             self.note(f"{key} removed{', ' if why else ''}{why}")
         return value
 
     def keep_items(self, key: str, items: list[Any]) -> None:
-        """What is left of a list or a mapping; nothing left means no key."""
+        """Sets a key to the items that remain, or removes it when none do."""
         if items:
             self.service[key] = items
         else:

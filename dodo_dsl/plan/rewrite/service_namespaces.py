@@ -8,7 +8,7 @@ from dodo_dsl.plan.rewrite.service_copy import Copy
 
 
 def own_namespaces(copy: Copy) -> None:
-    """The namespaces of a test; references between the application's services hold on."""
+    """The namespaces of a test; references between the application's services stay."""
     for key in host_access.NAMESPACES:
         _own_reference(copy, key)
     if copy.setting.own_network:
@@ -43,7 +43,7 @@ def _own_network(copy: Copy) -> None:
 
 
 def _own_names(copy: Copy, stays: bool) -> None:
-    """``networks`` leave, but the names that a service has there stay."""
+    """Removes ``networks``, but keeps the names that a service has there."""
     networks = copy.service.pop("networks", None)
     if networks is None:
         return
@@ -51,7 +51,7 @@ def _own_names(copy: Copy, stays: bool) -> None:
     names = list(dict.fromkeys(str(a) for n in about if isinstance(n, dict) for a in n.get("aliases") or ()))
     if names and not stays:
         copy.service["networks"] = {"default": {"aliases": names}}
-    copy.note("networks removed, the test has one of its own")
+    copy.note("networks removed, the test has a network of its own")
 
 
 def _host_network(copy: Copy) -> None:
@@ -78,7 +78,7 @@ def _without_network(sysctls: Any) -> Any:
 
 
 def own_dependencies(copy: Copy) -> None:
-    """``depends_on`` of services that start, and of DoDo's that must be ready before."""
+    """``depends_on`` of services that start, and of DoDo's that must be ready first."""
     service, setting = copy.service, copy.setting
     raw = service.get("depends_on") or {}
     started = {"condition": "service_started"}

@@ -1,4 +1,4 @@
-"""Volumes of a service: ``/tmp`` and shared memory are the test's own, and so are the volumes that have a name."""
+"""Volumes of a service: ``/tmp``, shared memory and named volumes are the test's own."""
 
 from collections.abc import MutableSequence
 from typing import Any
@@ -8,7 +8,7 @@ from dodo_dsl.application.interpolation import split_outside
 from dodo_dsl.plan.rewrite.service_copy import Copy
 
 TAKEN = ("tmp", "report")
-"""Volumes of DoDo's own."""
+"""The names of DoDo's own volumes."""
 
 _DISPLAYS = "/tmp/.X11-unix"
 
@@ -33,14 +33,14 @@ def _renamed(copy: Copy, volume: Any) -> Any:
     found = host_access.mount(volume)
     if found.source not in TAKEN or (isinstance(volume, dict) and volume.get("type", "volume") != "volume"):
         return volume
-    copy.note(f"volume {found.source} is called {renamed(found.source)}")
+    copy.note(f"volume {found.source} renamed to {renamed(found.source)}")
     if isinstance(volume, dict):
         return {**volume, "source": renamed(found.source)}
     return ":".join([renamed(found.source), *split_outside(volume, ":")[1:]])
 
 
 def _own(copy: Copy, volume: Any) -> Any:
-    """The mount as an isolated test has it, None for what it has already."""
+    """The mount as an isolated test has it, None for shared memory, which it has already."""
     found = host_access.mount(volume)
     if host_access.is_shared_memory(found):
         copy.note(f"{found.source} removed, shared memory is the test's own")
@@ -58,7 +58,7 @@ def _own(copy: Copy, volume: Any) -> Any:
 
 
 def own_volumes(volumes: Any, changes: MutableSequence[str]) -> dict[str, Any]:
-    """Top-level ``volumes``: each test has its own, so a name for all of the machine leaves."""
+    """Top-level ``volumes``: each test has its own, so names that all of the host would share are removed."""
     found = {}
     for name, about in (volumes or {}).items():
         is_external = isinstance(about, dict) and host_access.is_true(about.get("external", False))
