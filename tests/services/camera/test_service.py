@@ -99,7 +99,7 @@ def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
         (["--source=file"], "--file is missing"),
         (["--source=file", "--file=/none.png"], "there is no file '/none.png'"),
         (["--source=webcam"], "--source=webcam is not a camera, expected a device such as /dev/video0"),
-        (["--source=/dev/video99"], "there is not a camera /dev/video99; is it plugged in?"),
+        (["--source=/dev/video99"], "there is no camera /dev/video99; is it plugged in?"),
         (["--source=/dev/null"], "the camera /dev/null cannot be opened"),
         (["--source=emulated"], "is the camera of 'rig: emulated'"),
         (["--source=rpicam", "--freq=20"], "--exposure=0.1 does not fit into the 0.05 s between two pictures"),
