@@ -11,6 +11,8 @@ import pytest
 from tests.firmware.programs import BUILT, ROOT, Bench, Rig
 
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
+CLOSE = (-0.8, -0.6, -141.7)
+"""Near home (m, m, degrees), so that homing is short; x and y whole electrical turns from it, as in the middle."""
 
 
 def _make(*targets: str) -> None:
@@ -45,12 +47,13 @@ def fresh(bench_program: Path) -> Iterator[Bench]:
 
 
 @pytest.fixture
-def bench(fresh: Bench) -> Bench:
+def bench(bench_program: Path) -> Iterator[Bench]:
     """The core, calibrated and in the middle."""
-    fresh.calibrate()
-    fresh.go(0, 0, 0)
-    fresh.extremes()
-    return fresh
+    with Bench(bench_program, CLOSE) as bench:
+        bench.calibrate()
+        bench.go(0, 0, 0)
+        bench.extremes()
+        yield bench
 
 
 @pytest.fixture
