@@ -22,7 +22,7 @@ NEAR_HOME = (-0.85, -0.65, -140.0)
 
 
 class Program:
-    """A program that takes orders, a line each, and answers in JSON; time passes only by `run`."""
+    """A program that takes commands, a line each, and answers in JSON; time passes only by `run`."""
 
     def __init__(self, *words: str) -> None:
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -48,7 +48,7 @@ class Program:
             self.events.append(found)
         return found
 
-    def order(self, line: str) -> list[dict[str, Any]]:
+    def command(self, line: str) -> list[dict[str, Any]]:
         assert self._process.stdin is not None
         self._process.stdin.write(line + "\n")
         self._process.stdin.flush()
@@ -60,9 +60,9 @@ class Program:
         return found[:-1]
 
     def run(self, seconds: float) -> list[dict[str, Any]]:
-        return self.order(f"run {seconds:.4f}")
+        return self.command(f"run {seconds:.4f}")
 
-    def say(self, line: str) -> list[str]:
+    def send_line(self, line: str) -> list[str]:
         """The answers to a line."""
         return self.send((line + "\n").encode("ascii"))
 
@@ -70,7 +70,7 @@ class Program:
         raise NotImplementedError
 
     def ask(self, line: str) -> str:
-        [answer] = self.say(line)
+        [answer] = self.send_line(line)
         return answer
 
     def status(self) -> Status:
@@ -80,11 +80,11 @@ class Program:
         return tuple(map(float, self.ask("$POSITION").removeprefix("$").split(",")))
 
     def pose(self) -> dict[str, Any]:
-        [pose] = [one for one in self.order("pose") if "x" in one]
+        [pose] = [one for one in self.command("pose") if "x" in one]
         return pose
 
     def extremes(self) -> dict[str, list[float]]:
-        [found] = [one for one in self.order("extremes") if "way" in one]
+        [found] = [one for one in self.command("extremes") if "way" in one]
         return found
 
     def happened(self, event: str) -> list[dict[str, Any]]:
@@ -94,24 +94,24 @@ class Program:
         """Let time pass until the rig has a status; the seconds."""
         passed = 0.0
         while (status := self.status()) != wanted:
-            assert passed < patience, f"the rig says {status.name} after {passed} s instead of {wanted.name}"
+            assert passed < patience, f"the rig reports {status.name} after {passed} s instead of {wanted.name}"
             self.run(every)
             passed += every
         return passed
 
     def calibrate(self) -> None:
-        assert self.say("$CALIBRATE") == []
+        assert self.send_line("$CALIBRATE") == []
         self.until(Status.IDLE)
 
     def go(self, x: float, y: float, yaw: float) -> None:
-        assert self.say(f"$GOTO:{x:.6f},{y:.6f},{yaw:.6f}") == []
+        assert self.send_line(f"$GOTO:{x:.6f},{y:.6f},{yaw:.6f}") == []
         self.until(Status.IDLE)
         self.run(0.2)  # the rotor comes to rest
 
     def keep_running(self, velocity: str, seconds: float, every: float = 0.05) -> None:
         """RUN again and again."""
         for _ in range(round(seconds / every)):
-            assert self.say(f"$RUN:{velocity}") == []
+            assert self.send_line(f"$RUN:{velocity}") == []
             self.run(every)
 
     def watch(self, seconds: float, every: float = 0.2) -> None:
@@ -138,7 +138,7 @@ class Bench(Program):
         super().__init__(str(program), str(place[0]), str(place[1]), str(math.radians(place[2])))
 
     def send(self, data: bytes) -> list[str]:
-        return [one["answer"] for one in self.order("send " + data.hex()) if "answer" in one]
+        return [one["answer"] for one in self.command("send " + data.hex()) if "answer" in one]
 
 
 class Rig(Program):
@@ -172,14 +172,14 @@ class Rig(Program):
         self.port = None
 
     def plug(self) -> None:
-        [ready] = [one for one in self.order("plug") if "port" in one]
+        [ready] = [one for one in self.command("plug") if "port" in one]
         self.path = ready["port"]
 
     def send(self, data: bytes) -> list[str]:
         """The answers that come within 10 ms after the last byte, in the controller's time."""
         assert self.port is not None
         self.port.write(data)
-        self.order(f"await {len(data)}")
+        self.command(f"await {len(data)}")
         self.run(0.01 + len(data) * 10 / 115200)
         new = self.port.read(self.sent - self._got)
         assert len(new) == self.sent - self._got, "answers are missing"

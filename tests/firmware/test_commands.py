@@ -13,13 +13,13 @@ def error(code: Error) -> list[str]:
 def test_a_fresh_rig_asks_for_calibrate_and_moves_nothing(fresh: Bench) -> None:
     assert fresh.status() == Status.NOT_CALIBRATED
     for line in ("$POSITION", "$GOTO:0,0,0", "$RUN:0.1,0,0"):
-        assert fresh.say(line) == error(Error.UNCALIBRATED)
+        assert fresh.send_line(line) == error(Error.UNCALIBRATED)
     fresh.run(1)
     assert fresh.extremes()["way"] == [0, 0, 0]
 
 
 def test_goto_reaches_its_place_within_the_limits(bench: Bench) -> None:
-    assert bench.say("$GOTO:0.8,-0.6,2.5") == []
+    assert bench.send_line("$GOTO:0.8,-0.6,2.5") == []
     assert bench.status() == Status.MOVING
     bench.until(Status.IDLE)
     wanted = {"x": 0.8, "y": -0.6, "yaw": 2.5}
@@ -67,7 +67,7 @@ def test_y1_and_y2_stay_square(bench: Bench) -> None:
 @pytest.mark.parametrize("stop", ["$STOP", "$STOP:", "$STOP\r"])
 def test_stop_brakes(bench: Bench, stop: str) -> None:
     bench.keep_running("0.4,0,0", 1)
-    assert bench.say(stop) == []
+    assert bench.send_line(stop) == []
     bench.run(0.9)
     assert bench.status() == Status.IDLE
     assert bench.speed() == pytest.approx(0, abs=1e-3)
@@ -75,16 +75,16 @@ def test_stop_brakes(bench: Bench, stop: str) -> None:
 
 
 def test_stop_ends_goto(bench: Bench) -> None:
-    bench.say("$GOTO:0.9,0,0")
+    bench.send_line("$GOTO:0.9,0,0")
     bench.run(0.5)
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     bench.run(2)
     assert bench.status() == Status.IDLE
     assert bench.position()[0] < 0.3
 
 
 def test_run_ends_goto(bench: Bench) -> None:
-    bench.say("$GOTO:0.9,0,0")
+    bench.send_line("$GOTO:0.9,0,0")
     bench.run(0.4)
     bench.keep_running("-0.1,0,0", 1.5)
     assert bench.pose()["vx"] == pytest.approx(-0.1, rel=0.02)
@@ -131,7 +131,7 @@ def test_run_with_nothing_stands_and_needs_no_further_run(bench: Bench) -> None:
     ],
 )
 def test_a_line_with_a_mistake_is_answered_and_moves_nothing(bench: Bench, line: str, code: Error) -> None:
-    assert bench.say(line) == error(code)
+    assert bench.send_line(line) == error(code)
     bench.run(0.1)
     assert bench.extremes()["way"] == [0, 0, 0]
 
@@ -143,7 +143,7 @@ def test_an_empty_line_is_silent(bench: Bench) -> None:
 def test_a_mistake_neither_stops_nor_keeps_alive(bench: Bench) -> None:
     bench.keep_running("0.2,0,0", 0.5)
     for _ in range(4):
-        assert bench.say("$RUN:0.2,0") == error(Error.COUNT)
+        assert bench.send_line("$RUN:0.2,0") == error(Error.COUNT)
         bench.run(0.1)
     assert bench.status() == Status.MOVING
     bench.run(0.2)
@@ -152,6 +152,6 @@ def test_a_mistake_neither_stops_nor_keeps_alive(bench: Bench) -> None:
 
 @pytest.mark.parametrize("number", ["0.100000", "+0.1", "0.1000009", "00.1", "0.100000999999"])
 def test_numbers_may_be_written_in_many_ways(bench: Bench, number: str) -> None:
-    bench.say(f"$GOTO:{number},0,0")
+    bench.send_line(f"$GOTO:{number},0,0")
     bench.until(Status.IDLE)
     assert bench.position()[0] == pytest.approx(0.1, abs=MICROSTEP["x"])

@@ -26,7 +26,7 @@ def test_calibrate_goto_run_and_position(new_rig: Rig) -> None:
     new_rig.keep_running("0.2,0.1,-0.3", 1)
     pose = new_rig.pose()
     assert (pose["vx"], pose["vy"], pose["vyaw"]) == pytest.approx((0.2, 0.1, -0.3), rel=0.05)
-    new_rig.say("$STOP")
+    new_rig.send_line("$STOP")
     new_rig.run(1)
     assert new_rig.is_true()
     extremes = new_rig.extremes()
@@ -45,7 +45,7 @@ def test_run_brakes_before_the_edge(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize(
-    ("order", "status"),
+    ("command", "status"),
     [
         ("push x 8", Status.STALL),
         ("switch y2 closed", Status.LIMIT),
@@ -58,9 +58,9 @@ def test_run_brakes_before_the_edge(rig: Rig) -> None:
         ("cut data", Status.FAULT),
     ],
 )
-def test_faults_stop_the_rig_and_have_a_status(rig: Rig, order: str, status: Status) -> None:
+def test_faults_stop_the_rig_and_have_a_status(rig: Rig, command: str, status: Status) -> None:
     rig.keep_running("0.1,0.1,0.2", 0.4)
-    rig.order(order)
+    rig.command(command)
     rig.run(0.02)
     assert rig.status() == status
     rig.run(0.6)
@@ -69,23 +69,23 @@ def test_faults_stop_the_rig_and_have_a_status(rig: Rig, order: str, status: Sta
 
 
 def test_noise_on_the_line_moves_nothing_by_itself(rig: Rig) -> None:
-    rig.order("noise 1000")
+    rig.command("noise 1000")
     for _ in range(40):
-        rig.say("$STATUS")
-        rig.say("#RUN:0.1,0.1,0.1")
-    rig.order("noise 0")
+        rig.send_line("$STATUS")
+        rig.send_line("#RUN:0.1,0.1,0.1")
+    rig.command("noise 0")
     rig.run(0.1)
-    rig.say("")
+    rig.send_line("")
     assert rig.extremes()["way"] == [0, 0, 0]
     assert rig.status() == Status.IDLE
 
 
 def test_a_byte_that_the_receiver_loses_voids_its_line(rig: Rig) -> None:
-    rig.order("lose")
-    assert rig.say("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.DAMAGED)}"]
+    rig.command("lose")
+    assert rig.send_line("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.DAMAGED)}"]
     rig.run(0.2)
     assert rig.extremes()["way"] == [0, 0, 0]
-    assert rig.order("overruns")[0]["overruns"] == 1
+    assert rig.command("overruns")[0]["overruns"] == 1
     assert rig.status() == Status.IDLE
 
 
@@ -97,9 +97,9 @@ def test_opening_the_port_resets_the_controller_and_the_position_stays(rig: Rig)
     assert len(rig.happened("reset")) == resets + 1
     assert rig.status() == Status.IDLE
     assert rig.is_true()
-    assert rig.say("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.RESTARTED)}"]
-    rig.say("$STOP")
-    assert rig.say("$RUN:0.1,0,0") == []
+    assert rig.send_line("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.RESTARTED)}"]
+    rig.send_line("$STOP")
+    assert rig.send_line("$RUN:0.1,0,0") == []
 
 
 def test_a_port_that_keeps_dtr_up_resets_nothing(rig: Rig) -> None:
@@ -120,7 +120,7 @@ def test_with_a_boot_loader_the_drivers_forget(firmware: None) -> None:
         rig.open()
         rig.run(1.2)
         rig.calibrate()
-        rig.order("reset")
+        rig.command("reset")
         rig.run(1.2)
         assert rig.status() == Status.NOT_CALIBRATED
 
@@ -161,7 +161,7 @@ def test_help_ends_with_an_example_that_runs(firmware: None, tmp_path: Path) -> 
     assert not link.is_symlink()
 
 
-def test_it_admits_that_it_was_late(firmware: None) -> None:
+def test_it_reports_that_it_was_late(firmware: None) -> None:
     process = subprocess.Popen([EMULATOR, ELF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None and process.stdin is not None
     try:
@@ -193,13 +193,13 @@ def test_it_admits_that_it_was_late(firmware: None) -> None:
         (["--link", "/nowhere/rig", str(ELF)], "no link"),
     ],
 )
-def test_mistakes_are_said_in_one_sentence(firmware: None, words: list[str], sentence: str) -> None:
+def test_mistakes_are_reported_in_one_sentence(firmware: None, words: list[str], sentence: str) -> None:
     done = subprocess.run([EMULATOR, *words], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
     assert done.returncode == 2
     assert sentence in done.stderr and done.stderr.count("\n") == 1
 
 
-def test_orders_that_are_none_are_answered(new_rig: Rig) -> None:
-    for order in ("run -1", "run x", "switch z open", "heat x", "nothing", "motors perhaps"):
+def test_unknown_commands_are_answered(new_rig: Rig) -> None:
+    for command in ("run -1", "run x", "switch z open", "heat x", "nothing", "motors perhaps"):
         with pytest.raises(AssertionError, match="error"):
-            new_rig.order(order)
+            new_rig.command(command)

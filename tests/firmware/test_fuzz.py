@@ -1,4 +1,4 @@
-"""Strange bytes for the firmware: its core with sanitizers, and its binary through the emulated serial port."""
+"""Malformed bytes for the firmware: its core with sanitizers, and its binary through the emulated serial port."""
 
 import runpy
 import subprocess
@@ -40,7 +40,7 @@ def test_only_valid_commands_move_the_core(bench: Bench, data: bytes) -> None:
     bench.run(0.02)
     way = bench.extremes()["way"]
     assert moves or way == [0, 0, 0]
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     if moves:
         bench.run(0.5)
         bench.calibrate() if bench.status() == Status.NOT_CALIBRATED else None
@@ -54,7 +54,7 @@ def test_no_sequence_of_runs_leaves_the_workspace(bench: Bench, runs: list[tuple
     events = len(bench.events)
     for vx, vy, vyaw, seconds in runs:
         for _ in range(round(seconds / 0.05)):
-            assert bench.say(f"$RUN:{vx:.4f},{vy:.4f},{vyaw:.4f}") == []
+            assert bench.send_line(f"$RUN:{vx:.4f},{vy:.4f},{vyaw:.4f}") == []
             bench.run(0.05)
             pose = bench.pose()
             for axis, (low, high) in BOUNDS.items():
@@ -65,7 +65,7 @@ def test_no_sequence_of_runs_leaves_the_workspace(bench: Bench, runs: list[tuple
     assert bench.events[events:] == []
 
 
-def test_the_binary_survives_strange_lines(firmware: None) -> None:
+def test_the_binary_survives_malformed_lines(firmware: None) -> None:
     words = [sys.executable, str(ROOT / "scripts" / "fuzz-firmware"), "2000", "7"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -11,9 +11,9 @@ HOME = (-0.9, -0.7, -2.63386)
 
 
 def test_home_is_where_the_switches_open(fresh: Bench) -> None:
-    fresh.say("$CALIBRATE")
+    fresh.send_line("$CALIBRATE")
     assert fresh.status() == Status.HOMING
-    assert fresh.say("$POSITION") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    assert fresh.send_line("$POSITION") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
     fresh.until(Status.IDLE)
     assert fresh.position() == pytest.approx(HOME, abs=1e-5)
     fresh.run(0.3)
@@ -49,11 +49,11 @@ def test_home_is_found_from_anywhere_though_switches_bounce(bench_program: Path,
         assert bench.status() == Status.IDLE
 
 
-def test_rotors_jump_when_drivers_start_anew(bench: Bench) -> None:
+def test_rotors_jump_when_drivers_reset(bench: Bench) -> None:
     """A driver's electrical angle is 0 after its reset, up to two full steps away."""
     bench.go(0.0003, 0.0001, 0.5)
     before = bench.pose()
-    bench.say("$CALIBRATE")
+    bench.send_line("$CALIBRATE")
     bench.run(0.09)
     after = bench.pose()
     jumps = [abs(after[axis] - before[axis]) / (128 * MICROSTEP[axis]) for axis in ("x", "y", "yaw")]
@@ -65,7 +65,7 @@ def test_rotors_jump_when_drivers_start_anew(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("beyond", [1, 3, 9, 20])
-def test_a_rotor_may_stand_between_two_poles_when_drivers_start_anew(bench: Bench, beyond: int) -> None:
+def test_a_rotor_may_stand_between_two_poles_when_drivers_reset(bench: Bench, beyond: int) -> None:
     """So it falls to either side, and has to rest there before the field sets off, or it loses a turn of four steps."""
     half_turn = round((0.9 + 0.1) / MICROSTEP["x"] / 512) * 512 - 256
     bench.go(-0.9 + (half_turn + beyond) * MICROSTEP["x"], -0.7 + (half_turn - beyond) * MICROSTEP["y"], 0)
@@ -76,7 +76,7 @@ def test_a_rotor_may_stand_between_two_poles_when_drivers_start_anew(bench: Benc
 
 
 def test_y1_and_y2_are_square_afterwards(fresh: Bench) -> None:
-    fresh.order("push y1 12")
+    fresh.command("push y1 12")
     fresh.run(0.1)
     assert abs(fresh.pose()["skew"]) > 0.003
     fresh.calibrate()
@@ -85,9 +85,9 @@ def test_y1_and_y2_are_square_afterwards(fresh: Bench) -> None:
 
 
 def test_a_pair_that_is_far_from_square_is_not_torn_on(fresh: Bench) -> None:
-    fresh.order("push y1 80")
+    fresh.command("push y1 80")
     fresh.run(0.1)
-    fresh.say("$CALIBRATE")
+    fresh.send_line("$CALIBRATE")
     fresh.until(Status.FAULT)
     assert abs(fresh.pose()["skew"]) < 0.03
 
@@ -97,9 +97,9 @@ def test_a_pair_that_is_far_from_square_is_not_torn_on(fresh: Bench) -> None:
 def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, motor: str, stuck: str) -> None:
     """An open one is noticed at the frame, at homing speed, and by the way; a closed one before anything goes far."""
     bench.go(-0.5, -0.4, -2)
-    bench.order(f"switch {motor} {stuck}")
+    bench.command(f"switch {motor} {stuck}")
     bench.extremes()
-    bench.say("$CALIBRATE")
+    bench.send_line("$CALIBRATE")
     passed = 0.0
     while (status := bench.status()) == Status.HOMING:
         assert passed < 60
@@ -111,36 +111,36 @@ def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, moto
         assert max(bench.extremes()["way"][:2]) < 0.02
     bench.run(1)
     assert not bench.pose()["moves"]
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 
 def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
-    fresh.order("tear x")
-    fresh.say("$CALIBRATE")
+    fresh.command("tear x")
+    fresh.send_line("$CALIBRATE")
     fresh.until(Status.FAULT)
     assert 1.85 < fresh.extremes()["way"][0] < 1.9
 
 
 def test_an_axis_that_never_arrives_is_a_fault(fresh: Bench) -> None:
-    """Neither its switch nor its counter says how far it is."""
-    fresh.order("tear x")
-    fresh.order("freeze x on")
-    fresh.say("$CALIBRATE")
+    """Neither its switch nor its counter shows how far it is."""
+    fresh.command("tear x")
+    fresh.command("freeze x on")
+    fresh.send_line("$CALIBRATE")
     passed = fresh.until(Status.FAULT)
     assert 30 <= passed <= 33
     fresh.run(1)
     assert not fresh.pose()["moves"]
-    fresh.say("$STOP")
+    fresh.send_line("$STOP")
     assert fresh.status() == Status.NOT_CALIBRATED
 
 
 def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
-    fresh.say("$CALIBRATE")
+    fresh.send_line("$CALIBRATE")
     fresh.watch(1)
-    fresh.order("switch x closed")
+    fresh.command("switch x closed")
     fresh.run(0.01)
-    fresh.order("switch x works")
+    fresh.command("switch x works")
     fresh.run(0.2)
     before = fresh.pose()["x"]
     fresh.until(Status.FAULT)
@@ -149,11 +149,11 @@ def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
 
 
 def test_only_stop_ends_it_early(fresh: Bench) -> None:
-    fresh.say("$CALIBRATE")
+    fresh.send_line("$CALIBRATE")
     fresh.watch(1)
     for line in ("$RUN:0.1,0,0", "$GOTO:0,0,0", "$CALIBRATE"):
-        assert fresh.say(line) == [f"$ERROR:{int(Error.HOMING)}"]
-    fresh.say("$STOP")
+        assert fresh.send_line(line) == [f"$ERROR:{int(Error.HOMING)}"]
+    fresh.send_line("$STOP")
     fresh.run(1)
     assert fresh.status() == Status.NOT_CALIBRATED
     assert not fresh.pose()["moves"]
@@ -168,7 +168,7 @@ def test_calibrate_brakes_first(bench: Bench) -> None:
 
 def test_a_reset_takes_up_the_position_of_the_drivers(bench: Bench) -> None:
     bench.keep_running("0.3,-0.2,0.4", 0.6)
-    bench.order("restart")
+    bench.command("restart")
     bench.run(1.2)
     assert bench.status() == Status.IDLE
     assert not bench.pose()["moves"]
@@ -180,15 +180,15 @@ def test_a_reset_takes_up_the_position_of_the_drivers(bench: Bench) -> None:
 @pytest.mark.parametrize("what", ["homing", "power", "stall"])
 def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str) -> None:
     if what == "homing":
-        bench.say("$CALIBRATE")
+        bench.send_line("$CALIBRATE")
         bench.watch(1)
     elif what == "power":
-        bench.order("motors off")
-        bench.order("motors on")
+        bench.command("motors off")
+        bench.command("motors on")
     else:
-        bench.order("push x 8")
+        bench.command("push x 8")
         bench.run(0.1)
-    bench.order("restart")
+    bench.command("restart")
     bench.run(0.5)
     assert bench.status() == Status.NOT_CALIBRATED
 
@@ -196,30 +196,30 @@ def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str)
 @pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
 def test_a_reset_does_not_take_up_a_part(bench: Bench, motor: str) -> None:
     """The other three drivers know where they are."""
-    bench.order(f"short {motor}")
+    bench.command(f"short {motor}")
     bench.run(0.1)
-    bench.order("restart")
+    bench.command("restart")
     bench.run(0.1)
     assert bench.status() == Status.NOT_CALIBRATED
 
 
 @pytest.mark.parametrize("line", ["$RUN:0.2,0,0", "$GOTO:0.3,0,0"])
 @pytest.mark.parametrize("notice", ["$STOP", "$CALIBRATE"])
-def test_after_a_reset_nobody_drives_on_unaware(bench: Bench, line: str, notice: str) -> None:
+def test_after_a_reset_nobody_continues_unaware(bench: Bench, line: str, notice: str) -> None:
     """The master of before goes on with its lines, and does not look at the status."""
     bench.keep_running("0.2,0,0", 0.6)
-    bench.order("restart")
+    bench.command("restart")
     for _ in range(20):
-        assert bench.say(line) == [f"$ERROR:{int(Error.RESTARTED)}"]
+        assert bench.send_line(line) == [f"$ERROR:{int(Error.RESTARTED)}"]
         bench.run(0.05)
     assert bench.status() == Status.IDLE
     assert not bench.pose()["moves"]
-    bench.say(notice)
+    bench.send_line(notice)
     bench.until(Status.IDLE)
-    assert bench.say(line) == []
+    assert bench.send_line(line) == []
 
 
 def test_a_start_without_a_position_needs_no_stop(fresh: Bench) -> None:
-    fresh.order("restart")
+    fresh.command("restart")
     fresh.calibrate()
     fresh.go(-0.5, -0.5, 0)

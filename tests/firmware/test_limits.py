@@ -28,10 +28,12 @@ def with_one(axis: str, value: str) -> str:
 @pytest.mark.parametrize("axis", AXES)
 def test_goto_takes_the_bounds_and_nothing_beyond(bench: Bench, axis: str, end: int) -> None:
     bound, sign = BOUNDS[axis][end], (-1, 1)[end]
-    assert bench.say(f"$GOTO:{with_one(axis, f'{bound + sign * BEYOND[axis]:.6f}')}") == [f"$ERROR:{int(Error.BOUNDS)}"]
+    assert bench.send_line(f"$GOTO:{with_one(axis, f'{bound + sign * BEYOND[axis]:.6f}')}") == [
+        f"$ERROR:{int(Error.BOUNDS)}"
+    ]
     bench.run(0.1)
     assert bench.extremes()["way"] == [0, 0, 0]
-    assert bench.say(f"$GOTO:{with_one(axis, f'{bound:.6f}')}") == []
+    assert bench.send_line(f"$GOTO:{with_one(axis, f'{bound:.6f}')}") == []
     bench.until(Status.IDLE)
     assert bench.position()[AXES.index(axis)] == pytest.approx(bound, abs=MICROSTEP[axis])
     assert bench.happened("crash") == []
@@ -40,10 +42,10 @@ def test_goto_takes_the_bounds_and_nothing_beyond(bench: Bench, axis: str, end: 
 @pytest.mark.parametrize("sign", ["", "-"])
 @pytest.mark.parametrize("axis", AXES)
 def test_run_takes_the_highest_speed_and_nothing_beyond(bench: Bench, axis: str, sign: str) -> None:
-    assert bench.say(f"$RUN:{with_one(axis, f'{sign}1.000001')}") == [f"$ERROR:{int(Error.BOUNDS)}"]
+    assert bench.send_line(f"$RUN:{with_one(axis, f'{sign}1.000001')}") == [f"$ERROR:{int(Error.BOUNDS)}"]
     bench.run(0.1)
     assert bench.extremes()["way"] == [0, 0, 0]
-    assert bench.say(f"$RUN:{with_one(axis, f'{sign}{SPEED[axis]:.6f}')}") == []
+    assert bench.send_line(f"$RUN:{with_one(axis, f'{sign}{SPEED[axis]:.6f}')}") == []
 
 
 @pytest.mark.parametrize("sign", ["", "-"])
@@ -78,7 +80,7 @@ def test_a_sudden_turn_towards_the_edge_stays_inside(bench: Bench) -> None:
 
 def close_in_motion(bench: Bench, motor: str, velocity: str) -> None:
     bench.keep_running(velocity, 0.5)
-    bench.order(f"switch {motor} closed")
+    bench.command(f"switch {motor} closed")
     bench.run(0.02)
 
 
@@ -99,13 +101,13 @@ def test_a_switch_stops_its_axis_at_once_and_the_others_softly(bench: Bench, mot
 def test_after_a_switch_only_calibrate_moves_the_rig(bench: Bench) -> None:
     close_in_motion(bench, "x", "0.1,0,0")
     for line in ("$RUN:-0.1,0,0", "$GOTO:0,0,0"):
-        assert bench.say(line) == [f"$ERROR:{int(Error.TROUBLE)}"]
+        assert bench.send_line(line) == [f"$ERROR:{int(Error.TROUBLE)}"]
     assert bench.status() == Status.LIMIT
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
     for line in ("$RUN:-0.1,0,0", "$GOTO:0,0,0", "$POSITION"):
-        assert bench.say(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
-    bench.order("switch x works")
+        assert bench.send_line(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    bench.command("switch x works")
     bench.calibrate()
     bench.run(0.3)
     assert bench.is_true()
@@ -115,7 +117,7 @@ def miscount(bench: Bench, axis: str, far: bool, beyond: float) -> None:
     """Move the counters of an axis, so that its switch lies that much (m, rad) within its measured bounds."""
     steps = beyond * STEPS[axis] * (1 if far else -1)
     for motor in MOTORS[axis]:
-        bench.order(f"miscount {motor} {steps:.0f}")
+        bench.command(f"miscount {motor} {steps:.0f}")
 
 
 def run_until_limit(bench: Bench, line: str, patience: float = 8.0) -> None:
@@ -123,7 +125,7 @@ def run_until_limit(bench: Bench, line: str, patience: float = 8.0) -> None:
     for _ in range(round(patience / 0.02)):
         if bench.status() == Status.LIMIT:
             return
-        bench.say(line)
+        bench.send_line(line)
         bench.run(0.02)
     raise AssertionError("no switch closed")
 
@@ -131,7 +133,7 @@ def run_until_limit(bench: Bench, line: str, patience: float = 8.0) -> None:
 @pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
 @pytest.mark.parametrize("axis", AXES)
 def test_a_switch_hit_while_the_axis_turns_is_left_the_way_it_came(bench: Bench, axis: str, far: bool) -> None:
-    """The counter is wrong; the rig is told to go back, and meets the switch while it brakes."""
+    """The counter is wrong; the rig is commanded back, and hits the switch while it brakes."""
     sign, index = (1 if far else -1), AXES.index(axis)
     goal = [0.0, 0.0, 0.0]
     goal[index] = BOUNDS[axis][far] - sign * NEAR[axis]
@@ -142,11 +144,11 @@ def test_a_switch_hit_while_the_axis_turns_is_left_the_way_it_came(bench: Bench,
         bench.keep_running(with_one(axis, f"{sign * 0.12}"), 0.01, every=0.01)
     run_until_limit(bench, f"$RUN:{with_one(axis, f'{-sign * 0.12}')}", patience=1)
     assert bench.pose()[axis] * sign > BOUNDS[axis][far] * sign
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     bench.run(0.2)
-    assert bench.say(f"$RUN:{with_one(axis, f'{sign * 0.1}')}") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    assert bench.send_line(f"$RUN:{with_one(axis, f'{sign * 0.1}')}") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
     hit = bench.pose()[axis]
-    bench.say("$CALIBRATE")
+    bench.send_line("$CALIBRATE")
     for _ in range(20):
         bench.run(0.02)
         assert bench.pose()[axis] * sign < hit * sign + WOBBLE[axis]
@@ -154,17 +156,17 @@ def test_a_switch_hit_while_the_axis_turns_is_left_the_way_it_came(bench: Bench,
     assert bench.happened("crash") == []
 
 
-def test_a_switch_hit_at_speed_while_the_rig_is_told_to_go_back_blocks_both_ways(bench: Bench) -> None:
+def test_a_switch_hit_at_speed_while_the_rig_is_commanded_back_blocks_both_ways(bench: Bench) -> None:
     bench.go(0.5, 0, 0)
     miscount(bench, "x", True, 0.2)
     while bench.pose()["x"] < 0.76:
         bench.keep_running("0.5,0,0", 0.02, every=0.02)
     run_until_limit(bench, "$RUN:-0.5,0,0", patience=1)
     bench.run(0.5)
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     bench.extremes()
     for line in ("$RUN:0.3,0,0", "$RUN:-0.3,0,0", "$GOTO:0,0,0"):
-        assert bench.say(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+        assert bench.send_line(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
     bench.run(0.5)
     assert bench.extremes()["way"] == [0, 0, 0]
     assert bench.happened("crash") == []
@@ -175,23 +177,23 @@ def test_a_switch_that_is_stuck_closed_lets_nothing_move(bench: Bench, motor: st
     """Both ends share an input, so a stuck switch guards neither: CALIBRATE tries to leave it, and then gives up."""
     close_in_motion(bench, motor, "0.05,0.05,0.1")
     bench.run(1)
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     bench.extremes()
     for sign in ("", "-"):
-        assert bench.say(f"$RUN:{sign}0.1,{sign}0.1,{sign}0.1") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+        assert bench.send_line(f"$RUN:{sign}0.1,{sign}0.1,{sign}0.1") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
     assert bench.extremes()["way"] == [0, 0, 0]
-    bench.say("$CALIBRATE")
+    bench.send_line("$CALIBRATE")
     bench.until(Status.FAULT)
     ways = bench.extremes()["way"]
     assert max(ways[:2]) <= 0.022 and ways[2] <= 0.5
-    bench.say("$STOP")
-    assert bench.say("$RUN:0.1,0.1,0.1") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    bench.send_line("$STOP")
+    assert bench.send_line("$RUN:0.1,0.1,0.1") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
 
 
 @pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
 @pytest.mark.parametrize("axis", AXES)
 def test_a_rig_whose_counter_is_wrong_is_caught_by_its_switch(bench: Bench, axis: str, far: bool) -> None:
-    """The end is nearer than the counters say."""
+    """The end is nearer than the counters show."""
     sign = 1 if far else -1
     goal = [0.0, 0.0, 0.0]
     goal[AXES.index(axis)] = BOUNDS[axis][far] - sign * NEAR[axis]
@@ -201,18 +203,18 @@ def test_a_rig_whose_counter_is_wrong_is_caught_by_its_switch(bench: Bench, axis
     bench.run(0.3)
     assert not bench.pose()["moves"]
     assert bench.happened("crash") == []
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 
 def test_a_pair_that_is_not_square_stops(bench: Bench) -> None:
     """A driver that restarted counts from 0."""
     bench.keep_running("0,0.2,0", 0.5)
-    bench.order("short y2")
+    bench.command("short y2")
     bench.run(0.1)
     assert bench.status() == Status.FAULT
     pose = bench.pose()
     assert abs(pose["skew"]) < 0.005
     assert abs(pose["vy"]) < 0.005
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED

@@ -13,16 +13,16 @@ OFF = {"x": 3.0, "y": 3.0, "yaw": 3.2}
 
 
 def drive_into_switch(bench: Bench, axis: str, far: bool, speed: float) -> float:
-    """From the other end, while the counter says that there is room; the highest true speed."""
+    """From the other end, while the counter shows room; the highest true speed."""
     sign, index = (1 if far else -1), list(AXES).index(axis)
     goal, velocity = [0.0, 0.0, 0.0], ["0", "0", "0"]
     goal[index], velocity[index] = BOUNDS[axis][not far] + sign * 0.02, f"{sign * speed}"
     bench.go(*goal)
     for motor in AXES[axis]:
-        bench.order(f"miscount {motor} {sign * OFF[axis] / (128 * MICROSTEP[axis]):.0f}")
+        bench.command(f"miscount {motor} {sign * OFF[axis] / (128 * MICROSTEP[axis]):.0f}")
     fastest = 0.0
     for _ in range(600):
-        bench.say(f"$RUN:{','.join(velocity)}")
+        bench.send_line(f"$RUN:{','.join(velocity)}")
         bench.run(0.02)
         fastest = max(fastest, abs(bench.pose()[f"v{axis}"]))
         if bench.status() == Status.LIMIT:
@@ -33,7 +33,7 @@ def drive_into_switch(bench: Bench, axis: str, far: bool, speed: float) -> float
 def recovers(bench: Bench) -> bool:
     """CALIBRATE leads out from behind a switch, and home is where it was."""
     bench.run(0.5)
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
     bench.calibrate()
     bench.run(0.3)
@@ -51,7 +51,7 @@ def test_up_to_this_speed_the_frame_is_not_hit(bench: Bench, axis: str, speed: f
 
 @pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
 @pytest.mark.parametrize("axis", ["x", "y"])
-def test_at_full_speed_the_frame_is_hit_and_the_emulator_says_so(bench: Bench, axis: str, far: bool) -> None:
+def test_at_full_speed_the_frame_is_hit_and_reported(bench: Bench, axis: str, far: bool) -> None:
     """A hard stop from 1 m/s makes the motor slip; friction alone needs 83 mm and not 15."""
     assert drive_into_switch(bench, axis, far, SPEED[axis]) > 0.99
     bench.run(0.5)

@@ -1,4 +1,4 @@
-"""What drivers report, and what the firmware's core makes of it."""
+"""Faults that drivers report, and how the firmware's core reacts."""
 
 import pytest
 
@@ -10,7 +10,7 @@ MOTORS = ("x", "y1", "y2", "alpha")
 
 @pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize(
-    ("order", "status", "void"),
+    ("command", "status", "void"),
     [
         ("heat {} warm", Status.HOT, False),
         ("heat {} hot", Status.HOT, True),
@@ -18,50 +18,50 @@ MOTORS = ("x", "y1", "y2", "alpha")
         ("push {} 8", Status.STALL, True),
     ],
 )
-def test_trouble_stops_everything(bench: Bench, motor: str, order: str, status: Status, void: bool) -> None:
+def test_trouble_stops_everything(bench: Bench, motor: str, command: str, status: Status, void: bool) -> None:
     bench.keep_running("0.1,0.1,0.2", 0.5)
-    bench.order(order.format(motor))
+    bench.command(command.format(motor))
     bench.run(0.01)
     assert bench.status() == status
     bench.run(1)
     assert not bench.pose()["moves"]
-    assert bench.say("$POSITION")[0].startswith("$ERROR") == void
-    bench.order(f"heat {motor} cool")
-    bench.say("$STOP")
+    assert bench.send_line("$POSITION")[0].startswith("$ERROR") == void
+    bench.command(f"heat {motor} cool")
+    bench.send_line("$STOP")
     assert bench.status() == (Status.NOT_CALIBRATED if void else Status.IDLE)
     assert abs(bench.pose()["skew"]) < 0.012
 
 
 def test_a_pair_whose_counters_part_stops_and_is_void(bench: Bench) -> None:
     bench.keep_running("0,0.1,0", 0.5)
-    bench.order("miscount y2 8")
+    bench.command("miscount y2 8")
     bench.run(0.01)
     assert bench.status() == Status.FAULT
     bench.run(0.1)
     assert not bench.pose()["moves"]
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 
 def test_heat_that_lasts_comes_back(bench: Bench) -> None:
-    bench.order("heat x warm")
+    bench.command("heat x warm")
     bench.run(0.01)
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     bench.run(0.01)
     assert bench.status() == Status.HOT
 
 
 def test_motors_without_supply_are_a_fault_until_they_have_it_and_are_calibrated(bench: Bench) -> None:
     bench.keep_running("0.2,0.1,0", 0.5)
-    bench.order("motors off")
+    bench.command("motors off")
     bench.run(0.3)
     assert bench.status() == Status.FAULT
     assert bench.speed() < 1e-3
-    bench.say("$CALIBRATE")
+    bench.send_line("$CALIBRATE")
     bench.run(0.1)
     assert bench.status() == Status.FAULT
-    bench.order("motors on")
-    bench.say("$STOP")
+    bench.command("motors on")
+    bench.send_line("$STOP")
     bench.run(0.01)
     assert bench.status() == Status.NOT_CALIBRATED
     bench.calibrate()
@@ -71,9 +71,9 @@ def test_motors_without_supply_are_a_fault_until_they_have_it_and_are_calibrated
 
 def test_the_first_trouble_is_what_status_says(bench: Bench) -> None:
     bench.keep_running("0.2,0,0", 0.6)
-    bench.order("switch x closed")
+    bench.command("switch x closed")
     bench.run(0.05)
-    bench.order("heat y1 hot")
+    bench.command("heat y1 hot")
     bench.run(0.05)
     assert bench.status() == Status.LIMIT
 
@@ -81,31 +81,31 @@ def test_the_first_trouble_is_what_status_says(bench: Bench) -> None:
 def test_a_hard_stop_from_high_speed_voids_the_position(bench: Bench) -> None:
     """The motor slips, as the switch stops it harder than it can hold."""
     bench.keep_running("0.6,0,0", 1.3)
-    bench.order("switch x closed")
+    bench.command("switch x closed")
     bench.run(0.5)
     assert bench.status() == Status.LIMIT
     assert bench.happened("slip")
-    bench.order("switch x works")
-    bench.say("$STOP")
+    bench.command("switch x works")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 
 @pytest.mark.parametrize("motor", MOTORS)
-@pytest.mark.parametrize("order", ["heat {} hot", "short {}", "push {} 8", "forget {}"])
-def test_stop_does_not_hide_what_voids_the_position(bench: Bench, motor: str, order: str) -> None:
+@pytest.mark.parametrize("command", ["heat {} hot", "short {}", "push {} 8", "forget {}"])
+def test_stop_does_not_hide_what_voids_the_position(bench: Bench, motor: str, command: str) -> None:
     """STOP takes back the flags before the firmware has looked at them."""
-    bench.order(order.format(motor))
-    bench.order(f"heat {motor} cool")
-    if order.startswith("push"):
-        bench.order("pass 0.0005")
-    bench.say("$STOP")
+    bench.command(command.format(motor))
+    bench.command(f"heat {motor} cool")
+    if command.startswith("push"):
+        bench.command("pass 0.0005")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
 
 
 def test_stop_does_not_hide_a_dip_of_the_supply(bench: Bench) -> None:
-    bench.order("motors off")
-    bench.order("motors on")
-    bench.say("$STOP")
+    bench.command("motors off")
+    bench.command("motors on")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
     bench.run(0.1)
     assert bench.status() == Status.NOT_CALIBRATED
@@ -113,11 +113,11 @@ def test_stop_does_not_hide_a_dip_of_the_supply(bench: Bench) -> None:
 
 @pytest.mark.parametrize("wire", ["spi", "clock", "data"])
 @pytest.mark.parametrize("line", ["$RUN:0.3,0.2,0.4", "$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
-def test_drivers_that_cannot_be_told_lose_their_current(bench: Bench, wire: str, line: str) -> None:
+def test_drivers_that_cannot_be_reached_lose_their_current(bench: Bench, wire: str, line: str) -> None:
     for _ in range(15):
-        bench.say(line)
+        bench.send_line(line)
         bench.run(0.05)
-    bench.order(f"cut {wire}")
+    bench.command(f"cut {wire}")
     bench.run(0.02)
     assert bench.status() == Status.FAULT
     bench.run(0.15)
@@ -125,14 +125,14 @@ def test_drivers_that_cannot_be_told_lose_their_current(bench: Bench, wire: str,
     assert not pose["moves"]
     assert abs(pose["vx"]) + abs(pose["vy"]) + abs(pose["vyaw"]) < 1e-3
     for attempt in ("$STOP", "$CALIBRATE", line):
-        bench.say(attempt)
+        bench.send_line(attempt)
         bench.run(0.1)
         assert bench.status() == Status.FAULT
     assert not bench.pose()["moves"]
-    bench.order("cut nothing")
+    bench.command("cut nothing")
     bench.run(0.1)
     assert bench.status() == Status.FAULT
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED
     bench.calibrate()
     bench.go(0.1, 0.1, 0.1)

@@ -24,7 +24,7 @@ def close_port(rig: Rig) -> None:
     rig.close()
 
 
-def say_nothing(rig: Rig) -> None:
+def stay_silent(rig: Rig) -> None:
     """The host hangs with its port open."""
 
 
@@ -36,23 +36,23 @@ def only_garbage(rig: Rig) -> None:
 
 def pull_cable(rig: Rig) -> None:
     """The controller has a supply of its own."""
-    rig.order("unplug")
+    rig.command("unplug")
 
 
 def pull_cable_and_power(rig: Rig) -> None:
-    rig.order("unplug power")
+    rig.command("unplug power")
 
 
 def hang(rig: Rig) -> None:
-    rig.order("hang")
+    rig.command("hang")
 
 
 def hold_in_reset(rig: Rig) -> None:
-    rig.order("hold on")
+    rig.command("hold on")
 
 
 def motor_supply(rig: Rig) -> None:
-    rig.order("motors off")
+    rig.command("motors off")
 
 
 def open_again(rig: Rig) -> None:
@@ -76,7 +76,7 @@ def kill_client(rig: Rig) -> None:
 
 
 SILENT, SOON, START = (WATCHDOG, WATCHDOG), (0.0, 0.21), (0.0, 0.19)
-BEGINS = {close_port: SILENT, say_nothing: SILENT, only_garbage: SILENT, pull_cable: SILENT}
+BEGINS = {close_port: SILENT, stay_silent: SILENT, only_garbage: SILENT, pull_cable: SILENT}
 BEGINS |= {kill_client: SILENT, hang: SOON, open_again: START}
 """s after the last RUN between which braking begins; 20 ms pass before the plug is pulled, and 170 ms with the port."""
 ABRUPT = [pull_cable_and_power, hold_in_reset, motor_supply]
@@ -93,7 +93,7 @@ def speeds(rig: Rig, seconds: float) -> list[tuple[float, ...]]:
 
 def braking_begins(rig: Rig, pull: Callable[[Rig], None]) -> float:
     """s after the last RUN until all axes have lost speed."""
-    rig.say(f"$RUN:{VELOCITY}")
+    rig.send_line(f"$RUN:{VELOCITY}")
     begin, before = rig.pose()["t"] - 0.01, speeds(rig, 0.01)[0]
     pull(rig)
     while not all(now < then - 0.005 for now, then in zip(speeds(rig, 0.01)[0], before, strict=True)):
@@ -128,7 +128,7 @@ def test_the_rig_stops_at_once_without_power(rig: Rig, pull: Callable[[Rig], Non
 
 def test_after_the_cable_alone_it_goes_on_where_it_was(rig: Rig) -> None:
     rig.keep_running(VELOCITY, 1)
-    rig.order("unplug")
+    rig.command("unplug")
     rig.close()
     rig.run(2)
     rig.plug()
@@ -139,7 +139,7 @@ def test_after_the_cable_alone_it_goes_on_where_it_was(rig: Rig) -> None:
 
 def test_after_a_loss_of_power_it_asks_for_calibrate(rig: Rig) -> None:
     rig.keep_running(VELOCITY, 1)
-    rig.order("unplug power")
+    rig.command("unplug power")
     rig.close()
     rig.run(2)
     rig.plug()

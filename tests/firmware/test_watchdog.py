@@ -8,7 +8,7 @@ from tests.firmware.programs import Bench
 
 def test_silence_begins_braking_after_500_ms(bench: Bench) -> None:
     bench.keep_running("0.3,0,0", 1)
-    bench.say("$RUN:0.3,0,0")
+    bench.send_line("$RUN:0.3,0,0")
     bench.run(WATCHDOG - 0.01)
     assert bench.pose()["vx"] == pytest.approx(0.3, rel=0.02)
     bench.run(0.06)
@@ -36,7 +36,7 @@ def test_each_run_counts_anew(bench: Bench) -> None:
 def test_only_a_valid_run_keeps_it_alive(bench: Bench, line: str) -> None:
     bench.keep_running("0.1,0,0", 0.3)
     for _ in range(12):
-        bench.say(line)
+        bench.send_line(line)
         bench.run(0.05)
     assert bench.status() == Status.WATCHDOG
 
@@ -44,12 +44,12 @@ def test_only_a_valid_run_keeps_it_alive(bench: Bench, line: str) -> None:
 def test_run_waits_for_stop_afterwards(bench: Bench) -> None:
     bench.keep_running("0.1,0,0", 0.3)
     bench.run(1)
-    assert bench.say("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.TROUBLE)}"]
+    assert bench.send_line("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.TROUBLE)}"]
     bench.run(0.2)
     assert not bench.pose()["moves"]
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == Status.IDLE
-    assert bench.say("$RUN:0.1,0,0") == []
+    assert bench.send_line("$RUN:0.1,0,0") == []
 
 
 def test_goto_acknowledges_it(bench: Bench) -> None:
@@ -61,7 +61,7 @@ def test_goto_acknowledges_it(bench: Bench) -> None:
 
 @pytest.mark.parametrize("line", ["$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
 def test_goto_and_calibrate_brake_when_nobody_is_there(bench: Bench, line: str) -> None:
-    bench.say(line)
+    bench.send_line(line)
     bench.watch(0.6)
     bench.run(WATCHDOG - 0.01)
     before = abs(bench.pose()["vx"])
@@ -71,13 +71,13 @@ def test_goto_and_calibrate_brake_when_nobody_is_there(bench: Bench, line: str) 
     bench.run(2)
     assert not bench.pose()["moves"]
     assert max(bench.extremes()["ramp"][:2]) <= 0.5
-    bench.say("$STOP")
+    bench.send_line("$STOP")
     assert bench.status() == (Status.IDLE if "GOTO" in line else Status.NOT_CALIBRATED)
 
 
 def test_goto_brakes_when_nobody_is_there_before_it_sets_off(bench: Bench) -> None:
     bench.keep_running("0.8,0,0", 1.6)
-    bench.say("$GOTO:-0.5,0,0")
+    bench.send_line("$GOTO:-0.5,0,0")
     bench.run(WATCHDOG + 0.01)
     assert bench.status() == Status.WATCHDOG
     assert bench.pose()["moves"]
@@ -87,10 +87,10 @@ def test_goto_brakes_when_nobody_is_there_before_it_sets_off(bench: Bench) -> No
 
 @pytest.mark.parametrize("line", ["$STATUS", "$POSITION"])
 def test_goto_goes_on_while_somebody_asks(bench: Bench, line: str) -> None:
-    bench.say("$GOTO:0.5,0,0")
+    bench.send_line("$GOTO:0.5,0,0")
     for _ in range(12):
         bench.run(WATCHDOG - 0.02)
-        bench.say(line)
+        bench.send_line(line)
     assert bench.status() == Status.IDLE
     assert bench.position()[0] == pytest.approx(0.5, abs=1e-5)
 
@@ -98,17 +98,17 @@ def test_goto_goes_on_while_somebody_asks(bench: Bench, line: str) -> None:
 @pytest.mark.parametrize("line", ["$GOTO:2,0,0", "$NOISE", "$RUN:1", "STATUS", ""])
 @pytest.mark.parametrize("motion", ["$GOTO:0.7,0.5,2", "$CALIBRATE"])
 def test_a_line_with_a_mistake_is_nobody(bench: Bench, motion: str, line: str) -> None:
-    bench.say(motion)
+    bench.send_line(motion)
     for _ in range(12):
         bench.run(0.05)
-        bench.say(line)
+        bench.send_line(line)
     assert bench.status() == Status.WATCHDOG
 
 
 def test_calibrate_without_anybody_is_not_calibrated(bench: Bench) -> None:
-    bench.say("$CALIBRATE")
+    bench.send_line("$CALIBRATE")
     bench.run(2)
-    assert bench.say("$GOTO:0,0,0") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
+    assert bench.send_line("$GOTO:0,0,0") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
     bench.calibrate()
     bench.go(0, 0, 0)
 
@@ -119,10 +119,10 @@ WRAPS = [0.02, 0.25, 0.49]
 
 @pytest.mark.parametrize("wraps", WRAPS)
 def test_silence_is_noticed_in_time_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
-    bench.order(f"wraps {1.0 + wraps}")
+    bench.command(f"wraps {1.0 + wraps}")
     bench.keep_running("0.3,0,0", 1)
-    bench.order(f"wraps {wraps}")
-    bench.say("$RUN:0.3,0,0")
+    bench.command(f"wraps {wraps}")
+    bench.send_line("$RUN:0.3,0,0")
     bench.run(WATCHDOG - 0.01)
     assert bench.status() == Status.MOVING
     assert bench.pose()["vx"] == pytest.approx(0.3, rel=0.02)
@@ -133,18 +133,18 @@ def test_silence_is_noticed_in_time_while_the_clock_wraps(bench: Bench, wraps: f
 
 @pytest.mark.parametrize("wraps", WRAPS)
 def test_a_run_lives_on_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
-    bench.order(f"wraps {wraps}")
+    bench.command(f"wraps {wraps}")
     bench.keep_running("0.1,0,0", 2, every=0.4)
     assert bench.status() == Status.MOVING
 
 
 @pytest.mark.parametrize("wraps", WRAPS)
 def test_goto_is_watched_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
-    bench.order(f"wraps {wraps}")
-    bench.say("$GOTO:0.9,0,0")
+    bench.command(f"wraps {wraps}")
+    bench.send_line("$GOTO:0.9,0,0")
     bench.run(WATCHDOG - 0.02)
     assert bench.status() == Status.MOVING
-    bench.order(f"wraps {wraps}")
-    bench.say("$STATUS")
+    bench.command(f"wraps {wraps}")
+    bench.send_line("$STATUS")
     bench.run(WATCHDOG + 0.02)
     assert bench.status() == Status.WATCHDOG
