@@ -14,7 +14,7 @@ from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
 from tests.run.desk import wait_for
 from tests.run.helpers import BEGUN, DRIVES, PASS, READY, WAIT
-from tests.run.test_faults import FAULTS, NEIGHBOUR
+from tests.run.process.test_faults import FAULTS, NEIGHBOUR
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("host"), pytest.mark.usefixtures("images")]
 
@@ -63,7 +63,7 @@ def test_faults_at_once(crate: Crate, book: Book) -> None:
         jobs.append(crate.job("pull", image=registry.image))
         outcomes = crate.run(*jobs)
     said = [text for _, text in crate.progress.phases]
-    assert f"pulling {registry.image}: the connection broke, the engine tries again" in said
+    assert f"pulling {registry.image}: the connection broke, the engine retries" in said
     assert outcomes["neighbour"].outcome == "passed", outcomes["neighbour"].reason
     for slug, (_, outcome, sentence) in KINDS.items():
         assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)

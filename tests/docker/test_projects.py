@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.run import capabilities, leases
+from dodo_dsl.run import leases
+from dodo_dsl.run.capabilities import examine
 from dodo_dsl.run.docker.archive import copy_out
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, reap_projects
 from dodo_dsl.run.docker.client import connect
@@ -44,12 +45,12 @@ def test_a_strangers_container_on_a_leftover_network_blocks_nothing_else(client:
         assert reaped.removed == ["b-free: 2 containers, networks and volumes"]
         (left,) = reaped.left
         assert left.startswith(f"a-blocked: project {blocked.name}: ") and "has active endpoints" in left
-        assert capabilities.clean().left == reaped.left, "it is tried again, and said again"
+        assert examine.clean().left == reaped.left, "it is tried again, and said again"
         stranger.reload()
         assert stranger.status == "running"
     finally:
         stranger.remove(force=True)
-    assert capabilities.clean().removed == ["a-blocked: 1 containers, networks and volumes"]
+    assert examine.clean().removed == ["a-blocked: 1 containers, networks and volumes"]
     assert list(leases.folder().glob("*.json")) == []
 
 
@@ -59,8 +60,8 @@ def test_files_of_a_container_come_out(client: Any, base_image: str, tmp_path: P
     try:
         container.wait()
         copy_out(container, "/report/.", tmp_path / "out")
-        with pytest.raises(OSError, match="they are more than 1,000,000 bytes"):
-            copy_out(container, "/report/.", tmp_path / "less", most=1_000_000)
+        with pytest.raises(OSError, match="more than 1,000,000 bytes"):
+            copy_out(container, "/report/.", tmp_path / "less", max_bytes=1_000_000)
     finally:
         container.remove(force=True)
     assert {p.name: p.stat().st_size for p in (tmp_path / "out").iterdir()} == {"test.rec": 3_000_000}

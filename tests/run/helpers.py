@@ -16,19 +16,19 @@ PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "
 FAIL = 'print(\'{"dodo": "verdict", "outcome": "failed", "reason": "hit wall left", "checks": []}\', flush=True)\n'
 WAIT = "import time; time.sleep(600)\n"
 STARTED = 'open(sys.argv[0].rpartition("-")[0] + "-started", "w").close()\n'
-"""What an application does first, so that others, by BEGUN, go on only when the test has begun."""
-BEGUN = """
+"""What an application does first, so that others, by AFTER_START or BEGUN, go on only when the test has begun."""
+AFTER_START = """
 while not os.path.exists(sys.argv[0].rpartition("-")[0] + "-started"):
-    time.sleep(0.05)
-time.sleep(1)
+    time.sleep(0.02)
 """
+BEGUN = AFTER_START + "time.sleep(1)\n"
 DRIVES = READY + BEGUN + "time.sleep(1)\n" + PASS
 CIDS = range(200, 230)
 
 
 @dataclass
 class Recorded:
-    """A Progress that remembers what it was told."""
+    """A Progress that remembers its calls."""
 
     notes: list[str] = field(default_factory=list)
     phases: list[tuple[str, str]] = field(default_factory=list)

@@ -1,31 +1,53 @@
-"""What ``dodo doctor`` says of a machine on which even looking fails."""
+"""What ``dodo doctor`` finds on machines that lack something."""
 
 from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import capabilities
+from dodo_dsl.run.capabilities import programs
+from dodo_dsl.run.capabilities.examine import examine, rigs, state_folder
+from dodo_dsl.run.rigs.quarantine import quarantine
 from services.gantry import emulator
 
 
-def test_what_cannot_be_looked_at_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In a folder that is gone; what else there is to look at is looked at."""
+@pytest.mark.slow
+def test_what_cannot_be_examined_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a folder that is gone; everything else is examined."""
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
-    found = {finding.name: finding for finding in capabilities.examine()}
-    assert (found["disk"].state, found["disk"].text[:22]) == ("problem", "cannot be looked at: [")
+    found = {finding.name: finding for finding in examine()}
+    assert (found["disk"].state, found["disk"].text[:22]) == ("problem", "cannot be examined: [E")
     assert {"multicast", "shared memory", "docker engine", "left behind"} <= set(found)
 
 
 def test_whether_the_emulated_rig_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Looked for where the gantry looks."""
-    assert (capabilities.FIRMWARE, capabilities.EMULATOR_PLACES) == (emulator.FOLDER, emulator.PLACES)
-    monkeypatch.setenv(capabilities.FIRMWARE, str(tmp_path))
-    found = {finding.name: finding for finding in capabilities.examine()}["emulated rig"]
+    assert (programs.FIRMWARE, programs.EMULATOR_PLACES) == (emulator.FOLDER, emulator.PLACES)
+    monkeypatch.setenv(programs.FIRMWARE, str(tmp_path))
+    (found,) = programs.emulated_rig()
     assert (found.state, found.text) == ("warning", f"is not built: it is not in {tmp_path}")
     assert "make firmware in DoDo's checkout, or set DODO_FIRMWARE to its folder" in found.advice
     for name in ("rig-emulator", "gantry.elf"):
         (tmp_path / name).write_bytes(b"")
-    found = {finding.name: finding for finding in capabilities.examine()}["emulated rig"]
+    (found,) = programs.emulated_rig()
     assert (found.state, found.text) == ("ok", f"is built, in {tmp_path}")
+
+
+def test_a_user_without_a_home_folder_gets_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "XDG_STATE_HOME", "DODO_HISTORY", "DODO_RIGS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
+    found = [*state_folder(), *rigs()]
+    assert [(finding.name, finding.state) for finding in found] == [("state folder", "warning"), ("rigs", "warning")]
+    told = "user 3999999999 has no home folder: set DODO_RIGS or XDG_STATE_HOME"
+    assert found[1].text == f"quarantines cannot be kept: {told}"
+
+
+def test_rigs_in_quarantine_are_problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path))
+    assert list(rigs()) == []
+    quarantine("kiwi", "it has lost steps")
+    (found,) = rigs()
+    assert (found.name, found.state, found.text) == ("rig kiwi", "problem", "in quarantine: it has lost steps")
+    assert found.advice == "repair it, then dodo rig clear kiwi"

@@ -1,4 +1,7 @@
-"""What happens in a test and what becomes of it, each with real processes, in namespaces and on the host."""
+"""Tests with real processes in a real sandbox: what starts them, watches them, keeps them apart and ends them.
+
+What becomes of a test whatever its processes do is tested without them, in ``tests/run/test_engine.py``.
+"""
 
 import os
 from dataclasses import replace
@@ -9,149 +12,129 @@ import pytest
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run import engine
 from dodo_dsl.run.process.host_isolation import namespaces_refusal
-from tests.run.helpers import FAIL, PASS, READY, WAIT, Bench
+from tests.run.desk import processes_with
+from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """Tests on the host, where a sandbox takes least time to start."""
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    return Bench(tmp_path, "host")
 
 
 @pytest.fixture(params=["network", "host"])
-def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+def bench(request: pytest.FixtureRequest, host: Bench) -> Bench:
     if request.param == "network" and (why := namespaces_refusal()):
         pytest.skip(f"no namespaces here: {why}")
-    return Bench(tmp_path, request.param)
+    host.isolation = request.param
+    return host
 
 
-CASES = {
+DECISIONS = {
     "passes": ({}, "passed", "it drove"),
-    "fails": ({"judge": READY + FAIL}, "failed", "hit wall left"),
-    "application-exits-0": (
-        {"application": "", "judge": READY + WAIT},
-        "failed",
-        "application service 'app' ended with exit code 0 after",
-    ),
     "application-crashes": (
-        {"application": "raise SystemExit(3)", "judge": READY + WAIT},
+        {"application": "print('cone lost'); raise SystemExit(7)", "judge": READY + WAIT},
         "failed",
-        "application service 'app' ended with exit code 3 after",
+        "application service 'app' ended with exit code 7 after",
     ),
-    "judge-crashes-after-its-verdict": (
-        {"judge": READY + PASS + "raise SystemExit(2)"},
+    "service-is-killed": (
+        {"environment": READY + "os.kill(os.getpid(), 9)", "judge": READY + WAIT},
         "error",
-        "service 'judge' of layer evaluation ended with exit code 2",
+        "service 'camera' of layer environment was killed by SIGKILL",
     ),
-    "verdict-before-the-begin": (
-        {"judge": PASS + READY + WAIT},
-        "error",
-        "evaluator 'judge' gave a verdict before the test began",
-    ),
-    "timeout": (
-        {"judge": READY + WAIT, "timeout_s": 0.5},
-        "error",
-        "evaluator 'judge' gave no verdict within the timeout of 0.5 s",
-    ),
-    "camera-crashes": (
-        {"environment": READY + "time.sleep(0.2); raise SystemExit(1)", "judge": READY + WAIT},
-        "error",
-        "service 'camera' of layer environment ended with exit code 1",
-    ),
-    "camera-never-ready": (
-        {"environment": "raise SystemExit(0)"},
-        "error",
-        "service 'camera' of layer environment ended with exit code 0 during set-up, before it was ready",
-    ),
-    "source-runs-out": ({"environment": READY + "time.sleep(0.1)"}, "passed", "it drove"),
-    "application-says-it-passed": (
+    "application-says-that-it-passed": (
         {"application": PASS + WAIT, "judge": READY + WAIT, "timeout_s": 0.5},
         "error",
-        "evaluator 'judge' gave no verdict",
+        "evaluator 'judge' gave no verdict within the timeout of 0.5 s",
     ),
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_outcome(bench: Bench, case: str) -> None:
-    parts, expected, reason = CASES[case]
-    (outcome,) = bench.run(bench.plan(**parts))
-    assert (outcome.outcome, outcome.reason[: len(reason)]) == (expected, reason)
+def test_what_processes_do_decides(host: Bench) -> None:
+    """Exits, signals and lines of output reach the engine; all tests at once."""
+    plans = [host.plan(**parts, slug=slug) for slug, (parts, _, _) in DECISIONS.items()]
+    outcomes = {outcome.slug: outcome for outcome in host.run(*plans)}
+    for slug, (_, expected, reason) in DECISIONS.items():
+        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(reason)]) == (expected, reason)
+    assert outcomes["application-crashes"].last_lines == ("cone lost",)
+    assert host.log(plans[1], "application.app") == "cone lost\n"
 
 
-def test_missing_program_is_an_error(bench: Bench) -> None:
+def test_missing_program_is_an_error(host: Bench) -> None:
     broken = Application(".", (ApplicationService("app", ("no-such-program-of-dodo",)),))
-    (outcome,) = bench.run(replace(bench.plan(), application=broken))
+    (outcome,) = host.run(replace(host.plan(), application=broken))
     assert outcome.outcome == "error"
     assert outcome.reason == "service 'app' could not be started: no-such-program-of-dodo: No such file or directory"
 
 
-def test_last_lines_and_logs_of_the_service_that_decided(bench: Bench) -> None:
-    plan = bench.plan(judge=READY + WAIT, application="print('cone lost'); raise SystemExit(7)")
-    (outcome,) = bench.run(plan)
-    assert outcome.last_lines == ("cone lost",)
-    assert bench.log(plan, "application.app") == "cone lost\n"
+def test_variables_file_of_an_unknown_user_is_an_error_of_its_test_alone(host: Bench) -> None:
+    broken = host.plan(slug="broken")
+    (app,) = broken.application.services
+    app = replace(app, env_files=("~no-such-user-at-all/own.env",))
+    broken = replace(broken, application=replace(broken.application, services=(app,)))
+    first, second = host.run(broken, host.plan(slug="beside"))
+    told = "service 'app' could not be started: there is no home folder for '~no-such-user-at-all/own.env'"
+    assert (first.outcome, first.reason, second.outcome) == ("error", told, "passed")
 
 
-def test_everything_is_gone_afterwards(bench: Bench) -> None:
-    """Services that ignore SIGTERM, and daemons that left their session, end with the test."""
+STUBBORN = """
+import signal, subprocess
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)", "{mark}"], start_new_session=True)
+print(sys.argv[1:], flush=True)
+"""
+
+
+def test_tests_at_once_are_apart_and_leave_nothing(bench: Bench) -> None:
+    """Services that ignore SIGTERM, and daemons that left their session, end with the test.
+
+    Each application sees its own flags; on the host these differ from test to test.
+    """
     mark = f"dodo-mark-{os.getpid()}-{bench.isolation}"
-    daemon = f'[sys.executable, "-c", "import time; time.sleep(600)", "{mark}"]'
-    stubborn = "import signal, subprocess\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
-    stubborn += f"subprocess.Popen({daemon}, start_new_session=True)\n" + WAIT
-    (outcome,) = bench.run(bench.plan(application=stubborn))
-    assert outcome.outcome == "passed"
-    left = [p for p in Path("/proc").glob("[0-9]*/cmdline") if mark.encode() in _read(p)]
-    assert left == []
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError:
-        return b""
-
-
-def test_tests_at_once_do_not_share_cid_or_memory(bench: Bench) -> None:
-    """Each application sees its own flags; on the host these differ from test to test."""
-    show = "print(sys.argv[1:], flush=True)\n" + WAIT
-    plans = [bench.plan(application=show, slug=f"test-{n}") for n in range(3)]
+    application = STUBBORN.format(mark=mark) + STARTED + WAIT
+    judge = READY + AFTER_START + PASS
+    plans = [bench.plan(judge=judge, application=application, slug=f"test-{n}") for n in range(3)]
     outcomes = bench.run(*plans, parallel=3)
     assert [o.outcome for o in outcomes] == ["passed"] * 3
-    told = [bench.log(p, "application.app") for p in plans]
+    assert processes_with(mark) == []
+    assert _fork_servers() == []
+    assert list((bench.folder / "leases").glob("*.json")) == []
+    shown = [bench.log(p, "application.app") for p in plans]
     if bench.isolation == "host":
         assert len({o.cid for o in outcomes}) == 3
-        assert len(set(told)) == 3
-        assert all("--name=dodo-" in t for t in told)
+        assert len(set(shown)) == 3
+        assert all("--name=dodo-" in t for t in shown)
     else:
-        assert all("'--name=video0.argb'" in t for t in told)
-    assert all(f"--cid={o.cid}" in t for o, t in zip(outcomes, told, strict=True))
+        assert all("'--name=video0.argb'" in t for t in shown)
+    assert all(f"--cid={o.cid}" in t for o, t in zip(outcomes, shown, strict=True))
 
 
-def test_application_without_flags_runs_alone_on_the_host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    bench = Bench(tmp_path, "host")
+def _fork_servers() -> list[str]:
+    """Those that this process has started."""
+    children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    return [pid for pid in processes_with("dodo_dsl.run.process.fork_server") if pid in children]
+
+
+def test_application_without_flags_runs_alone_on_the_host(host: Bench) -> None:
     span = "import time, pathlib\nt = time.monotonic()\n" + READY + "time.sleep(0.4)\n"
     span += "open(sys.argv[0] + '.span', 'w').write(f'{t} {time.monotonic()}')\n" + PASS
-    outcomes = bench.run(*(bench.plan(judge=span, slug=f"alone-{n}", command=()) for n in range(2)), parallel=2)
+    outcomes = host.run(*(host.plan(judge=span, slug=f"alone-{n}", command=()) for n in range(2)), parallel=2)
     assert [o.outcome for o in outcomes] == ["passed"] * 2
-    spans = sorted(tuple(map(float, p.read_text().split())) for p in tmp_path.glob("*.span"))
+    spans = sorted(tuple(map(float, p.read_text().split())) for p in host.folder.glob("*.span"))
     assert len(spans) == 2
     assert spans[0][1] <= spans[1][0]
 
 
-def test_set_up_and_execution_are_measured_apart(bench: Bench) -> None:
-    judge = READY + "time.sleep(2.0)\n" + PASS
-    (outcome,) = bench.run(bench.plan(environment="time.sleep(0.5)\n" + READY + WAIT, judge=judge))
-    assert outcome.setup_s is not None
-    assert outcome.execution_s is not None
+def test_services_are_waited_for_until_they_are_ready(host: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A service with a longer set-up than others may take by its manifest."""
+    monkeypatch.setattr(engine, "READY_PATIENCE_S", 0.1)
+    plan = host.plan(environment="time.sleep(0.5)\n" + READY + WAIT)
+    services = tuple(replace(service, setup_s=30.0) for service in plan.services)
+    (outcome,) = host.run(replace(plan, services=services))
+    assert outcome.outcome == "passed"
+    assert outcome.setup_s is not None and outcome.execution_s is not None
     assert outcome.setup_s >= 0.5
-    assert outcome.execution_s > 0.3
-
-
-def test_a_service_that_may_take_longer_to_get_ready_is_waited_for(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two that need two seconds, with one for all services: one of them has more by its manifest."""
-    monkeypatch.setattr(engine, "READY_PATIENCE_S", 1.0)
-    slow = bench.plan(environment="time.sleep(2)\n" + READY + WAIT, slug="slow")
-    camera, judge = slow.services
-    patient = replace(slow, name="patient", slug="patient", services=(replace(camera, setup_s=30.0), judge))
-    outcomes = bench.run(slow, patient)
-    assert [o.outcome for o in outcomes] == ["error", "passed"]
-    assert outcomes[0].reason == "service 'camera' was not ready within 1 s"
+    assert outcome.execution_s >= 0.3

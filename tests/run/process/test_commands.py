@@ -7,7 +7,8 @@ import pytest
 from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.run.process.commands import Commands, Lane
+from dodo_dsl.run.process.commands import Commands
+from dodo_dsl.run.process.slot import Slot
 
 COMPOSE = """\
 services:
@@ -34,7 +35,7 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     application = plan_application(source, 140, "host", folder, ())
     common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox", ())
     plan = Plan("t", "t", "t.dodo.yml", *common, application)
-    commands = Commands(plan, folder, tmp_path / "report", Lane(150))
+    commands = Commands(plan, folder, tmp_path / "report", Slot(150))
     (command,) = [commands.of(service) for service in application.services]
     assert command.argv == (
         *("python", "planner.py", "run", "--cid=150", "--rate=20", "--greeting=costs $5"),

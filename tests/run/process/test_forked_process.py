@@ -1,6 +1,5 @@
 """A forked module is as one that was started."""
 
-import os
 import subprocess
 import sys
 import textwrap
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.forked_process import Forked
+from dodo_dsl.run.process.forked_process import ForkedModule
 
 TELLS = """
 import os, signal, sys
@@ -21,11 +20,11 @@ print("an error", file=sys.stderr)
 
 PARENT = """
 import signal, sys
-from dodo_dsl.run.process.forked_process import Forked
+from dodo_dsl.run.process.forked_process import ForkedModule
 signal.signal(signal.SIGTERM, lambda *_: None)
 sys.path.insert(0, sys.argv[1])
 with open(sys.argv[1] + "/log", "wb") as log:
-    child = Forked(["python", "-m", sys.argv[2], "--a=b", "c"], {"ONLY": "1"}, sys.argv[1], log.fileno())
+    child = ForkedModule(["python", "-m", sys.argv[2], "--a=b", "c"], {"ONLY": "1"}, sys.argv[1], log.fileno())
 print(child.wait())
 """
 
@@ -76,24 +75,4 @@ def test_a_module_that_is_not_there(tmp_path: Path) -> None:
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="gone"):
-        Forked(["python", "-m", "this"], {}, str(tmp_path / "gone"), 1)
-
-
-def test_what_the_nursery_loads_has_no_thread() -> None:
-    """The kernel lets a process with several threads into no user namespace of its own."""
-    load = "from dodo_dsl.run.process import fork_server; fork_server.load()"
-    code = f"{load}; import os; print(len(os.listdir('/proc/self/task')))"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout == "1\n"
-
-
-@pytest.mark.parametrize("threads", [None, "3"])
-def test_the_variables_are_as_before(threads: str | None) -> None:
-    """Applications are started with them."""
-    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-    environment.update({} if threads is None else {"OPENBLAS_NUM_THREADS": threads})
-    load = "from dodo_dsl.run.process import fork_server; b = dict(os.environ); fork_server.load()"
-    code = f"import os; {load}; print(b == os.environ)"
-    words = [sys.executable, "-c", code]
-    result = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
-    assert result.stdout == "True\n"
+        ForkedModule(["python", "-m", "this"], {}, str(tmp_path / "gone"), 1)

@@ -1,4 +1,4 @@
-"""What the process backend does when its sandbox does not."""
+"""What the process backend does when its sandbox or its fork server does not answer."""
 
 import signal
 import socket
@@ -13,17 +13,18 @@ from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.run.helpers import Bench
 
 
-def test_a_sandbox_that_reads_nothing_is_not_waited_for_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sandbox_that_reads_nothing_is_waited_for_only_so_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sandbox_client, "CLOSE_S", 0.1)
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setblocking(False)
     with ours, theirs, pytest.raises(OSError, match=r"it has read nothing for 0\.1 s"):
         for _ in range(1000):
-            sandbox_client.send_patiently(ours, bytes(10_000), ())
+            sandbox_client.send_with_patience(ours, bytes(10_000), ())
 
 
+@pytest.mark.slow
 def test_an_environment_that_is_too_large_is_the_services_fault(tmp_path: Path) -> None:
-    bench = Bench(tmp_path)
+    bench = Bench(tmp_path, "host")
     plan = bench.plan()
     (app,) = plan.application.services
     large = replace(app, environment={f"LARGE_{n}": "x" * 10_000 for n in range(14)})
@@ -33,11 +34,12 @@ def test_an_environment_that_is_too_large_is_the_services_fault(tmp_path: Path) 
     assert outcome.reason.endswith(" bytes of words and variables, expected at most 131,072")
 
 
-def test_without_a_nursery_a_sandbox_of_its_own_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The nursery has gone before it was asked, and while it was."""
+@pytest.mark.slow
+def test_without_a_fork_server_a_sandbox_of_its_own_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fork server ends before the request, and during it."""
     if why := namespaces_refusal():
         pytest.skip(f"no namespaces here: {why}")
-    real = fork_server_client.Nursery
+    real = fork_server_client.ForkServer
 
     class Gone(real):  # type: ignore[misc, valid-type]
         def __init__(self, descriptors: tuple[int, ...]) -> None:
@@ -52,25 +54,9 @@ def test_without_a_nursery_a_sandbox_of_its_own_is_started(tmp_path: Path, monke
             self._process.kill()
 
     for number, kind in enumerate((Gone, Going)):
-        monkeypatch.setattr(backends, "Nursery", kind)
+        monkeypatch.setattr(backends, "ForkServer", kind)
         folder = tmp_path / str(number)
         folder.mkdir()
         bench = Bench(folder, "network")
         (outcome,) = bench.run(bench.plan())
         assert (outcome.outcome, outcome.reason) == ("passed", "it drove")
-
-
-def test_the_nursery_is_gone_after_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if why := namespaces_refusal():
-        pytest.skip(f"no namespaces here: {why}")
-    made = []
-    real = fork_server_client.Nursery
-
-    def remembered(descriptors: tuple[int, ...]) -> fork_server_client.Nursery:
-        made.append(real(descriptors))
-        return made[-1]
-
-    monkeypatch.setattr(backends, "Nursery", remembered)
-    bench = Bench(tmp_path, "network")
-    bench.run(bench.plan())
-    assert [nursery._process.poll() for nursery in made] == [0]

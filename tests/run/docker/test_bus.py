@@ -1,0 +1,49 @@
+"""The begin of a test, announced through its sandbox container or on the host."""
+
+import asyncio
+
+import pytest
+
+from dodo_dsl.opendlv.bus.envelope import decode_frame
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.run.docker.bus import announce_begin
+from dodo_dsl.run.protocol import BackendError
+
+
+class Sandbox:
+    """A container that remembers a command, and ends it with a code and an output."""
+
+    def __init__(self, code: int, output: bytes | None) -> None:
+        self.answer = (code, output)
+        self.words: list[str] = []
+
+    def exec_run(self, words: list[str]) -> tuple[int, bytes | None]:
+        self.words = words
+        return self.answer
+
+
+def test_it_is_received_on_the_host(cid: int) -> None:
+    with Session(cid) as session:
+        asyncio.run(announce_begin(cid, 7, None))
+        envelope = session.receive(5.0)
+    assert envelope is not None
+    assert session.messages.decode(envelope.data_type, envelope.payload).seed == 7  # type: ignore[attr-defined]
+
+
+def test_a_host_that_cannot_send_is_an_error() -> None:
+    with pytest.raises(BackendError, match="the begin of the test cannot be announced on its bus: "):
+        asyncio.run(announce_begin(999, 7, None))
+
+
+def test_the_sandbox_sends_the_datagram_to_the_group() -> None:
+    sandbox = Sandbox(0, b"")
+    asyncio.run(announce_begin(140, 7, sandbox))
+    *_, escaped, group, port = sandbox.words
+    assert (group, port) == ("225.0.0.140", "12175")
+    assert decode_frame(bytes.fromhex(escaped.replace("\\x", ""))).data_type > 0
+
+
+@pytest.mark.parametrize(("output", "problem"), [(b"no such file\n", "no such file"), (None, "exit code 1")])
+def test_a_command_that_fails_is_an_error(output: bytes | None, problem: str) -> None:
+    with pytest.raises(BackendError, match=f"cannot be announced on its bus: {problem}$"):
+        asyncio.run(announce_begin(140, 7, Sandbox(1, output)))
