@@ -86,7 +86,7 @@ class ScriptedBackend:
     close_problem: Exception | None = None
     tails: Mapping[str, list[str]] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
-    name: str = "scripted"
+    name: str = "process"
 
     def __post_init__(self) -> None:
         self.cid = self.plan.cid + 1
@@ -145,7 +145,7 @@ class ScriptedBackends:
     make: Callable[[Plan, int], ScriptedBackend] = lambda plan, _: ScriptedBackend(plan, drives())
     open_problem: BackendError | OSError | None = None
     leave_problem: Exception | None = None
-    name: str = "scripted"
+    name: str = "process"
     began: list[str] = field(default_factory=list)
     now: int = 0
     most: int = 0

@@ -45,7 +45,7 @@ def test_layers_start_in_order_and_times_are_measured() -> None:
     phases = ["setting up", *(f"waiting for {layer}" for layer in ORDER), "running", "taking down"]
     assert (said, kept) == (phases, [])
     assert (found.outcome, found.reason, found.setup_s, found.execution_s) == ("passed", "it drove", 5.0, 5.0)
-    assert (found.cid, found.backend, found.seed, found.last_lines) == (131, "scripted", 7, ())
+    assert (found.cid, found.backend, found.seed, found.last_lines) == (131, "process", 7, ())
     assert [(row["name"], row["layer"], row["exit_code"]) for row in found.services] == [
         ("camera", "environment", None),
         ("track", "evaluation", 0),

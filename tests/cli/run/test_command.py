@@ -1,121 +1,163 @@
-"""``dodo run`` as users meet it: a real command on compiled tests of small scripts."""
+"""``dodo run``: what it prints, reports and exits with, on backends that report given events."""
 
 import json
-import os
 import signal
-import socket
-import subprocess
-import sys
-import time
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from io import StringIO
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
+import jsonschema
 import pytest
 
-from dodo_dsl.opendlv.bus.address import group
-from tests.run.desk import ROOT, Desk, gone, marks, processes_with, wait_for
-from tests.run.helpers import FAIL, PASS, READY, WAIT
+from dodo_dsl import package_data
+from dodo_dsl.cli.main import main
+from dodo_dsl.cli.run import command
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.plan_json import to_json
+from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready
+from tests.run.scripted import FAILED, PASSED, Events, ScriptedBackend, ScriptedBackends, plan
+
+STARTS: Mapping[str, Events] = {"environment": [(0.0, Ready("camera"))], "evaluation": [(0.0, Ready("track"))]}
+
+
+def stages(*events: Event) -> dict[str, Events]:
+    """Events as soon as the test has begun."""
+    return {**STARTS, "begin": [(0.0, event) for event in events]}
+
+
+ENDINGS = {
+    "passed": stages(PASSED, Exited("track", 0)),
+    "failed": stages(FAILED, Exited("track", 0)),
+    "error": stages(Exited("track", 0)),
+}
+
+
+@dataclass
+class Command:
+    """``dodo`` in a folder of its own, in this process; tests end as ``stages`` say."""
+
+    folder: Path
+    stages: Mapping[str, Events]
+
+    def compiled(self, tested: Plan) -> Path:
+        target = self.folder / "generated" / tested.slug
+        target.mkdir(parents=True, exist_ok=True)
+        (target / "test.json").write_text(to_json(tested))
+        return target
+
+    def run(self, *words: str, tested: Plan | None = None, report: str = "report") -> tuple[int, str, str]:
+        """Exit code, standard output and standard error of ``dodo run`` on a compiled test."""
+        folder = self.compiled(tested or plan())
+        return self.dodo("run", "--compiled", str(folder), "--report", report, *words)
+
+    def dodo(self, *words: str) -> tuple[int, str, str]:
+        stdout, stderr = StringIO(), StringIO()
+        code = main(words, stdout, stderr)
+        assert "Traceback" not in stdout.getvalue() + stderr.getvalue()
+        return code, stdout.getvalue(), stderr.getvalue()
+
+    def result(self) -> dict[str, Any]:
+        """The one test of the report."""
+        document = json.loads((self.folder / "report" / "results.json").read_text())
+        jsonschema.validate(document, json.loads((package_data.schemas() / "results.schema.json").read_text()))
+        (test,) = document["tests"]
+        return dict(test)
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
-    return Desk(tmp_path)
+def dodo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Command]:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    monkeypatch.setenv("DODO_HISTORY", str(tmp_path / "history.jsonl"))
+    made = Command(tmp_path, ENDINGS["passed"])
+
+    def backends(*_: object) -> ScriptedBackends:
+        return ScriptedBackends(lambda tested, _: ScriptedBackend(tested, made.stages))
+
+    monkeypatch.setattr(command, "Processes", backends)
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    yield made
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
-def test_passes_with_exit_code_0(desk: Desk) -> None:
-    process = desk.start(desk.bench.plan())
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 0, out
-    assert "PASSED  test  it drove (set-up " in out
-    assert "1 passed, 0 failed, 0 in error" in out
-    (test,) = desk.results()
-    assert test["outcome"] == "passed"
-    assert [s["name"] for s in test["services"]] == ["camera", "judge", "app"]  # type: ignore[attr-defined]
-    assert (desk.folder / "report" / "test" / "logs" / "application.app.log").is_file()
+@pytest.mark.parametrize(("ending", "code"), [("passed", 0), ("failed", 1), ("error", 3)])
+def test_exit_code_and_counts(dodo: Command, ending: str, code: int) -> None:
+    dodo.stages = ENDINGS[ending]
+    got, out, _ = dodo.run()
+    assert got == code
+    counts = {kind: int(kind == ending) for kind in ("passed", "failed", "error")}
+    assert "{passed} passed, {failed} failed, {error} in error\n".format(**counts) in out
+    assert f"{ending.upper():<6}  test  " in out
+    assert dodo.result()["outcome"] == ending
 
 
-def test_fails_with_exit_code_1_and_a_junit_failure(desk: Desk) -> None:
-    process = desk.start(desk.bench.plan(judge=READY + FAIL))
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 1, out
-    case = ElementTree.parse(desk.folder / "report" / "junit.xml").find(".//testcase")
+def test_the_report_of_a_test_that_failed(dodo: Command) -> None:
+    dodo.stages = ENDINGS["failed"]
+    dodo.run()
+    case = ElementTree.parse("report/junit.xml").find(".//testcase")
     assert case is not None
     assert (case.get("classname"), case.get("name"), case.get("file")) == ("sil", "test", "test/test.dodo.yml")
     failure = case.find("failure")
     assert failure is not None
     assert failure.get("message") == "hit wall left"
-    assert (desk.folder / "report" / "metrics.txt").read_text().endswith("# EOF\n")
-    assert "hit wall left" in (desk.folder / "report" / "index.html").read_text()
+    assert Path("report/metrics.txt").read_text().endswith("# EOF\n")
+    assert "hit wall left" in Path("report/index.html").read_text()
+    assert [service["name"] for service in dodo.result()["services"]] == ["camera", "track", "app"]
 
 
-def test_letters_that_the_terminal_lacks_cost_no_verdict(desk: Desk) -> None:
-    desk.environment["PYTHONIOENCODING"] = "ascii"
-    process = desk.start(desk.bench.plan(judge=READY + PASS.replace("it drove", "it turned 5\\\\u00b0 and")))
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 0, out
-    assert "PASSED  test  it turned 5? and" in out
-
-
-def test_losses_of_messages_are_noted_below_the_test(desk: Desk) -> None:
-    lost = 'print(\'{"dodo": "lost", "messages": 5}\', flush=True)\n'
-    process = desk.start(desk.bench.plan(judge=READY + lost + "time.sleep(0.3)\n" + PASS))
-    out, _ = process.communicate(timeout=30)
-    note = "service 'judge' lost 5 messages, as its receive buffer was full: its verdict is about the others"
-    assert (process.returncode, f"        note: {note}\n" in out) == (0, True), out
-    assert desk.results()[0]["notes"] == [note]
-
-
-def test_error_has_exit_code_3_and_is_a_junit_error(desk: Desk) -> None:
-    process = desk.start(desk.bench.plan(judge=READY))
-    process.communicate(timeout=30)
-    assert process.returncode == 3
-    case = ElementTree.parse(desk.folder / "report" / "junit.xml").find(".//testcase")
+def test_an_error_is_an_error_in_junit(dodo: Command) -> None:
+    dodo.stages = ENDINGS["error"]
+    dodo.run()
+    case = ElementTree.parse("report/junit.xml").find(".//testcase")
     assert case is not None
     assert case.find("error") is not None
 
 
-@pytest.mark.parametrize("isolation", ["network", "host"])
-def test_interrupt_takes_everything_down_and_still_reports(desk: Desk, isolation: str) -> None:
-    process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", isolation)
-    wait_for(process, "running")
-    process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 130, out
-    assert "Traceback" not in out
-    (test,) = desk.results()
-    assert (test["outcome"], test["reason"]) == ("error", "the run was interrupted")
-    assert gone(marks(desk))
+def test_losses_of_messages_are_noted_below_the_test(dodo: Command) -> None:
+    dodo.stages = stages(Overrun("track", 5), PASSED, Exited("track", 0))
+    code, out, _ = dodo.run()
+    note = "service 'track' lost 5 messages, as its receive buffer was full: its verdict does not consider them"
+    assert (code, f"        note: {note}\n" in out) == (0, True), out
+    assert dodo.result()["notes"] == [note]
 
 
-def test_interrupt_during_teardown_keeps_the_verdict(desk: Desk) -> None:
-    stubborn = "import signal\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n" + WAIT
-    process = desk.start(desk.bench.plan(application=stubborn))
-    wait_for(process, "taking down")
-    process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 130, out
-    (test,) = desk.results()
-    assert (test["outcome"], test["reason"]) == ("passed", "it drove")
-    assert gone(marks(desk))
+def test_times_of_all_runs_are_kept_and_drawn(dodo: Command) -> None:
+    """A second run forecasts what the first one took, and the report shows both."""
+    assert "; at most " in dodo.run()[1]
+    assert "; about " in dodo.run()[1]
+    assert Path("report/times.png").read_bytes().startswith(b"\x89PNG")
+    assert 'src="times.png"' in Path("report/index.html").read_text()
+    assert len(Path("history.jsonl").read_text().splitlines()) == 2
 
 
-def test_reader_that_leaves_does_not_end_the_run(desk: Desk) -> None:
-    process = desk.start(desk.bench.plan())
-    assert process.stdout is not None
-    process.stdout.readline()
-    process.stdout.close()
-    assert process.wait(30) == 0
-    (test,) = desk.results()
-    assert test["outcome"] == "passed"
+def test_a_user_without_a_home_folder_runs_tests(dodo: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "XDG_STATE_HOME", "DODO_HISTORY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
+    assert dodo.run()[0] == 0
+    assert "; at most " in dodo.run()[1]
 
 
-def test_report_among_tests_is_refused_and_harms_nothing(desk: Desk) -> None:
-    process = desk.start(desk.bench.plan(), report="generated")
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 2
-    assert "holds tests; name another folder with --report" in out
-    assert (desk.folder / "generated" / "test" / "test.json").is_file()
+def test_a_verdict_without_room_for_a_report_is_printed(dodo: Command, small_disk: Path) -> None:
+    (small_disk / "full").write_bytes(bytes(60_000))
+    with (small_disk / "fuller").open("wb", buffering=0) as file, pytest.raises(OSError, match="No space left"):
+        while True:
+            file.write(bytes(512))
+    code, out, _ = dodo.run(report=str(small_disk))
+    assert code == 3
+    assert "PASSED  test  it drove (" in out
+    assert f"'{small_disk}' cannot take the whole report: No space left on device\n" in out
+
+
+def test_report_among_tests_is_refused_and_harms_nothing(dodo: Command) -> None:
+    code, out, err = dodo.run(report="generated")
+    assert code == 2
+    assert "holds tests; name another folder with --report" in out + err
+    assert Path("generated/test/test.json").is_file()
 
 
 @pytest.mark.parametrize(
@@ -123,70 +165,32 @@ def test_report_among_tests_is_refused_and_harms_nothing(desk: Desk) -> None:
     [{"slug": "../../x"}, {"timeout_s": "1"}, {"cid": 999}, {"seed": -1}, {"services": 3}, {"application": {}}],
     ids=str,
 )
-def test_tampered_compiled_tests_are_refused(desk: Desk, change: dict[str, object]) -> None:
-    folder = desk.compiled(desk.bench.plan())
+def test_tampered_compiled_tests_are_refused(dodo: Command, change: dict[str, object]) -> None:
+    folder = dodo.compiled(plan())
     raw = json.loads((folder / "test.json").read_text())
     (folder / "test.json").write_text(json.dumps({**raw, **change}))
-    command = [sys.executable, "-m", "dodo_dsl", "run", "--compiled", str(folder)]
-    environment = {**desk.environment, "PYTHONPATH": str(ROOT)}
-    result = subprocess.run(command, cwd=desk.folder, env=environment, capture_output=True, text=True, check=False)
-    assert result.returncode == 2
-    assert "not a compiled test" in result.stderr
+    code, _, err = dodo.dodo("run", "--compiled", str(folder))
+    assert (code, "not a compiled test" in err) == (2, True)
 
 
-def test_foreign_traffic_is_refused_with_its_sender(desk: Desk) -> None:
-    plan = replace(desk.bench.plan(), cid=231)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        stranger.connect(group(231))
-        port = stranger.getsockname()[1]
-        process = desk.start(plan, "--isolation", "host")
-        while process.poll() is None:
-            stranger.send(b"\x0d\xa4\x00\x00\x00")
-            time.sleep(0.02)
-    out, _ = process.communicate()
-    assert process.returncode == 3, out
-    (test,) = desk.results()
-    assert test["outcome"] == "error"
-    assert f":{port}; end it" in str(test["reason"])
+USAGE = [
+    (("--compiled", "nowhere"), "there is no compiled test at 'nowhere': No such file or directory"),
+    (("no-such-test",), "there is no test 'no-such-test'"),
+    (("--application", "none.yml"), "there is no file 'none.yml', expected the application's compose file"),
+    (("a/b.dodo.yml",), "there is no test at"),
+    (("--seed", "-1"), "'-1' is "),
+    (("-j", "0"), "'0' is "),
+]
 
 
-def test_kept_test_stays_until_it_is_taken_down(desk: Desk) -> None:
-    process = desk.start(desk.bench.plan(), "--keep")
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 0, out
-    assert processes_with(marks(desk))
-    (pid,) = [line.rpartition(" ")[2] for line in out.splitlines() if line.startswith("take it down: kill ")]
-    other = desk.start(desk.bench.plan(slug="other"), report="other")
-    assert other.communicate(timeout=30)[0]
-    assert processes_with(marks(desk)), "the next run takes no kept test down"
-    os.kill(int(pid), signal.SIGTERM)
-    assert gone(marks(desk))
+@pytest.mark.parametrize(("words", "sentence"), USAGE, ids=[" ".join(words) for words, _ in USAGE])
+def test_usage_errors_are_sentences(
+    dodo: Command, words: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = dodo.dodo("run", *words)
+    assert (code, sentence in err + capsys.readouterr().err) == (2, True)
 
 
-def test_usage_errors_are_sentences(desk: Desk) -> None:
-    for words, said in (
-        (["--compiled", "nowhere"], "there is no compiled test at 'nowhere': No such file or directory"),
-        (["no-such-test"], "there is no test 'no-such-test'"),
-        (["--application", "none.yml"], "there is no file 'none.yml', expected the application's compose file"),
-        (["a/b.dodo.yml"], "there is no test at"),
-        (["--seed", "-1"], "'-1' is no whole number from 0 to 4294967295"),
-        (["-j", "0"], "'0' is no whole number of 1 or more"),
-    ):
-        environment = {**desk.environment, "PYTHONPATH": str(ROOT)}
-        command = [sys.executable, "-m", "dodo_dsl", "run", *words]
-        result = subprocess.run(command, cwd=desk.folder, env=environment, capture_output=True, text=True, check=False)
-        assert result.returncode == 2, result
-        assert said in result.stderr
-        assert "Traceback" not in result.stderr
-
-
-def test_times_of_all_runs_are_kept_and_drawn(desk: Desk) -> None:
-    """A second run forecasts what the first one took, and the report shows both."""
-    first = desk.start(desk.bench.plan())
-    said_first, _ = first.communicate()
-    assert "; at most " in said_first
-    second = desk.start(desk.bench.plan())
-    said, _ = second.communicate()
-    assert "; about " in said
-    assert (desk.folder / "report" / "times.png").read_bytes().startswith(b"\x89PNG")
-    assert 'src="times.png"' in (desk.folder / "report" / "index.html").read_text()
+def test_a_real_rig_is_never_kept_up(dodo: Command) -> None:
+    code, _, err = dodo.run("--keep", tested=replace(plan(), rig="kiwi", level="hil", isolation="host"))
+    assert (code, "test runs on rig 'kiwi', which --keep would leave driven" in err) == (2, True)
