@@ -4,14 +4,15 @@ import json
 
 import pytest
 
-from tests.drive.applications import KIWI, results
+from tests.drive.applications import results
 from tests.images.conftest import engine_answers
-from tests.rig.test_rig import Place, place  # noqa: F401
+from tests.run.rigs.place import APPLICATION, Place, place
 
-APPLICATION = ("--application", str(KIWI / "docker-compose.yml"))
+__all__ = ["place"]
+pytestmark = pytest.mark.slow
 
 
-def test_no_isolation_leads_around_a_rigs_checks(place: Place) -> None:  # noqa: F811
+def test_no_isolation_leads_around_a_rigs_checks(place: Place) -> None:
     words = ("--isolation", "network")
     said = place.dodo("run", "hil-fake", *APPLICATION, *words, code=2)
     assert "error[rig-isolation]: rig 'fake' is reached through the host" in said
@@ -22,7 +23,7 @@ def test_no_isolation_leads_around_a_rigs_checks(place: Place) -> None:  # noqa:
 
 
 @pytest.mark.parametrize("backend", ["process", "docker"])
-def test_a_plan_with_a_network_of_its_own_is_examined_all_the_same(place: Place, backend: str) -> None:  # noqa: F811
+def test_a_plan_with_a_network_of_its_own_is_examined_all_the_same(place: Place, backend: str) -> None:
     if backend == "docker" and not engine_answers():
         pytest.skip("no Docker engine answers (scripts/start-engine starts one)")
     place.dodo("compile", "tests/hil-fake", *APPLICATION, "-o", "generated", code=0)
@@ -31,5 +32,6 @@ def test_a_plan_with_a_network_of_its_own_is_examined_all_the_same(place: Place,
     place.rig.unplug()
     place.dodo("run", "--compiled", str(file.parent), "--backend", backend, code=3)
     (test,) = results(place.folder / "dodo-report").values()
-    assert test["reason"].startswith("rig fake cannot be checked: ")
+    assert test["reason"].startswith("rig 'fake' cannot be checked: '")
     assert list((place.folder / "leases").glob("*.json")) == []
+    assert not list((place.folder / "state").glob("*"))

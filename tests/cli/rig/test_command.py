@@ -1,0 +1,71 @@
+"""``dodo rig``: manual use of a rig, with a rig on a pseudo terminal as the hardware."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dodo_dsl.cli.main import main
+from tests.run.rigs.place import Place, busy, place
+
+__all__ = ["place"]
+
+
+@pytest.mark.parametrize("action", ["status", "home", "goto", "calibrate", "clear", "truth"])
+def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rig", action, "--help"], sys.stdout, sys.stderr) == 0
+    assert "RIG" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_manual_use(place: Place) -> None:
+    assert "fake: the rig is idle, x = -0.880 m" in place.dodo("rig", "status", code=0)
+    moved = place.dodo("rig", "goto", "fake", "0.1", "-0.2", "45", code=0)
+    assert "x = 0.100 m, y = -0.200 m, yaw = 45.0 degrees" in moved
+    (status,) = json.loads(place.dodo("rig", "status", "fake", "--json", code=0))
+    assert (status["rig"], status["word"], status["quarantine"]) == ("fake", "idle", "")
+    moves = len(place.rig.commands("GOTO"))
+    assert "out of the rig's ranges" in place.dodo("rig", "goto", "fake", "0", "0.5", "0", code=2)
+    assert len(place.rig.commands("GOTO")) == moves
+    assert "there is no rig 'fke'" in place.dodo("rig", "home", "fke", code=2)
+
+
+@pytest.mark.slow
+def test_one_user_at_a_time(place: Place) -> None:
+    with busy(place, "rig", "goto", "fake", "0", "0", "0"):
+        said = place.dodo("rig", "status", "fake", "--wait", "0.3", code=3)
+        assert "dodo rig goto" in said and "within 0.3 s" in said
+    assert place.rig.last() == "STOP"
+
+
+@pytest.mark.slow
+def test_two_repositories_that_name_one_port_exclude_each_other(place: Place, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    rigs = {"theirs": {"kind": "dynamic", "cid": 3, "serial": str(place.rig.path.resolve())}}
+    (other / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "rigs": rigs}))
+    with busy(place, "rig", "goto", "theirs", "0", "0", "0", folder=other):
+        said = place.dodo("rig", "status", "fake", "--wait", "0.3", code=3)
+        assert "no device came free within 0.3 s; test 'dodo rig goto'" in said
+
+
+@pytest.mark.slow
+def test_status_shows_a_fault_until_calibrate_acknowledges_it(place: Place) -> None:
+    place.rig.status = 3
+    for _ in range(2):
+        assert "the rig touched a limit switch and stopped" in place.dodo("rig", "status", code=0)
+    assert "touched a limit switch" in place.dodo("rig", "home", "fake", code=3)
+    assert "the rig is idle" in place.dodo("rig", "calibrate", "fake", code=0)
+
+
+@pytest.mark.parametrize("action", ["status", "clear"])
+def test_a_user_without_a_home_folder_is_told_what_to_set(
+    action: str, place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("HOME", "XDG_STATE_HOME", "DODO_RIGS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
+    told = "user 3999999999 has no home folder: set DODO_RIGS or XDG_STATE_HOME\n"
+    assert place.dodo("rig", action, "fake", code=3) == f"dodo rig: quarantines cannot be kept: {told}"

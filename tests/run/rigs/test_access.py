@@ -1,0 +1,84 @@
+"""Manual access to a rig: what its program answers, and how it ends."""
+
+import asyncio
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run import leases
+from dodo_dsl.run.rigs.access import query, query_exclusively
+from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
+
+PYTHON = (sys.executable, "-c")
+
+
+@pytest.mark.parametrize(
+    ("program", "kind", "sentence", "usage"),
+    [
+        ("import sys; sys.exit('no such port')", NoAnswer, "the rig's program gave no answer: no such port", False),
+        ("pass", NoAnswer, "the rig's program gave no answer: no output", False),
+        ("""print('{"error": "it is lost"}'); raise SystemExit(1)""", RigProblem, "it is lost", False),
+        ("""print('{"error": "out of range"}'); raise SystemExit(2)""", RigProblem, "out of range", True),
+    ],
+)
+def test_a_program_without_an_answer(program: str, kind: type[RigProblem], sentence: str, usage: bool) -> None:
+    with pytest.raises(RigProblem) as caught:
+        asyncio.run(query(PYTHON, [program]))
+    assert (type(caught.value), str(caught.value), caught.value.usage) == (kind, sentence, usage)
+
+
+def test_an_answer_from_a_program_that_holds_the_leases() -> None:
+    reader, writer = os.pipe()
+    program = f"""import os, json; print(json.dumps({{"open": os.path.exists("/proc/self/fd/{writer}")}}))"""
+    try:
+        assert asyncio.run(query(PYTHON, [program], descriptors=(writer,))) == {"open": True}
+        assert asyncio.run(query(PYTHON, [program])) == {"open": False}
+    finally:
+        os.close(reader)
+        os.close(writer)
+
+
+def test_a_program_that_hangs_is_ended() -> None:
+    with pytest.raises(ProgramTimeout, match=r"the rig's program gave no answer within 0\.2 s"):
+        asyncio.run(query(PYTHON, ["import time; time.sleep(600)"], patience_s=0.2))
+
+
+def test_a_cancelled_program_stops_the_rig(tmp_path: Path) -> None:
+    """It gets SIGTERM, and the time to act on it."""
+    program = f"""
+import pathlib, signal, sys, time
+folder = pathlib.Path({str(tmp_path)!r})
+signal.signal(signal.SIGTERM, lambda *_: (folder.joinpath("stopped").touch(), sys.exit()))
+folder.joinpath("runs").touch()
+time.sleep(600)
+"""
+
+    async def scene() -> None:
+        task = asyncio.ensure_future(query(PYTHON, [program]))
+        while not (tmp_path / "runs").exists():
+            await asyncio.sleep(0.01)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    asyncio.run(scene())
+    assert (tmp_path / "stopped").exists()
+
+
+def test_a_rig_in_use_is_waited_for_and_then_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path))
+    held = leases.try_lease("cid-121", {"test": "hil-other"})
+    assert held is not None
+    said: list[str] = []
+    command = (PYTHON, ["print({})"])
+    with pytest.raises(leases.LeaseTimeout, match=r"no cid came free within 0\.1 s; test hil-other"):
+        query_exclusively(121, "'dodo rig home'", command, said.append, 0.1)
+    assert said == [f"waiting for test hil-other of process {os.getpid()}"]
+    held.release()
+    began = time.monotonic()
+    assert query_exclusively(121, "'dodo rig home'", command, said.append) == {}
+    assert (len(said), time.monotonic() - began < leases.DEFAULT_PATIENCE_S) == (1, True)
+    assert list(tmp_path.glob("*.json")) == []

@@ -1,0 +1,134 @@
+"""The health check before a test on a real rig: what puts the rig into quarantine, and what does not."""
+
+import asyncio
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.plan.model import Flag, Plan, Service
+from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.rigs import health_check
+from dodo_dsl.run.rigs.health_check import CHECKS, TRIES, examine
+from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
+from dodo_dsl.run.rigs.quarantine import quarantine, quarantined
+from tests.run.scripted import plan
+
+GANTRY = (Flag("serial", "/dev/ttyACM0", ""), Flag("range-x", "0.5", ""), Flag("freq", "50", ""))
+CAMERA = (Flag("source", "/dev/video0", ""), Flag("width", "640", ""))
+HUNG = ProgramTimeout("the rig's program gave no answer within 90 s")
+FIT = {"ok": True}
+
+
+class Programs:
+    """What the programs of the checks answer, one after the other; errors are raised."""
+
+    def __init__(self, *answers: dict[str, Any] | RigProblem) -> None:
+        self.answers = list(answers)
+        self.calls: list[list[str]] = []
+        self.descriptors: set[tuple[int, ...]] = set()
+
+    async def query(
+        self, program: Sequence[str], words: Sequence[str], patience_s: float, descriptors: tuple[int, ...]
+    ) -> dict[str, Any]:
+        self.calls.append([*program[2:], *words])
+        self.descriptors.add(descriptors)
+        answer = self.answers.pop(0)
+        if isinstance(answer, RigProblem):
+            raise answer
+        return answer
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+def on_rig() -> Plan:
+    pose = Service("action", "pose", "gantry", "x", (), GANTRY)
+    camera = Service("environment", "camera", "camera", "x", (), CAMERA)
+    other = Service("environment", "clock", "other", "x", (), GANTRY)
+    return replace(plan(), rig="kiwi", services=(camera, pose, other))
+
+
+def problem(programs: Programs, monkeypatch: pytest.MonkeyPatch, tested: Plan | None = None) -> str:
+    """Why a test cannot run; empty when it can."""
+    monkeypatch.setattr(health_check, "query", programs.query)
+    try:
+        asyncio.run(examine(tested or on_rig(), lambda _: None, (7, 8)))
+    except BackendError as error:
+        return str(error)
+    return ""
+
+
+def test_programs_get_the_flags_of_the_test_and_hold_its_leases(monkeypatch: pytest.MonkeyPatch, state: Path) -> None:
+    programs = Programs(FIT, FIT)
+    assert problem(programs, monkeypatch) == ""
+    assert programs.calls == [
+        ["services.camera.health_check", "--source=/dev/video0", "--width=640"],
+        ["services.gantry.manual", "--serial=/dev/ttyACM0", "--range-x=0.5", "check"],
+    ]
+    assert programs.descriptors == {(7, 8)}
+    assert not state.exists()
+
+
+def test_an_unfit_rig_is_put_into_quarantine_and_checked_no_more(monkeypatch: pytest.MonkeyPatch, state: Path) -> None:
+    programs = Programs(FIT, {"ok": False, "reason": "it has lost steps"})
+    sentence = "rig 'kiwi' is in quarantine: it has lost steps ('dodo rig clear kiwi' ends it)"
+    assert problem(programs, monkeypatch) == sentence
+    assert json.loads((state / "kiwi.json").read_text())["reason"] == "it has lost steps"
+    assert problem(programs, monkeypatch) == sentence
+    assert len(programs.calls) == 2
+
+
+def test_a_failure_without_a_reason_has_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "its health check failed" in problem(Programs({}), monkeypatch)
+
+
+def test_a_check_that_hangs_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    programs = Programs(HUNG, FIT, FIT)
+    assert problem(programs, monkeypatch) == ""
+    assert programs.calls[0] == programs.calls[1]
+    assert not quarantined("kiwi")
+
+
+def test_a_check_that_hangs_again_puts_the_rig_into_quarantine(monkeypatch: pytest.MonkeyPatch) -> None:
+    programs = Programs(*[HUNG] * TRIES)
+    assert f"in quarantine: its health check hung {TRIES} times: {HUNG}" in problem(programs, monkeypatch)
+    assert quarantined("kiwi").startswith("its health check hung")
+
+
+@pytest.mark.parametrize("error", [NoAnswer("the rig's program gave no answer: Killed"), RigProblem("it is busy")])
+def test_what_says_nothing_about_the_rig_does_not_quarantine_it(
+    error: RigProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert problem(Programs(error), monkeypatch) == f"rig 'kiwi' cannot be checked: {error}"
+    assert not quarantined("kiwi")
+
+
+def test_a_camera_that_reads_a_file_is_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    camera = Service("environment", "camera", "camera", "x", (), (Flag("file", "a.png", "path"),))
+    programs = Programs()
+    assert problem(programs, monkeypatch, replace(on_rig(), services=(camera,))) == ""
+    assert programs.calls == []
+
+
+def test_a_rig_in_quarantine_is_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    quarantine("kiwi", "it smokes")
+    assert "is in quarantine: it smokes" in problem(Programs(), monkeypatch)
+
+
+def test_without_a_place_for_quarantines_no_test_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path / "file"))
+    reason = problem(Programs(FIT, FIT), monkeypatch)
+    assert reason == f"rig 'kiwi' cannot be checked: '{tmp_path}/file/kiwi.json' cannot be read: Not a directory"
+
+
+def test_programs_of_the_checks_exist() -> None:
+    for check in CHECKS.values():
+        assert Path(__file__).parents[3].joinpath(*check.module.split(".")).with_suffix(".py").is_file()

@@ -1,0 +1,67 @@
+"""Rigs in quarantine, kept in files."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run.rigs.problems import RigProblem
+from dodo_dsl.run.rigs.quarantine import all_quarantined, clear, quarantine, quarantined
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+def test_it_lasts_until_it_is_cleared() -> None:
+    assert (quarantined("kiwi"), all_quarantined(), clear("kiwi")) == ("", {}, False)
+    quarantine("kiwi", "it has lost steps")
+    quarantine("other", "its camera is dark")
+    assert all_quarantined() == {"kiwi": "it has lost steps", "other": "its camera is dark"}
+    assert (clear("kiwi"), quarantined("kiwi"), clear("kiwi")) == (True, "", False)
+    assert list(all_quarantined()) == ["other"]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", "3", '{"reason"'])
+def test_a_damaged_file_is_a_quarantine(state: Path, text: str) -> None:
+    state.mkdir()
+    (state / "kiwi.json").write_text(text)
+    assert quarantined("kiwi") == "its quarantine file cannot be read"
+    assert clear("kiwi")
+
+
+@pytest.mark.parametrize("name", ["", "../kiwi", "Kiwi", "a.b", "-a", "a b"])
+def test_a_strange_name_reaches_no_file(state: Path, name: str) -> None:
+    for call in (quarantined, clear):
+        with pytest.raises(RigProblem, match="is not a rig's name, expected lower-case letters, digits and hyphens"):
+            call(name)
+    with pytest.raises(RigProblem):
+        quarantine(name, "x")
+    assert not state.exists()
+
+
+def test_other_files_are_no_rigs(state: Path) -> None:
+    state.mkdir()
+    for name in ("kiwi.txt", "Upper.json", "kiwi.4711.part"):
+        (state / name).touch()
+    assert all_quarantined() == {}
+
+
+def test_a_quarantine_that_cannot_be_written_is_an_error_with_its_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path / "file" / "rigs"))
+    with pytest.raises(RigProblem, match=r"cannot be written to '.*kiwi\.json': Not a directory \(it has lost steps\)"):
+        quarantine("kiwi", "it has lost steps")
+
+
+def test_a_user_without_a_home_folder_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "XDG_STATE_HOME", "DODO_RIGS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
+    with pytest.raises(
+        RigProblem, match="quarantines cannot be kept: user 3999999999 has no home folder: set DODO_RIGS"
+    ):
+        quarantined("kiwi")

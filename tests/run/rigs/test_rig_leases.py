@@ -1,0 +1,65 @@
+"""The leases of a rig: its CID and its devices, whatever they are called."""
+
+import asyncio
+import os
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run import leases
+from dodo_dsl.run.rigs.rig_leases import device_leases, devices_in, leased
+
+
+def test_flags_name_hardware() -> None:
+    words = ["--serial=/dev/ttyACM0", "check", "--source=0", "--width=640", "--serial"]
+    assert devices_in(words) == ["/dev/ttyACM0", "0", ""]
+
+
+def test_two_names_of_one_device_are_one_lease(tmp_path: Path) -> None:
+    (tmp_path / "null").symlink_to("/dev/null")
+    (tmp_path / "file").touch()
+    others = [str(tmp_path / "file"), str(tmp_path / "none"), "emulated", "0", "a\0b", ""]
+    (name,) = device_leases(["/dev/null", str(tmp_path / "null"), *others])
+    number = Path("/dev/null").stat().st_rdev
+    assert name == f"device-{os.major(number)}-{os.minor(number)}"
+    assert len(device_leases(["/dev/null", "/dev/zero"])) == 2
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path))
+    return tmp_path
+
+
+def test_cid_and_devices_are_held_together_and_released(folder: Path) -> None:
+    async def scene() -> list[str]:
+        async with leased(121, "mine", print, devices=["/dev/null", "/dev/zero"]) as descriptors:
+            assert len(descriptors) == 3
+            return sorted(path.name.split(".")[0] for path in folder.glob("*.json"))
+
+    names = asyncio.run(scene())
+    assert names == sorted(["cid-121", *device_leases(["/dev/null", "/dev/zero"])])
+    assert list(folder.glob("*.json")) == []
+
+
+def test_the_emulated_rig_has_none(folder: Path) -> None:
+    async def scene() -> tuple[int, ...]:
+        async with leased(None, "mine", print, devices=["emulated"]) as descriptors:
+            return descriptors
+
+    assert asyncio.run(scene()) == ()
+
+
+def test_a_busy_device_gives_the_cid_back(folder: Path) -> None:
+    (name,) = device_leases(["/dev/null"])
+    held = leases.try_lease(name, {"test": "theirs"})
+    assert held is not None
+
+    async def scene() -> None:
+        async with leased(121, "mine", lambda _: None, 0.1, ["/dev/null"]):
+            raise AssertionError("the device is held")
+
+    with pytest.raises(leases.LeaseTimeout, match=r"no device came free within 0\.1 s; test theirs"):
+        asyncio.run(scene())
+    assert [path.name.split(".")[0] for path in folder.glob("*.json")] == [name]
+    held.release()
