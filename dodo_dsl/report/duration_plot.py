@@ -12,7 +12,7 @@ _MOST = 60
 
 
 def draw(tests: Mapping[str, Sequence[Times]], machine: str, target: Path) -> None:
-    """A bar a test: the median of its runs on this machine, and each run as a point; the longest on top."""
+    """One bar for each test with the median of its runs on this machine, each run as a point; the longest on top."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -20,7 +20,7 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True)
 class Files:
-    """What lies beside the page, as paths relative to it, by slug; ``times`` is one picture's path or empty."""
+    """The files beside the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty."""
 
     pictures: Mapping[str, Sequence[Picture]]
     logs: Mapping[str, Sequence[str]]
@@ -30,13 +30,13 @@ class Files:
 
 
 MEANINGS = {
-    "outside": "samples at times for which there is no target, left out",
-    "broken": "samples that are no finite numbers",
-    "without-truth": "frames of which nobody knows what is in them, left out",
-    "late": "detections that came when their frame was judged already, left out",
-    "repeated": "detections under a detectionId that their frame had already, left out",
+    "outside": "samples at times without a target, ignored",
+    "broken": "samples that are not finite numbers",
+    "without-truth": "frames without ground truth, ignored",
+    "late": "detections that came after their frame was judged, ignored",
+    "repeated": "detections with a detectionId that their frame already had, ignored",
 }
-"""Of checks whose names do not say it; as the READMEs of the evaluators have them."""
+"""Explanations of checks whose names do not explain them, as in the READMEs of the evaluators."""
 
 
 def render(outcomes: Sequence[Outcome], files: Files) -> str:

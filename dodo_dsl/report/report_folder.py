@@ -35,7 +35,7 @@ class Drawable:
 
 
 def forget(folder: Path, slugs: Sequence[str]) -> int:
-    """Removes what earlier runs wrote for the tests that they name, and for ``slugs``; other files stay.
+    """Removes the reports of an earlier run, and those of ``slugs``; other files stay.
 
     Returns how many tests of the earlier run are not among ``slugs``.
     """
@@ -76,7 +76,7 @@ def write_report(
         if outcome.slug in tests:
             try:
                 _draw(folder / outcome.slug, outcome, tests[outcome.slug])
-            except Exception as error:  # noqa: BLE001  (what is drawn comes from services; no picture costs a verdict)
+            except Exception as error:  # noqa: BLE001  (the data comes from services, and no plot may cost a verdict)
                 problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
     (folder / TIMES).unlink(missing_ok=True)
     if times:
@@ -90,7 +90,7 @@ def write_report(
 
 
 def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
-    """The four files that stand for the whole run."""
+    """Writes the four files about the whole run."""
     pictures = {o.slug: _pictures(folder, o) for o in outcomes}
     attachments = {slug: f"{_shown(folder)}/{found[0].path}" for slug, found in pictures.items() if found}
     times = TIMES if (folder / TIMES).is_file() else ""
@@ -105,7 +105,7 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
 
 
 def _pictures(folder: Path, outcome: Outcome) -> list[html.Picture]:
-    """Those that a test has, the one that says most first: GitLab shows one beside a test case."""
+    """The pictures of a test, the most informative first: GitLab shows one beside a test case."""
     known = (
         (TRAJECTORY, f"The drive of {outcome.name} from above"),
         (SNAPSHOT, f"What the camera of {outcome.name} saw"),

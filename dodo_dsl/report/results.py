@@ -11,11 +11,11 @@ from dodo_dsl.outcome import Outcome
 
 FILE_NAME = "results.json"
 VERSION = 1
-_MOST_OF_A_FAULT = 200
+_MAX_PROBLEM_TEXT = 200
 
 
 class ResultsError(ValueError):
-    """A file that holds no results of this version."""
+    """A file without results of this version."""
 
 
 def to_json(outcomes: Sequence[Outcome]) -> str:
@@ -24,7 +24,7 @@ def to_json(outcomes: Sequence[Outcome]) -> str:
 
 
 def writable(outcome: Outcome) -> Outcome:
-    """The same with a question mark for what UTF-8 cannot write, as in the names of some files."""
+    """The same with a question mark for each character that UTF-8 cannot encode, as in the names of some files."""
     return dataclasses.replace(
         outcome,
         name=_written(outcome.name),
@@ -41,12 +41,12 @@ def _written(text: str) -> str:
 
 
 def _rounded(test: dict[str, Any]) -> dict[str, Any]:
-    """Durations in milliseconds' precision: more would claim what nobody measured."""
+    """Rounds durations to milliseconds, which is more than the precision of the measurement."""
     return {k: round(v, 3) if k.endswith("_s") and v is not None else v for k, v in test.items()}
 
 
 def load(path: Path) -> list[Outcome]:
-    """The outcomes of a ``results.json`` as its schema has them; raises ResultsError."""
+    """The outcomes of a ``results.json`` that its schema accepts; raises ResultsError."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         if document["dodo"] != "results" or document["version"] != VERSION:
@@ -58,18 +58,18 @@ def load(path: Path) -> list[Outcome]:
     except OSError as error:
         raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise ResultsError(f"{path}: no results of DoDo ({error})") from error
+        raise ResultsError(f"{path}: not results of DoDo ({error})") from error
 
 
 def _validate(document: Any) -> None:
-    """ValueError with the place and the fault that says most; texts have to be such as UTF-8 can write."""
+    """Raises ValueError with the place of the most relevant problem, or for strings that UTF-8 cannot encode."""
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
     schema = json.loads((package_data.schemas() / "results.schema.json").read_text(encoding="utf-8"))
-    fault = best_match(Draft202012Validator(schema).iter_errors(document))
-    if fault is not None:
-        raise ValueError(f"{fault.json_path}: {fault.message[:_MOST_OF_A_FAULT]}")
+    problem = best_match(Draft202012Validator(schema).iter_errors(document))
+    if problem is not None:
+        raise ValueError(f"{problem.json_path}: {problem.message[:_MAX_PROBLEM_TEXT]}")
     json.dumps(document, ensure_ascii=False).encode()
 
 

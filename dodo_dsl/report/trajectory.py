@@ -1,4 +1,4 @@
-"""What a recording says of a drive: the vehicle's path over the map's cones and lines."""
+"""The drive in a recording: the vehicle's path over the map's cones and lines."""
 
 import json
 import math
@@ -70,7 +70,7 @@ def _path(recording: Path) -> Iterator[tuple[float, float, float, float]]:
 
 
 def read_ground(place: Path) -> Ground:
-    """The parts of an OpenDLV map that a picture shows; an unreadable map is an empty one, the services judge it."""
+    """The parts of an OpenDLV map that a picture shows; an unreadable map is empty, as its errors are reported elsewhere."""
     try:
         raw = json.loads((place / "map.json" if place.is_dir() else place).read_text(encoding="utf-8"))
         models = [

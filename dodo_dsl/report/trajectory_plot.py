@@ -13,7 +13,7 @@ _MARGIN = 0.3
 _PIXELS_PER_INCH = 110
 _INCHES = 7.0
 _AROUND_INCHES = 1.4
-"""What title, labels and legend need."""
+"""Room for title, labels and legend."""
 
 
 def draw(drive: Drive, outcome: Outcome, target: Path) -> None:
@@ -29,7 +29,7 @@ def draw(drive: Drive, outcome: Outcome, target: Path) -> None:
     axes.plot([p[0] for p in drive.path], [p[1] for p in drive.path], color=colour, linewidth=1.6, label="path")
     _vehicles(axes, drive, colour)
     _frame(axes, drive)
-    reason = printable(outcome.reason).replace("$", r"\$")  # no mathematics is meant
+    reason = printable(outcome.reason).replace("$", r"\$")  # it is not a formula
     axes.set_title(f"{outcome.name}: {outcome.outcome}\n{reason}", fontsize=10, wrap=True)
     figure.savefig(target, dpi=_PIXELS_PER_INCH, format="png")
 

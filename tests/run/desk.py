@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -18,10 +19,12 @@ ROOT = Path(__file__).parents[2]
 
 
 class Desk:
-    """Compiled tests, a report folder, a lease folder and a history of their own."""
+    """Compiled tests, a report folder, a lease folder, CIDs and a history of their own."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, cids: range) -> None:
         self.folder = folder
+        self._cids = cids
+        (folder / "dodo.yml").write_text(f"dodo: 1\ncids: {cids[0]}-{cids[-1]}\n")
         self.bench = Bench(folder)
         own = {"DODO_LEASES": str(folder / "leases"), "DODO_HISTORY": str(folder / "history.jsonl")}
         self.environment = {**os.environ, **own}
@@ -29,7 +32,7 @@ class Desk:
     def compiled(self, plan: Plan) -> Path:
         target = self.folder / "generated" / plan.slug
         target.mkdir(parents=True, exist_ok=True)
-        (target / "test.json").write_text(to_json(plan))
+        (target / "test.json").write_text(to_json(replace(plan, cid=self._cids[0])))
         return target
 
     def start(self, plan: Plan, *flags: str, report: str = "report") -> "subprocess.Popen[str]":

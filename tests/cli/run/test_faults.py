@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 from dodo_dsl.plan.model import Flag, Plan, Service
 from tests.faults import Book
 from tests.run.desk import Desk, gone, marks, processes_with, wait_for
-from tests.run.helpers import PASS, READY, WAIT
+from tests.run.helpers import PASS, READY, WAIT, reserved_cids
 
 pytestmark = pytest.mark.slow
 FLOODS = "while True: print('x' * 1000, flush=True)\n"
@@ -29,8 +30,9 @@ with Session(int(sys.argv[1].partition("=")[2])) as bus:
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
-    return Desk(tmp_path)
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    with reserved_cids(2) as cids:
+        yield Desk(tmp_path, cids)
 
 
 def recorded(plan: Plan) -> Plan:

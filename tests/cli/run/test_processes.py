@@ -2,12 +2,13 @@
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.run.desk import Desk, gone, marks, processes_with, wait_for
-from tests.run.helpers import PASS, READY, WAIT
+from tests.run.helpers import PASS, READY, WAIT, reserved_cids
 
 pytestmark = pytest.mark.slow
 HOST = ("--isolation", "host")
@@ -15,8 +16,9 @@ HOST = ("--isolation", "host")
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
-    return Desk(tmp_path)
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    with reserved_cids(2) as cids:
+        yield Desk(tmp_path, cids)
 
 
 def test_letters_that_the_terminal_lacks_cost_no_verdict(desk: Desk) -> None:
