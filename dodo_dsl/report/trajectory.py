@@ -70,7 +70,7 @@ def _path(recording: Path) -> Iterator[tuple[float, float, float, float]]:
 
 
 def read_ground(place: Path) -> Ground:
-    """The parts of an OpenDLV map that a picture shows; an unreadable map is empty, as its errors are reported elsewhere."""
+    """The parts of an OpenDLV map that a picture shows; an unreadable map is empty: services report its errors."""
     try:
         raw = json.loads((place / "map.json" if place.is_dir() else place).read_text(encoding="utf-8"))
         models = [

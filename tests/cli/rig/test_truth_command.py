@@ -57,6 +57,7 @@ def files(place: Path, stem: str) -> list[str]:
     return sorted(path.name for path in place.iterdir() if stem in path.name)
 
 
+@pytest.mark.slow
 def test_the_scene_knows_the_shipped_truth(place: Path) -> None:
     said = rig("emulated", "--test", "hil-camera", "--classes", CONES, "-o", "board.json")
     assert said.startswith("board.json: 8 boxes (4 blue, 4 yellow) in 640 x 480 pixels")
@@ -75,6 +76,7 @@ def test_the_scene_knows_the_shipped_truth(place: Path) -> None:
         assert changed[round(y) : round(y) + 2, round(x) + 5 : round(x + width) - 5].any(axis=0).all()
 
 
+@pytest.mark.slow
 def test_the_scene_has_the_light_of_its_test(place: Path) -> None:
     means = []
     for light in ("0.5", "1.6"):
@@ -85,6 +87,7 @@ def test_the_scene_has_the_light_of_its_test(place: Path) -> None:
     assert boxes(place / "0.5.json") == boxes(place / "1.6.json")
 
 
+@pytest.mark.slow
 def test_a_test_whose_truth_is_missing_gets_one(place: Path) -> None:
     path = place / "tests" / "truths" / "static-rig.json"
     path.unlink()
@@ -92,6 +95,7 @@ def test_a_test_whose_truth_is_missing_gets_one(place: Path) -> None:
     assert len(boxes(path)) == 8
 
 
+@pytest.mark.slow
 def test_boxes_marked_by_hand_on_a_snapshot(place: Path) -> None:
     assert "desk-1.png: a snapshot of 320 x 240 pixels; mark boxes with" in rig("desk", "-o", "desk-1.json")
     assert files(place, "desk-1") == ["desk-1.png"]
@@ -107,23 +111,25 @@ def test_boxes_marked_by_hand_on_a_snapshot(place: Path) -> None:
 
 
 BOX = ("--box", "yellow", 10, 20, 30, 40)
+DESK = ("desk", "--picture", "desk.png")
+"""Without a snapshot, which takes a second."""
 
 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("desk", "--box", "yellow", 300, 20, 30, 40), "lies outside of the picture, which has 320 x 240 pixels"),
-        (("desk", "--box", "yellow", -1, 20, 30, 40), "box 1 (yellow -1 20 30 40): lies outside"),
-        (("desk", "--box", "yellow", 10, 20, 0, 40), "has no area, expected a width and a height above 0"),
-        (("desk", "--box", "yellow", 10, 20, "nan", 40), "expected a class and four numbers X Y WIDTH HEIGHT"),
-        (("desk", "--box", "", 10, 20, 30, 40), "the class is empty"),
-        (("desk", *BOX, "--classes", "red,blue"), "there is no class 'yellow', expected one of red, blue"),
-        (("desk", "--box", "red", 1, 2, 3, 4, "--test", "hil-camera"), "no class 'red', expected one of blue, yellow"),
+        ((*DESK, "--box", "yellow", 300, 20, 30, 40), "lies outside of the picture, which has 320 x 240 pixels"),
+        ((*DESK, "--box", "yellow", -1, 20, 30, 40), "box 1 (yellow -1 20 30 40): lies outside"),
+        ((*DESK, "--box", "yellow", 10, 20, 0, 40), "has no area, expected a width and a height above 0"),
+        ((*DESK, "--box", "yellow", 10, 20, "nan", 40), "expected a class and four numbers X Y WIDTH HEIGHT"),
+        ((*DESK, "--box", "", 10, 20, 30, 40), "the class is empty"),
+        ((*DESK, *BOX, "--classes", "red,blue"), "there is no class 'yellow', expected one of red, blue"),
+        ((*DESK, "--box", "red", 1, 2, 3, 4, "--test", "hil-camera"), "no class 'red', expected one of blue, yellow"),
         (
-            ("desk", "--boxes", "tests/truths/static-rig.json"),
+            (*DESK, "--boxes", "tests/truths/static-rig.json"),
             "a picture of 640 x 480 pixels, expected one of 320 x 240",
         ),
-        (("desk", "--boxes", "desk.png"), "desk.png: cannot be read as COCO JSON"),
+        ((*DESK, "--boxes", "desk.png"), "desk.png: cannot be read as COCO JSON"),
         (("desk", *BOX, "--picture", "none.png"), "none.png: cannot be read: No such file"),
         (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: holds no picture"),
         (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),
@@ -137,17 +143,19 @@ BOX = ("--box", "yellow", 10, 20, 30, 40)
         (("emulated", "--picture", "desk.png"), "--picture has no virtual scene"),
     ],
 )
-def test_what_is_no_truth(place: Path, words: tuple[object, ...], sentence: str) -> None:
+def test_what_is_not_a_truth(place: Path, words: tuple[object, ...], sentence: str) -> None:
     assert sentence in rig("-o", "desk-2.json", *words, code=2)
     assert files(place, "desk-2") == []
 
 
+@pytest.mark.slow
 def test_a_camera_that_gives_nothing_is_an_error(place: Path) -> None:
     (place / "desk.png").unlink()
     assert "desk.png" in rig("desk", "-o", "desk-2.json", *BOX, code=3)
     assert files(place, "desk-2") == []
 
 
+@pytest.mark.slow
 def test_what_help_and_page_show_works(place: Path) -> None:
     page = (ROOT / "docs" / "rigs.md").read_text()
     for words in re.findall(r"dodo rig truth ([^`\n]*)", page.split("## Truth files")[1]):
@@ -163,6 +171,7 @@ def test_what_help_and_page_show_works(place: Path) -> None:
     assert boxes(place / "truths" / "desk.json") == boxes(place / "marked.json")
 
 
+@pytest.mark.slow
 def test_a_dark_picture_is_taken_with_a_warning(place: Path) -> None:
     cv2.imwrite("desk.png", np.kron(np.eye(8), np.ones((40, 40))).astype(np.uint8))
     said = rig("desk", "-o", "dusk.json", *BOX)
