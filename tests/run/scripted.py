@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dodo_dsl.plan.model import Application, ApplicationService, Lockstep, Plan, Service
+from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, Service
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.engine import ORDER
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Verdict
 
 T = TypeVar("T")
@@ -179,4 +178,4 @@ def send_signal_after(seconds: float, number: int) -> None:
     asyncio.get_running_loop().call_later(seconds, os.kill, os.getpid(), number)
 
 
-assert set(READY) <= set(ORDER)
+assert set(READY) <= set(LAYERS)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.engine import BEGIN_PATIENCE_S, LAST_TIME_PATIENCE_S, ORDER, READY_PATIENCE_S, Engine
+from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.run.engine import BEGIN_PATIENCE_S, LAST_TIME_PATIENCE_S, READY_PATIENCE_S, Engine
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
@@ -41,8 +41,8 @@ def test_layers_start_in_order_and_times_are_measured() -> None:
     said: list[str] = []
     backend = ScriptedBackend(plan(), drives(5.0), {"open": 3.0, "close": 4.0})
     found, kept = run(Engine(backend.plan, backend, said.append).run())
-    assert backend.calls == ["open", *ORDER, "begin", "close"]
-    phases = ["setting up", *(f"waiting for {layer}" for layer in ORDER), "running", "taking down"]
+    assert backend.calls == ["open", *LAYERS, "begin", "close"]
+    phases = ["setting up", *(f"waiting for {layer}" for layer in LAYERS), "running", "taking down"]
     assert (said, kept) == (phases, [])
     assert (found.outcome, found.reason, found.setup_s, found.execution_s) == ("passed", "it drove", 5.0, 5.0)
     assert (found.cid, found.backend, found.seed, found.last_lines) == (131, "process", 7, ())
