@@ -1,4 +1,4 @@
-"""Problems as values: where, which rule, what is wrong and the way out."""
+"""Problems as values: place, rule, message and hint."""
 
 import difflib
 import functools
@@ -58,7 +58,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def shown_path(file: str) -> str:
-    """The path as a reader finds it: relative to the working folder where it lies below it."""
+    """The path relative to the working folder if it lies below it."""
     path = Path(file)
     if not path.is_absolute():
         return file
@@ -68,7 +68,7 @@ def shown_path(file: str) -> str:
 
 @functools.lru_cache(maxsize=4)
 def _lines(file: str) -> list[str]:
-    """The beginning of a file, as far as a spec may be long."""
+    """The lines of a file, up to the maximum size of a spec."""
     path = Path(file)
     if not path.is_file():
         return []
@@ -85,7 +85,7 @@ def _source_line(span: Span) -> str | None:
 
 
 def printable(text: str) -> str:
-    """The text without what could move a terminal's cursor or speak to a CI log."""
+    """The text without control characters, which could move a cursor or command a CI log."""
     return "".join(c if c.isprintable() else ("→" if c == "\t" else "�") for c in text)
 
 

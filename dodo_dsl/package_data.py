@@ -1,6 +1,6 @@
-"""Where the package's data lies: schemas, templates, services and the shipped registry.
+"""Paths of the package's data: schemas, templates, services and the shipped registry.
 
-An installed wheel carries them in ``dodo_dsl/_data``; in a checkout they lie beside the package.
+An installed wheel has them in ``dodo_dsl/_data``, a checkout beside the package.
 """
 
 from pathlib import Path
@@ -31,5 +31,5 @@ def registry() -> Path:
 
 
 def is_shipped(folder: Path, repository: Path) -> bool:
-    """Whether a folder of tests is DoDo's own, seen from another repository than DoDo's checkout."""
+    """Whether a folder of tests ships with DoDo and is used from another repository than DoDo's checkout."""
     return folder.resolve().is_relative_to(registry().resolve()) and repository.resolve() != root().resolve()

@@ -1,1 +1,1 @@
-"""The command line: a module a command, each with ``add`` (its flags) and ``main`` (its work)."""
+"""The command line: one module per command, each with ``add`` (its flags) and ``main`` (its work)."""

@@ -15,12 +15,12 @@ from dodo_dsl.emit.output_folder import differences, stale_folders, write
 EXAMPLES = """examples:
   dodo compile                             all tests of the deployment, into generated/
   dodo compile tests/my-test -o out        one folder of tests
-  dodo compile --check                     problems of all tests; nothing is written
+  dodo compile --check                     problems of all tests; writes nothing
   dodo compile --check --format gitlab     the same as a code quality report
 """
 
 
-_SHORT_DIFF = 30  # lines that are shown without being asked for
+_SHORT_DIFF = 30  # lines that are shown without --diff
 _MOST_NAMES = 8
 _MOST_PROBLEMS = 1000
 
@@ -30,12 +30,15 @@ def add(parser: argparse.ArgumentParser) -> None:
         "path",
         nargs="*",
         metavar="PATH",
-        help="specs, folders or names; DIR then holds these only (default: all)",
+        help="specs, folders or names of tests; DIR then holds only these (default: all)",
     )
-    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
-    parser.add_argument("--check", action="store_true", help="write nothing; show problems, and what is stale in DIR")
-    parser.add_argument("--diff", action="store_true", help="with --check, show what is stale in full")
-    parser.add_argument("--format", choices=sorted(FORMATS), default="text", help="of the diagnostics")
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"),
+                        help="output folder (default: generated)")  # fmt: skip
+    parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
+    parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
+    parser.add_argument(
+        "--format", choices=sorted(FORMATS), default="text", help="format of the diagnostics (default: text)"
+    )
     selection.add_application(parser)
 
 
@@ -71,7 +74,7 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     outdated = f"{options.output} is stale; dodo compile brings it up to date"
     if options.format == "text":
         stdout.write(_difference(stale, options.output, options.diff))
-        warnings = [f"{len(diagnostics)} warning{'' if len(diagnostics) == 1 else 's'}"] if diagnostics else []
+        warnings = [_count(len(diagnostics), "warning")] if diagnostics else []
         state = ", ".join([*warnings, *([outdated] if stale else [])])
         stdout.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
     elif stale:
@@ -80,7 +83,7 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
 
 
 def _difference(stale: Mapping[str, str], out: Path, in_full: bool) -> str:
-    """The diff where it is asked for or short, and otherwise what differs."""
+    """The diff if it is wanted or short, otherwise the names of what differs."""
     text = "".join(stale.values())
     if in_full or text.count("\n") <= _SHORT_DIFF:
         return text
@@ -109,10 +112,9 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int
     if options.format == "text":
         stdout.write(f"{_count(len(made.compiled.suite.plans))} compiled into {options.output}\n")
         if gone:
-            what = f"{_count(len(gone))} of before that {'is' if len(gone) == 1 else 'are'} not among them"
-            stdout.write(f"removed {what}: {_names(gone)}\n")
+            stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
     return Exit.OK
 
 
-def _count(number: int) -> str:
-    return f"{number} test{'' if number == 1 else 's'}"
+def _count(number: int, what: str = "test") -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

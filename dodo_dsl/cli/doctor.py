@@ -1,4 +1,4 @@
-"""dodo doctor: what this machine can run, what it lacks, what was left behind."""
+"""dodo doctor: check what this machine can run, what it lacks and what killed runs left behind."""
 
 import argparse
 import dataclasses
@@ -12,15 +12,15 @@ from dodo_dsl.run.work_folder import reap_folders
 
 EXAMPLES = """examples:
   dodo doctor              every finding, and what to do about it
-  dodo doctor --clean      remove what killed runs left: processes, shared memory, containers, networks, volumes
-  dodo doctor --json       for programs
+  dodo doctor --clean      remove what killed runs left behind: processes, shared memory, containers, networks, volumes
+  dodo doctor --json       the same as JSON
 """
 _SIGNS = {"ok": "ok     ", "warning": "warning", "problem": "PROBLEM"}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--clean", action="store_true", help="remove what killed runs left, and nothing else")
-    parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.add_argument("--clean", action="store_true", help="remove what killed runs left behind")
+    parser.add_argument("--json", action="store_true", help="output as JSON")
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

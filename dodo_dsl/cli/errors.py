@@ -1,4 +1,4 @@
-"""What a command ends with when it cannot go on: one sentence and an exit code, whichever part of DoDo raised it."""
+"""The end of a command that cannot go on: one sentence and an exit code, whichever part of DoDo raised the error."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +23,7 @@ def files_of_the_user() -> Iterator[None]:
 
 
 def exit_code(error: Exception) -> Exit | None:
-    """The exit code of an error that its own sentence explains; None for one that nobody foresaw."""
+    """The exit code of an error that its own sentence explains; None for an unexpected one."""
     if isinstance(error, UsageError):
         return Exit.USAGE
     if isinstance(error, _usage_errors()) or getattr(error, "usage", False):
@@ -32,7 +32,7 @@ def exit_code(error: Exception) -> Exit | None:
 
 
 def sentence(error: Exception) -> str:
-    """What is wrong; of the system's errors without their number."""
+    """The error's own text; an error of the system without its number, with its file."""
     if not isinstance(error, OSError):
         return str(error).rstrip("\n")
     place = f"{error.filename}: " if error.filename else ""
@@ -56,7 +56,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
 
 
 def _machine_errors() -> tuple[type[Exception], ...]:
-    """Errors of the machine, its engine and its rigs; a rig's may be the user's, which its ``usage`` says."""
+    """Errors of the machine, its engine and its rigs. ``usage`` of a rig's error makes it one of the user."""
     from dodo_dsl.images.docker_command import DockerError
     from dodo_dsl.images.wheels import WheelsError
     from dodo_dsl.run.leases import LeaseTimeout

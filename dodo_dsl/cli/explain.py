@@ -1,4 +1,4 @@
-"""dodo explain: what a rule means, or how a test is wired and what its application must give."""
+"""dodo explain: explain a rule, or how a test is wired and what its application must provide."""
 
 import argparse
 import json
@@ -14,10 +14,10 @@ from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import did_you_mean, format_text, printable
 
 EXAMPLES = """examples:
-  dodo explain                       the rules, a line each
-  dodo explain wrong-unit            a rule: why it is so, what breaks it and what does not
-  dodo explain sil-closed-straight   a test: services, where values come from, who says and hears what
-  dodo explain 'sil-*' --json        several tests, for programs
+  dodo explain                       all rules, one line each
+  dodo explain wrong-unit            a rule: its reason, what breaks it and what complies
+  dodo explain sil-closed-straight   a test: services, origins of values, producers and consumers
+  dodo explain 'sil-*' --json        several tests, as JSON
 """
 
 _MOST_ROWS = 100
@@ -25,7 +25,7 @@ _MOST_ROWS = 100
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("word", nargs="?", metavar="TEST|RULE", help="a rule, or the name or path of a test")
-    parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.add_argument("--json", action="store_true", help="output as JSON")
     selection.add_application(parser)
 
 
@@ -91,10 +91,10 @@ def _services(one: Explanation) -> str:
 
 
 def _wiring(one: Explanation) -> str:
-    rows = [[_port(line), ", ".join(line.says) or _unsaid(line, one), "->", ", ".join(line.hears) or _unheard(line)]
+    rows = [[_port(line), ", ".join(line.says) or _producers(line, one), "->", ", ".join(line.hears) or _consumers(line)]
             for line in one.wiring]  # fmt: skip
-    parts = ["who says what, and who hears it\n" + _table(rows, "  ")]
-    for title, required in (("the application must give", True), ("the application may give", False)):
+    parts = ["producers and consumers\n" + _table(rows, "  ")]
+    for title, required in (("the application must provide", True), ("the application may provide", False)):
         asked = [a for a in one.asked if a.required is required]
         if asked:
             parts.append(
@@ -108,12 +108,12 @@ def _port(line: Line | Asked) -> str:
     return f"memory {line.port}" if line.kind == "memory" else line.port
 
 
-def _unheard(line: Line) -> str:
-    return "who opens it" if line.kind == "memory" else "nobody"
+def _consumers(line: Line) -> str:
+    return "any reader" if line.kind == "memory" else "no consumer"
 
 
-def _unsaid(line: Line, one: Explanation) -> str:
-    return "the application" if any(line.port == a.port for a in one.asked) else "nobody"
+def _producers(line: Line, one: Explanation) -> str:
+    return "the application" if any(line.port == a.port for a in one.asked) else "no producer"
 
 
 def _declared(asked: Asked, one: Explanation) -> str:
@@ -122,18 +122,18 @@ def _declared(asked: Asked, one: Explanation) -> str:
     if asked.declared_by:
         return f"declared by {', '.join(asked.declared_by)}"
     undeclared = ", ".join(one.undeclared)
-    return f"not declared; {undeclared} without x-dodo may" if undeclared else "not declared"
+    return f"not declared; {undeclared} has no x-dodo and may provide it" if undeclared else "not declared"
 
 
 def _differences(instances: Sequence[Explanation]) -> str:
-    """The values that are not the same in all instances, a row an instance."""
+    """The values that differ between the instances, one row per instance."""
     if len(instances) == 1:
         return ""
     values = [_values(one) for one in instances]
     keys = [key for key in values[0] if len({v.get(key, "") for v in values}) > 1]
     rows = [[one.name, *(f"{k}: {v.get(k, '')}" for k in keys)] for one, v in zip(instances, values, strict=True)]
     rest = f"  ... {len(rows) - _MOST_ROWS} more\n" if len(rows) > _MOST_ROWS else ""
-    return f"the {len(rows)} instances, and what differs\n" + _table(rows[:_MOST_ROWS], "  ") + rest
+    return f"the {len(rows)} instances and their differences\n" + _table(rows[:_MOST_ROWS], "  ") + rest
 
 
 def _values(one: Explanation) -> dict[str, str]:
@@ -142,7 +142,7 @@ def _values(one: Explanation) -> dict[str, str]:
 
 
 def _table(rows: Sequence[Sequence[str]], indent: str) -> str:
-    """Columns padded to their widest cell, but no wider than 48; the last as it is."""
+    """Columns padded to their widest cell, at most 48 wide; the last is not padded."""
     widths = [min(48, max(map(len, column))) for column in zip(*rows, strict=True)]
     lines = ("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)
     return "".join(f"{indent}{printable(line)}\n" for line in lines)

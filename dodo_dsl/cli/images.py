@@ -14,23 +14,23 @@ from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
 EXAMPLES = """examples:
-  dodo images build                                   all of them, as the deployment names them
-  dodo images build collision virtual-camera          two of them
-  dodo images build --offline-wheels                  where a build cannot reach the package index
+  dodo images build                                   all images, named as in dodo.yml
+  dodo images build collision virtual-camera          two images
+  dodo images build --offline-wheels                  if a build cannot reach the package index
   dodo images push --prefix registry.example.org/dodo
 """
-_INDEX_HINT = "where a build cannot reach the package index, --offline-wheels lets this machine download the packages"
+_INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     build = _action(actions, "build", "build images from the installed DoDo")
+    build.add_argument("--base-image", metavar="I", help="base image with Python (default: a python:*-slim)")
     build.add_argument(
-        "--base-image", metavar="I", help="image with Python to stand on (default: one of python:*-slim)"
+        "--offline-wheels", action="store_true", help="download packages on this machine, not in the build"
     )
-    build.add_argument("--offline-wheels", action="store_true", help="download packages here, not inside the build")
-    build.add_argument("--source", metavar="URL", default="", help="where the sources are, for the images' labels")
-    _action(actions, "push", "push images to their registry; log in with `docker login` before")
+    build.add_argument("--source", metavar="URL", default="", help="URL of the sources, for the images' labels")
+    _action(actions, "push", "push images to their registry; log in with 'docker login' first")
 
 
 def _action(
@@ -39,9 +39,11 @@ def _action(
     action = actions.add_parser(name, help=text, description=text)
     action.add_argument("name", nargs="*", metavar="NAME", help="services, sandbox, base or vision (default: all)")
     action.add_argument(
-        "--prefix", metavar="P", help="of the images' names (default: dodo.yml's images.prefix, or dodo)"
+        "--prefix", metavar="P", help="prefix of the images' names (default: images.prefix of dodo.yml, or dodo)"
     )
-    action.add_argument("--tag", metavar="T", help="of the images (default: dodo.yml's images.tag, or the version)")
+    action.add_argument(
+        "--tag", metavar="T", help="tag of the images (default: images.tag of dodo.yml, or the version)"
+    )
     return action
 
 
@@ -54,7 +56,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     prefix = (options.prefix or deployment.image_prefix).rstrip("/")
     if options.action == "push" and prefix == Deployment.image_prefix:
-        raise UsageError("to which registry? name it with --prefix, or as images.prefix in dodo.yml")
+        raise UsageError("no registry; name it with --prefix or as images.prefix in dodo.yml")
     names = known(load_manifests()[0].values())
     return choose(options.name, names, prefix, options.tag or deployment.image_tag)
 
@@ -74,7 +76,7 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
         code, output = docker_command.show(words, stdout, folder)
     if code:
         hint = f"; {_INDEX_HINT}" if packages is None and (stdout.isatty() or "requirements/install" in output) else ""
-        raise docker_command.DockerError(f"the images cannot be built, the reason stands above{hint}")
+        raise docker_command.DockerError(f"the images cannot be built; the output above says why{hint}")
     width = max(len(image.reference) for image in images)
     for image in images:
         stdout.write(f"built {image.reference:<{width}}  {docker_command.size(image.reference) / 1e6:.0f} MB\n")
@@ -83,7 +85,7 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
 
 def _packages(base_image: str, stdout: TextIO) -> Path:
     python = wheels.python_of(base_image)
-    stdout.write(f"packages for Python {python.tag} on {python.machine}, by pip of this machine\n")
+    stdout.write(f"downloading packages for Python {python.tag} on {python.machine} with pip\n")
     stdout.flush()
     return wheels.provide(python, wheels.cache_folder())
 
@@ -99,5 +101,5 @@ def _push(images: list[Image], stdout: TextIO) -> int:
         if code:
             denied = any(word in output for word in ("denied", "unauthorized", "no basic auth"))
             hint = f"; log in with: docker login {image.reference.partition('/')[0]}" if denied else ""
-            raise docker_command.DockerError(f"{image.reference} cannot be pushed, the reason stands above{hint}")
+            raise docker_command.DockerError(f"{image.reference} cannot be pushed; the output above says why{hint}")
     return Exit.OK

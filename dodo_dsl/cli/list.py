@@ -1,4 +1,4 @@
-"""dodo list: what tests and services there are."""
+"""dodo list: list the tests and services."""
 
 import argparse
 import json
@@ -14,8 +14,8 @@ from dodo_dsl.diagnostics import did_you_mean, printable, shown_path
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
   dodo list --services      the services that a test may use
-  dodo list --services integrator    one of them: parameters, messages
-  dodo list --json          for programs
+  dodo list --services integrator    one service: parameters, messages
+  dodo list --json          the same as JSON
 """
 
 _MOST_FILES = 3
@@ -23,9 +23,9 @@ _MOST_FILES = 3
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--services", nargs="?", const="", metavar="NAME", help="services instead of tests, or one with its parameters"
+        "--services", nargs="?", const="", metavar="NAME", help="list services instead of tests, or describe one"
     )
-    parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.add_argument("--json", action="store_true", help="output as JSON")
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -85,20 +85,20 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
         facts = f"{parameter.type}{default}"
         if parameter.required:
             others = [*["another service of the test"] * parameter.shared, *["the rig"] * bool(parameter.rig)]
-            facts += f", required unless {' or '.join(others)} has it" if others else ", required"
+            facts += f", required unless {' or '.join(others)} provides it" if others else ", required"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
         stdout.write(f"  {parameter.name}: {facts} {unit}".rstrip() + f"\n      {parameter.help}\n")
     for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):
-        for way, names in (("in", ports.inputs), ("out", ports.outputs)):
+        for direction, names in (("in", ports.inputs), ("out", ports.outputs)):
             if names:
-                stdout.write(f"{title} {way}: {', '.join(names)}\n")
+                stdout.write(f"{title} {direction}: {', '.join(names)}\n")
     if manifest.example is not None:
-        stdout.write(f"alone: {shlex.join([*manifest.process, '--cid=128', *manifest.example])}\n")
+        stdout.write(f"standalone: {shlex.join([*manifest.process, '--cid=128', *manifest.example])}\n")
     return Exit.OK
 
 
 def _table(rows: list[dict[str, str]], columns: tuple[str, ...], stdout: TextIO) -> None:
-    """Columns padded to their widest cell; the last is left as it is, so that it can be piped on."""
+    """Columns padded to their widest cell, except the last, so that it can be piped on."""
     widths = [max((len(row[c]) for row in rows), default=0) for c in columns[:-1]]
     for row in rows:
         cells = [row[c].ljust(w) for c, w in zip(columns, widths, strict=False)]

@@ -37,8 +37,8 @@ COMMANDS: dict[str, ModuleType] = {
 DEBUG = "DODO_DEBUG"
 
 _EXAMPLES = """examples:
-  dodo list                          what tests there are
-  dodo compile --check               every problem of every test, nothing written
+  dodo list                          the tests of the deployment
+  dodo compile --check               every problem of every test; writes nothing
   dodo run sil-closed-straight       run one test and judge the application
   dodo run --level sil -j 2          all simulations, two at a time
 """
@@ -55,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"dodo {__version__}")
     commands = top.add_subparsers(metavar="COMMAND", dest="command", required=True)
     for name, module in COMMANDS.items():
-        summary = (module.__doc__ or "").splitlines()[0].split(": ", 1)[1]
+        summary = (module.__doc__ or "").splitlines()[0].split(": ", 1)[1].rstrip(".")
         command = commands.add_parser(
             name,
             help=summary,
@@ -79,7 +79,7 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except BrokenPipeError:
-        # the reader of a pipe left (`dodo list | head`): nothing to say, and nothing more to flush
+        # the reader of a pipe left (``dodo list | head``); nothing more can be flushed
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.OK
     except Exception as error:

@@ -1,4 +1,4 @@
-"""A bar on a terminal for work that takes long; nothing elsewhere."""
+"""A progress bar on a terminal for long work; nothing elsewhere."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -8,8 +8,8 @@ from dodo_dsl.diagnostics import printable
 
 
 @contextmanager
-def bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Gives a function that takes how much of `total` is done."""
+def progress_bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Yields a function that takes how much of ``total`` is done."""
     if not stream.isatty():
         yield lambda _: None
         return

@@ -1,4 +1,4 @@
-"""dodo report: draw the report of a finished run again."""
+"""dodo report: write the report of a finished run again."""
 
 import argparse
 from pathlib import Path
@@ -18,7 +18,8 @@ REPORT = Path("dodo-report")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", metavar="DIR", type=Path, nargs="?", default=REPORT)
+    parser.add_argument("folder", metavar="DIR", type=Path, nargs="?", default=REPORT,
+                        help="folder of the report (default: dodo-report)")  # fmt: skip
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

@@ -1,4 +1,4 @@
-"""Which tests a command line means: names, patterns, files or folders, and levels."""
+"""Which tests a command line selects: names, patterns, files or folders, and levels."""
 
 import argparse
 import fnmatch
@@ -34,7 +34,7 @@ def add_application(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        help="the application's compose file, or several that are merged (default: dodo.yml's)",
+        help="compose file of the application; repeatable, files are merged (default: that of dodo.yml)",
     )
 
 
@@ -58,7 +58,7 @@ def select(
 ) -> Checked:
     """The checked tests that the words mean (all without any), kept to the levels; raises NoSuchTest.
 
-    Shipped tests that the application cannot feed are left out, unless a word is the name or the path of one.
+    Shipped tests that the application cannot feed are skipped, unless a word is the name or path of one.
     """
     paths = [Path(word) for word in words if _is_path(word)]
     names = [word for word in words if not _is_path(word)]
@@ -76,17 +76,17 @@ def select(
     if levels:
         kept = tuple(s for s in checked.specs if s.level in levels)
         if not kept:
-            raise NoSuchTest(f"none of the tests is of level {' or '.join(levels)}")
+            raise NoSuchTest(f"no test has level {' or '.join(levels)}")
         checked = _narrowed(checked, kept)
     return without_unsatisfied(checked, given)
 
 
 def left_out(checked: Checked) -> str:
-    """One line about the shipped tests that were left out; empty when there are none."""
+    """One line about the shipped tests that were skipped; empty when there are none."""
     if not checked.left_out:
         return ""
-    why = "as the application does not send what they need (dodo explain NAME says what)"
-    return f"left out of the shipped tests: {', '.join(checked.left_out)}, {why}\n"
+    names = ", ".join(checked.left_out)
+    return f"skipped shipped tests that need what the application does not send: {names} (see dodo explain NAME)\n"
 
 
 def _is_name(word: str, spec: Spec) -> bool:

@@ -1,1 +1,1 @@
-"""Plans as files: compose layers, child pipeline and ``test.json``; written at once or compared with what stands."""
+"""Plans as files: compose layers, child pipeline and ``test.json``; written, or compared with existing files."""

@@ -1,4 +1,4 @@
-"""A planned service as a container sees it: command, volumes and what it waits for."""
+"""A planned service as a container: command, volumes and what it waits for."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _TRIES_A_SECOND = 2
 class Container:
     """What the layer template needs of a service; ``after`` holds names with compose's condition.
 
-    ``ready_tries`` says how often its ready file is looked for, twice a second.
+    ``ready_tries`` is how often its ready file is checked, twice a second.
     """
 
     name: str
@@ -51,7 +51,7 @@ def containers(plan: Plan, layer: str) -> list[Container]:
 
 
 def _word(flag: Flag) -> str:
-    """``--name=value`` with container paths, and with ``$`` doubled as compose wants it."""
+    """``--name=value`` with container paths, with ``$`` doubled for compose."""
     folder = {"path": f"{FILES}/", "report": f"{REPORT}/"}.get(flag.kind, "")
     return f"--{flag.name}={folder}{flag.value}".replace("$", "$$")
 

@@ -1,4 +1,4 @@
-"""Generated files on disk: written one by one, each as a whole, compared with what is there, stale ones removed."""
+"""Generated files on disk: written one by one, each as a whole, compared with existing ones, stale ones removed."""
 
 import difflib
 import filecmp

@@ -1,4 +1,4 @@
-"""The child pipeline: a job an instance, and what GitLab would refuse of it."""
+"""The child pipeline: one job per instance, and GitLab's limits for it."""
 
 import math
 import shlex
@@ -24,7 +24,7 @@ _SPARE_MINUTES = 10
 
 @dataclass(frozen=True)
 class Job:
-    """A job of the child pipeline; ``rig`` is the resource that it alone may use, or empty."""
+    """A job of the child pipeline; ``rig`` is the resource that it locks, or empty."""
 
     name: str
     stage: str
@@ -38,7 +38,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The stages in order, whether a gate stands before hil, whether images are pulled, and the jobs."""
+    """The stages in order, whether a gate precedes hil, whether images are pulled, and the jobs."""
 
     stages: tuple[str, ...]
     gate: bool
@@ -82,14 +82,14 @@ def _job(plan: Plan, gate: bool, folder: str) -> Job:
 
 
 def pipeline_problems(suite: Suite, text: str) -> list[Diagnostic]:
-    """What GitLab would refuse of the child pipeline ``text`` of a suite, at the test that is most to blame.
+    """What GitLab would refuse in the child pipeline ``text`` of a suite, at the test with the largest share.
 
     A job's name has at most 255 characters. The archive of an artifact that holds the YAML of a child pipeline has at
-    most 5 MB (``max_artifacts_content_include_size``). How many jobs a pipeline may have is unlimited on one's own
-    GitLab until somebody sets it, and 500, 1,500 or 2,000 on gitlab.com, by its tier. A YAML file may take 2 MB of
-    memory when parsed (``max_yaml_size_bytes``); a job takes 2.3 to 2.4 kB of that in Ruby. All of these but the first
-    can be raised, so that numbers of jobs are warnings. A job's at most 50 ``needs`` are never reached: the job
-    ``gate`` stands for all tests before it.
+    most 5 MB (``max_artifacts_content_include_size``). The number of jobs of a pipeline is unlimited on a self-managed
+    GitLab unless an administrator limits it, and 500, 1,500 or 2,000 on gitlab.com, by its tier. A YAML file may take
+    2 MB of memory when parsed (``max_yaml_size_bytes``); a job takes 2.3 to 2.4 kB of that in Ruby. All limits but the
+    first can be raised, so numbers of jobs are warnings. A job's limit of 50 ``needs`` is never reached: the job
+    ``gate`` represents all tests before it.
 
     Sources: https://docs.gitlab.com/administration/cicd/limits/ and
     https://docs.gitlab.com/user/gitlab_com/#cicd
@@ -108,14 +108,14 @@ def _whole(suite: Suite, text: str) -> Iterator[Diagnostic]:
     jobs, size = len(suite.plans) + _gated(suite), len(text.encode())
     hint = "compile fewer tests into one pipeline, or a smaller 'matrix'"
     if size > MAX_BYTES:
-        message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab takes 5 MB"
+        message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab accepts 5 MB"
         yield _largest(suite, message, hint, "error")
     if jobs > MAX_JOBS_PARSED:
         message = f"the child pipeline has {jobs} jobs, which take more than the 2 MB that GitLab reads by default"
         yield _largest(suite, message, f"{hint}; an administrator can raise max_yaml_size_bytes", "warning")
     elif jobs > MAX_JOBS_FREE:
-        message = f"the child pipeline has {jobs} jobs, gitlab.com takes 500 on its free tier and 1500 on Premium"
-        yield _largest(suite, message, f"{hint}; one's own GitLab takes any number by default", "warning")
+        message = f"the child pipeline has {jobs} jobs, gitlab.com allows 500 on its free tier and 1500 on Premium"
+        yield _largest(suite, message, f"{hint}; a self-managed GitLab allows any number by default", "warning")
 
 
 def _largest(suite: Suite, message: str, hint: str, severity: Severity) -> Diagnostic:

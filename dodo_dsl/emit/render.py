@@ -32,7 +32,7 @@ class File:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Block style, two spaces, lists indented, no aliases: what a reader of a compose file expects."""
+    """Block style, two spaces, lists indented, no aliases: as usual in compose files."""
 
     def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:
         super().increase_indent(flow, False)
@@ -42,7 +42,7 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _text(dumper: _Dumper, value: str) -> yaml.ScalarNode:
-    """A text, in quotes where YAML 1.2 would take it for something else, escaped where YAML 1.1 would break a line."""
+    """A string, quoted where YAML 1.2 would read another type, escaped where YAML 1.1 would break a line."""
     style = '"' if any(break_ in value for break_ in _OLD_BREAKS) else None if isinstance(resolve(value), str) else "'"
     return dumper.represent_scalar("tag:yaml.org,2002:str", value, style)
 
@@ -51,7 +51,7 @@ _Dumper.add_representer(str, _text)
 
 
 def _yaml_block(value: dict[str, Any], depth: int = 0) -> str:
-    """A compose file in block style. Tests of one application share most of it, so what lies deep is kept."""
+    """A compose file in block style. Tests of one application share most of it, so deep blocks are cached."""
     parts = []
     for key, below in value.items():
         if isinstance(below, dict) and below and depth < _SERVICE_DEPTH:
@@ -73,7 +73,7 @@ def _dumped(value: dict[str, Any]) -> str:
 
 
 def _yaml(value: Any) -> str:
-    """A scalar as JSON, which YAML reads as the same value whatever it holds."""
+    """A scalar as JSON, which YAML reads as the same value."""
     return orjson.dumps(value).decode()
 
 
@@ -94,7 +94,7 @@ def _render(template: str, **values: object) -> str:
 
 
 def render_plan(plan: Plan) -> list[File]:
-    """The compose layers, ``compose.yaml`` that keeps compose in the folder, ``.env`` and ``test.json`` of one test."""
+    """The compose layers, ``compose.yaml`` (which ends compose's search), ``.env`` and ``test.json`` of one test."""
     names = {layer: f"{layer}.compose.yml" for layer in LAYERS}
     own_network = plan.isolation == "network"
     files = [

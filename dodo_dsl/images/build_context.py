@@ -14,13 +14,13 @@ CONSTRAINTS = "constraints.txt"
 REQUIREMENTS = "services/requirements"
 _DOCKERFILE = "services/Dockerfile"
 _FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf")
-"""The emulated rig, where ``make firmware`` has built it: the gantry's image takes it along."""
+"""The emulated rig, if ``make firmware`` has built it: part of the gantry's image."""
 
 
 def assemble(folder: Path, wheels: Path | None) -> None:
     """Copies sources, constraints and wheels into an empty folder, with their dates.
 
-    The engine knows a context by its folder's name, and takes over only what has another date than the last time.
+    The engine identifies a context by its folder's name and transfers only files whose date has changed.
     """
     root, package = package_data.root(), Path(package_data.__file__).parent
     no_bytecode = shutil.ignore_patterns("__pycache__")
@@ -37,7 +37,7 @@ def assemble(folder: Path, wheels: Path | None) -> None:
 
 
 def _link(source: str, target: str) -> None:
-    """A wheel of some megabytes need not be copied where a hard link will do."""
+    """Hard-links a wheel, or copies it where that is impossible."""
     try:
         os.link(source, target)
     except OSError:
@@ -45,7 +45,7 @@ def _link(source: str, target: str) -> None:
 
 
 def define(folder: Path, images: Sequence[Image], base_image: str | None, source: str) -> None:
-    """Writes the targets of ``docker buildx bake``, one an image; without a base image the Dockerfile's is taken."""
+    """Writes the targets of ``docker buildx bake``, one per image; the default base image is the Dockerfile's."""
     arguments = {"VERSION": __version__, "SOURCE": source}
     if base_image:
         arguments["BASE_IMAGE"] = base_image

@@ -1,4 +1,4 @@
-"""The docker command: is all of it there, and its output as it comes."""
+"""The docker command: checks that it is complete, and passes on its output."""
 
 import shutil
 import subprocess
@@ -8,7 +8,7 @@ from typing import TextIO
 
 
 class DockerError(Exception):
-    """Something of Docker is missing, or a command of it failed; one sentence."""
+    """A part of Docker is missing, or a docker command failed; one sentence."""
 
 
 def _docker() -> str:
@@ -55,7 +55,7 @@ def size(reference: str) -> int:
 
 
 def show(words: Sequence[str], stdout: TextIO, folder: Path | None = None) -> tuple[int, str]:
-    """Runs a docker command with its progress on ``stdout``: exit code, and its output where that is no terminal.
+    """Runs a docker command with its progress on ``stdout``: exit code, and its output where that is not a terminal.
 
     On a terminal docker draws by itself; elsewhere its lines are passed on as they come.
     """

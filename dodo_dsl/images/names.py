@@ -1,4 +1,4 @@
-"""What images there are, and what they are called in a deployment."""
+"""The images and their names in a deployment."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ from dodo_dsl.spec.manifest import Manifest
 
 SANDBOX = "sandbox"
 SHARED = ("base", "vision")
-"""Stages that applications may stand on."""
+"""Stages that applications may use as base images."""
 
 
 class NoSuchImage(Exception):
-    """A name that means no image of DoDo's; one sentence."""
+    """A name without an image of DoDo's; one sentence."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,14 @@ class Image:
 def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:
     """The stages that are images: the sandbox, those of services, and those for applications.
 
-    A manifest that names a complete image (``registry.example.org/team/radar:1``) has it from elsewhere.
+    A manifest with a complete reference (``registry.example.org/team/radar:1``) uses an image from elsewhere.
     """
     bare = {m.image for m in manifests if "/" not in m.image and ":" not in m.image}
     return (*SHARED, *sorted({SANDBOX, *bare}))
 
 
 def choose(words: Sequence[str], names: Sequence[str], prefix: str, tag: str) -> list[Image]:
-    """The images that words mean, all without any; raises NoSuchImage."""
+    """The images with these names, all without any; raises NoSuchImage."""
     for word in words:
         if word not in names:
             hint = did_you_mean(word, names) or f"known: {', '.join(sorted(names))}"

@@ -17,7 +17,7 @@ _QUESTION = "import platform, sys; print(*sys.version_info[:2], platform.machine
 
 
 class WheelsError(Exception):
-    """Wheels that cannot be had; one sentence."""
+    """Wheels that cannot be provided; one sentence."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Python:
         return f"{self.version[0]}.{self.version[1]}"
 
     def platforms(self) -> list[str]:
-        """Wheel platforms that it takes, the newest first (PEP 600)."""
+        """Compatible wheel platforms, the newest first (PEP 600)."""
         newest = max(self.glibc[1], _OLDEST_GLIBC)
         names = [f"manylinux_2_{minor}_{self.machine}" for minor in range(newest, _OLDEST_GLIBC - 1, -1)]
         return [*names, f"manylinux2014_{self.machine}"]
@@ -62,7 +62,7 @@ def cache_folder() -> Path:
 def provide(python: Python, cache: Path) -> Path:
     """A folder with a wheel for each requirement and nothing else; raises WheelsError.
 
-    It is named after what was asked for, and appears under this name only when it is complete.
+    It is named after its requirements, and appears only when it is complete.
     """
     requirements = sorted((package_data.root() / REQUIREMENTS).glob("*.txt"))
     constraints = package_data.root() / CONSTRAINTS

@@ -1,1 +1,1 @@
-"""What people do with recordings: look inside, cut, and export to tables and data sets."""
+"""The work of ``dodo rec``: contents of recordings, cuts, and exports to tables and data sets."""

@@ -1,6 +1,6 @@
-"""Frames with detections as a labelled data set in the COCO format (pictures, and one `annotations.json`).
+"""Frames with detections as a labelled data set in the COCO format (pictures, and one ``annotations.json``).
 
-A detection is a DetectionBoundingBox; its class is the DetectionProperty (without `color:`) or else the DetectionType
+A detection is a DetectionBoundingBox; its class is the DetectionProperty (without ``color:``) or else the DetectionType
 of the same sender, sample time and detection. It belongs to the frame of the same sample time.
 Reference: cocodataset.org, "Data format", object detection.
 """
@@ -30,7 +30,7 @@ _JPEG_QUALITY = 95
 
 
 class Key(NamedTuple):
-    """What the messages of one detection have in common."""
+    """The identity of a detection, common to its messages."""
 
     sample_time: int
     sender_stamp: int
@@ -53,7 +53,7 @@ class Detection:
 
 @dataclass
 class DataSet:
-    """What is written: pictures and boxes so far."""
+    """The pictures and boxes written so far."""
 
     images: list[dict[str, Any]] = field(default_factory=list)
     boxes: list[tuple[int, str, list[float]]] = field(default_factory=list)
@@ -80,28 +80,28 @@ class DataSet:
 
 
 class LabelError(ValueError):
-    """Frames or labels that cannot be told apart; one sentence."""
+    """Missing or ambiguous frames or labels; one sentence."""
 
 
 def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Numbers:
     """The image messages of one camera among some rows; raises LabelError for none, or for several."""
     index = recording.index[rows]
     images: Numbers = rows[index["data_type"] == IMAGE]
-    stamps = sorted(set(recording.index["sender_stamp"][images].tolist()))
-    if not stamps:
+    cameras = sorted(set(recording.index["sender_stamp"][images].tolist()))
+    if not cameras:
         raise LabelError(f"the selection of {recording.path} holds no camera frames (opendlv.proxy.ImageReading)")
-    told = ", ".join(map(str, stamps))
-    if camera is None and len(stamps) > 1:
-        raise LabelError(f"{recording.path} holds frames of the cameras {told}; choose one with --camera")
-    if camera is not None and camera not in stamps:
-        raise LabelError(f"{recording.path} holds no frames of camera {camera}; there is {told}")
+    stamps = ", ".join(map(str, cameras))
+    if camera is None and len(cameras) > 1:
+        raise LabelError(f"{recording.path} holds frames of the cameras {stamps}; choose one with --camera")
+    if camera is not None and camera not in cameras:
+        raise LabelError(f"{recording.path} holds no frames of camera {camera}, expected one of {stamps}")
     return images if camera is None else images[recording.index["sender_stamp"][images] == camera]
 
 
 def detections(
     recording: Recording, messages: MessageSet, rows: Numbers, sender_stamp: int | None
 ) -> Mapping[int, list[Detection]]:
-    """The detections with a box among the messages of `rows`, by sample time; of one sender or all."""
+    """The detections with a box among the messages of ``rows``, by sample time; of one sender or all."""
     known = messages.names()
     kinds = {messages.id(_PREFIX + name): name for name in _KINDS if _PREFIX + name in known}
     found: defaultdict[Key, Detection] = defaultdict(Detection)
@@ -124,9 +124,9 @@ def detections(
 
 @dataclass(frozen=True)
 class Export:
-    """How frames are written into `folder`: pictures of type `png` or `jpg`, with a label or `everything`.
+    """How frames are written into ``folder``: as ``png`` or ``jpg``, only those with a label or ``everything``.
 
-    `progress` is told how many packets are done, `problem` what cannot be decoded at all.
+    ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all.
     """
 
     folder: Path

@@ -16,7 +16,7 @@ _DAY = 86_400_000_000
 
 @dataclass(frozen=True)
 class Stream:
-    """The messages of one id and sender; rate in Hz and the largest gap in s are None where one message tells none."""
+    """The messages of one id and sender; rate in Hz and largest gap in s are None for a single message."""
 
     id: int
     name: str | None
@@ -29,7 +29,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Frames:
-    """Packets with camera frames, and how many of them give a picture (None where nobody tried)."""
+    """Packets with camera frames, and how many of them give a picture (None if they were not decoded)."""
 
     packets: int
     decoded: int | None
@@ -37,9 +37,9 @@ class Frames:
 
 @dataclass(frozen=True)
 class Contents:
-    """Begin and duration in s, from sample times where there are any; `unordered` counts steps back in time.
+    """Start and duration in s, from sample times if there are any; ``unordered`` counts steps back in time.
 
-    `apart` messages are more than a day away from most others and do not count for these: in lockstep, what an
+    ``apart`` messages are more than a day away from most others and do not count for these: in lockstep, what an
     application stamps with the time of its machine lies years from the time of the test.
     """
 
@@ -70,9 +70,9 @@ def look(
     progress: Callable[[int], None] | None,
     problem: Callable[[str], None],
 ) -> Contents:
-    """Count everything; frames are decoded where `progress`, told how many are, is given.
+    """Count everything; frames are decoded if ``progress`` is given, which gets their number.
 
-    `problem` is told what cannot be decoded at all.
+    ``problem`` gets a sentence about what cannot be decoded at all.
     """
     times = recording.index["time"]
     stamped = times[times != 0]
@@ -92,7 +92,7 @@ def look(
 
 
 def _together(times: Numbers) -> Numbers:
-    """The times in us, as they stand, of the largest group without a gap of a day; the earliest of such groups."""
+    """The times in us, in their order, of the largest group without a gap of a day; the earliest of such groups."""
     ordered = np.sort(times)
     groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _DAY) + 1)
     largest = max(groups, key=len)

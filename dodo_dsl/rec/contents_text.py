@@ -16,11 +16,11 @@ def contents_text(found: Contents, recording: Recording) -> str:
         lines.append(f"begins {datetime.fromtimestamp(found.begin, UTC):%Y-%m-%d %H:%M:%S} UTC")
     if found.apart:
         are = "1 message is" if found.apart == 1 else f"{found.apart} messages are"
-        lines.append(f"{are} of another day than these, and not counted in them")
+        lines.append(f"{are} more than a day away from these and not counted")
     lines.append(f"message set {found.message_set}")
     if found.frames.packets:
-        told = "not decoded" if found.frames.decoded is None else f"{found.frames.decoded} decoded"
-        lines.append(f"camera frames: {found.frames.packets} packets, {told}")
+        decoded = "not decoded" if found.frames.decoded is None else f"{found.frames.decoded} decoded"
+        lines.append(f"camera frames: {found.frames.packets} packets, {decoded}")
     if found.unordered or found.untimed:
         lines.append(f"{found.unordered} steps back in time, {found.untimed} messages without a sample time")
     lines += [f"skipped {place}" for place in recording.damage.places[:_SHOWN]]

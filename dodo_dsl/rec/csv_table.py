@@ -1,7 +1,7 @@
-"""Recordings as CSV, field by field as `cluon-rec2csv` writes them.
+"""Recordings as CSV, field by field as ``cluon-rec2csv`` writes them.
 
-A file `<Message>-<senderStamp>.csv` for each message and sender, rows in the order of their sample times; cells end
-with `;`, times are seconds and microseconds, floats have 7 digits and doubles 11, texts and bytes are base64.
+A file ``<Message>-<senderStamp>.csv`` for each message and sender, rows in the order of their sample times; cells end
+with ``;``, times are seconds and microseconds, floats have 7 digits and doubles 11, strings and bytes are base64.
 """
 
 import base64
@@ -29,9 +29,9 @@ _FORMATS = {"float": "%.7g;", "double": "%.11g;", "string": '"%s";', "bytes": '"
 def write(
     recording: Recording, messages: MessageSet, rows: Numbers, folder: Path, progress: Callable[[int], None]
 ) -> Counter[int]:
-    """Write the files of the known messages among `rows` into a folder that has none of them yet.
+    """Write the files of the known messages among ``rows`` into a folder that has none of them yet.
 
-    `progress` is told how many rows are done. Returns how many payloads of which message could not be decoded: they
+    ``progress`` gets the number of rows done. Returns how many payloads of which message could not be decoded: they
     have no row. Raises OSError and RecordingError.
     """
     undecodable: Counter[int] = Counter()
@@ -52,7 +52,7 @@ def write(
 
 
 def names(recording: Recording, messages: MessageSet, rows: Numbers) -> list[str]:
-    """The files that `write` makes of rows with known messages."""
+    """The files that ``write`` makes of rows with known messages."""
     index = recording.index[rows]
     keys = np.unique(index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]).tolist()
     return [f"{messages.name(key >> 32)}-{key & 0xFFFFFFFF}.csv" for key in keys]

@@ -1,4 +1,4 @@
-"""A part of a recording as a recording of its own, byte for byte."""
+"""A part of a recording, copied into a new recording byte for byte."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +9,7 @@ from dodo_dsl.opendlv.recordings.writer import RecordingWriter
 
 
 def write(recording: Recording, rows: Numbers, path: Path, progress: Callable[[int], None]) -> None:
-    """Write some rows as they are into a new file; `progress` is told how many are done.
+    """Writes rows unchanged into a new file; ``progress`` gets the number of rows done.
 
     Raises OSError and RecordingError.
     """

@@ -1,4 +1,4 @@
-"""The part of a recording that a command is about: some messages, and a stretch of time."""
+"""The part of a recording that a command works on: some messages, and a time range."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ ABSOLUTE_S = 1e8  # seconds from here on are counted since 1970
 
 
 class NothingSelected(Exception):
-    """A selection that is wrong or holds no message; one sentence."""
+    """A selection that is invalid or without messages; one sentence."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """`messages` are names or ids, each with `/senderStamp` where one sender counts; none means all.
+    """``messages`` are names or ids, each with ``/senderStamp`` for a single sender; none means all.
 
-    `start` and `end` are seconds since the recording's begin, or since 1970.
+    ``start`` and ``end`` are seconds since the recording's start, or since 1970.
     """
 
     messages: Sequence[str] = ()
@@ -40,14 +40,14 @@ class Selection:
                 chosen |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
             rows = rows[chosen]
         if not len(rows):
-            raise NothingSelected(f"nothing is selected: no message of {recording.path} is {self}")
+            raise NothingSelected(f"nothing selected: no message of {recording.path} matches {self}")
         return rows
 
     def __str__(self) -> str:
-        parts = [" or ".join(self.messages)] if self.messages else ["there"]
-        parts += [f"from {self.start:g} s"] if self.start is not None else []
-        parts += [f"before {self.end:g} s"] if self.end is not None else []
-        return ", ".join(parts)
+        options = [f"--message {message}" for message in self.messages]
+        options += [f"--start {self.start:g}"] if self.start is not None else []
+        options += [f"--end {self.end:g}"] if self.end is not None else []
+        return " ".join(options)
 
 
 def _microseconds(seconds: float | None, begin: int) -> int | None:
@@ -59,7 +59,7 @@ def _microseconds(seconds: float | None, begin: int) -> int | None:
 def _parsed(text: str, known: MessageSet) -> tuple[int, int | None]:
     name, slash, stamp = text.partition("/")
     if slash and not stamp.isdecimal():
-        raise NothingSelected(f"`{text}` is no message: after the slash stands a sender stamp, a number")
+        raise NothingSelected(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
     try:
         id_ = int(name) if name.isdecimal() else known.id(name)
     except UnknownMessage as error:

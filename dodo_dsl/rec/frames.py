@@ -13,7 +13,7 @@ IMAGE = 1055
 
 
 class Packet(NamedTuple):
-    """A frame as it is recorded; `sample_time` is in microseconds since the epoch."""
+    """A recorded frame; ``sample_time`` is in microseconds since the epoch."""
 
     sender_stamp: int
     sample_time: int
@@ -22,7 +22,7 @@ class Packet(NamedTuple):
 
 
 def packets(recording: Recording, rows: Numbers) -> Iterator[Packet]:
-    """The packets of image messages in the order of `rows`; one that cannot be read has an empty format."""
+    """The packets of image messages in the order of ``rows``; one that cannot be read has an empty format."""
     messages = MessageSet.standard()
     for envelope in recording.envelopes(rows):
         try:
@@ -36,7 +36,7 @@ def packets(recording: Recording, rows: Numbers) -> Iterator[Packet]:
 def decoded(
     recording: Recording, rows: Numbers, problem: Callable[[str], None]
 ) -> Iterator[tuple[Packet, Frame | None]]:
-    """Each packet with its frame, or None where it gave none; what cannot be decoded at all is told once."""
+    """Each packet with its frame, or None if it gave none; ``problem`` gets a sentence per undecodable format."""
     decoders: dict[tuple[int, str], VideoDecoder | None] = {}
     for packet in packets(recording, rows):
         key = packet.sender_stamp, packet.format

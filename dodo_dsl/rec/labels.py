@@ -14,7 +14,7 @@ def of_truth(recording: Recording, images: Numbers, path: Path) -> Mapping[int, 
     (width, height), marks = truth.load(path)
     truth.check(marks, width, height, ())
     if not marks:
-        raise truth.TruthError(f"{path}: has no box")
+        raise truth.TruthError(f"{path}: has no boxes")
     boxes = [(m.label, (m.x / width, m.y / height, m.width / width, m.height / height)) for m in marks]
     found = [Detection(box, label) for label, box in boxes]
     return dict.fromkeys((e.sample_time for e in recording.envelopes(images)), found)

@@ -1,4 +1,4 @@
-"""True boxes of one picture: written by hand or read from COCO JSON, checked, drawn, and written as COCO JSON.
+"""True boxes of one picture: marked manually or read from COCO JSON, checked, drawn, and written as COCO JSON.
 
 Reference: cocodataset.org, "Data format", object detection; boxes are in pixels from the picture's upper left corner.
 """
@@ -16,11 +16,11 @@ MOST_BYTES, MOST_BOXES, MOST_PIXELS = 16_000_000, 10_000, 100_000
 _SLACK = 0.01
 """px by which a rounded box may reach over the picture's edge."""
 _LEAST_SHOWN = 1000
-"""px: a picture of less width is drawn twice as large, as boxes are small."""
+"""px: a narrower picture is drawn at twice its size, as its boxes are small."""
 
 
 class TruthError(ValueError):
-    """Boxes that are no truth of a picture; one sentence."""
+    """Boxes that cannot be the truth of a picture; one sentence."""
 
 
 class Mark(NamedTuple):
@@ -40,7 +40,7 @@ def mark(label: object, numbers: Sequence[object], place: str) -> Mark:
     """A box of a class and its four numbers; raises TruthError, which names the place."""
     name = str(label).strip().removeprefix("color:").strip()
     if not name or not name.isprintable():
-        raise TruthError(f"{place}: the class is empty or no text")
+        raise TruthError(f"{place}: the class is empty or not printable")
     try:
         x, y, width, height = (float(str(number)) for number in numbers)
     except ValueError:
@@ -51,7 +51,7 @@ def mark(label: object, numbers: Sequence[object], place: str) -> Mark:
 
 
 def check(marks: Sequence[Mark], width: int, height: int, classes: Collection[str]) -> None:
-    """Raises TruthError for the first box that a picture of this size cannot have; without classes any will do."""
+    """Raises TruthError for the first box that a picture of this size cannot have; without classes any is allowed."""
     for number, each in enumerate(marks, 1):
         place = f"box {number} ({each})"
         if classes and each.label not in classes:
@@ -60,7 +60,7 @@ def check(marks: Sequence[Mark], width: int, height: int, classes: Collection[st
             raise TruthError(f"{place}: has no area, expected a width and a height above 0")
         ends = each.x + each.width, each.y + each.height
         if min(each.x, each.y) < 0 or ends[0] > width + _SLACK or ends[1] > height + _SLACK:
-            raise TruthError(f"{place}: lies outside of the picture, which has {width} x {height} pixels")
+            raise TruthError(f"{place}: lies outside the picture of {width} x {height} pixels")
 
 
 def read(path: Path, width: int, height: int) -> list[Mark]:
@@ -110,7 +110,7 @@ def drawn(picture: "Picture", marks: Sequence[Mark]) -> "Picture":
 
 
 _COLOURS = ((255, 80, 255), (255, 255, 60), (80, 255, 120), (255, 255, 255), (60, 160, 255))
-"""B, G, R; none is that of a cone."""
+"""B, G, R; none is the colour of a cone."""
 
 
 def _document(path: Path) -> Any:
@@ -147,5 +147,5 @@ def _read_one(entry: dict[str, Any], names: dict[str, Any], place: str) -> Mark:
 
 
 def _key(number: Any) -> str:
-    """An id as something that can be looked up, whatever it is."""
+    """Any JSON value of an id as a key for lookups."""
     return json.dumps(number)

@@ -1,4 +1,4 @@
-"""A truth on disk: the COCO file, the picture that it is about, and the same picture with the boxes drawn."""
+"""A truth on disk: the COCO file, its picture, and the same picture with the boxes drawn."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ MOST_BYTES = 64_000_000
 
 @dataclass(frozen=True)
 class TruthFiles:
-    """What is written: the truth, the picture, and the picture with boxes."""
+    """The files of a truth: COCO, picture, and picture with boxes."""
 
     truth: Path
     picture: Path
@@ -35,7 +35,7 @@ class TruthFiles:
         return [*([self.truth, self.marked] if has_boxes else []), *([self.picture] if is_new else [])]
 
     def write(self, picture: "Picture", marks: Sequence[Mark], is_new: bool) -> None:
-        """Each appears whole; the pictures first, so that who finds the truth finds them, too."""
+        """Writes the pictures first, so that whoever finds the truth finds them, too."""
         height, width = picture.shape[:2]
         if is_new:
             _write_picture(self.picture, picture)
@@ -45,7 +45,7 @@ class TruthFiles:
 
 
 def given(path: Path) -> bytes:
-    """The bytes of a picture that is there; raises TruthError."""
+    """The bytes of an existing picture; raises TruthError."""
     try:
         if path.stat().st_size > MOST_BYTES:
             raise TruthError(f"{path}: is larger than {MOST_BYTES} bytes")
@@ -61,7 +61,7 @@ def decoded(data: bytes, name: str) -> "Picture":
 
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
     if picture is None:
-        raise TruthError(f"{name}: holds no picture")
+        raise TruthError(f"{name}: not a picture")
     return np.asarray(picture, np.uint8)
 
 

@@ -48,7 +48,7 @@ def _is_offered(manifest: Manifest) -> bool:
 def _uses(manifests: Iterable[Manifest]) -> Schema:
     """The shipped services by name, and any other name for a deployment's own."""
     known = [{"const": m.name, "description": f"{m.description} Layer: {' or '.join(m.layers)}."} for m in manifests]
-    own = {"type": "string", "description": "A service of your own, from a folder under 'services' of dodo.yml."}
+    own = {"type": "string", "description": "One of your own services, from 'services' in dodo.yml."}
     return {"properties": {"uses": {"anyOf": [*known, own]}}}
 
 

@@ -33,12 +33,12 @@ def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch
     assert code == 0
     assert "\nsil-perception" in out
     assert err.startswith(
-        "left out of the shipped tests: hil-camera, hil-camera-scenes, sil-perception, as the application"
+        "skipped shipped tests that need what the application does not send: hil-camera, hil-camera-scenes,"
     )
 
 
 def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
     code, out, _ = dodo("list", "--services", "collision")
     assert code == 0
-    assert "  map-path: path, required unless another service of the test has it\n" in out
+    assert "  map-path: path, required unless another service of the test provides it\n" in out
     assert "  message: message, required\n" in dodo("list", "--services", "continuous-signal")[1]

@@ -56,6 +56,6 @@ def test_who_cannot_be_a_process_is_told_what_to_write(tmp_path: Path, monkeypat
     result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (
         2,
-        "dodo run: application service 'application' has no 'x-dodo-process', which processes need; "
-        "write for example 'x-dodo-process: [python, main.py]' at it, or run with --backend docker\n",
+        "dodo run: application service 'application' has no 'x-dodo-process', which the process backend needs; "
+        "add for example 'x-dodo-process: [python, main.py]', or run with --backend docker\n",
     )

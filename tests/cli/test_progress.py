@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from dodo_dsl.cli.progress_bar import bar
+from dodo_dsl.cli.progress_bar import progress_bar
 from dodo_dsl.cli.run.progress import LiveProgress, PlainProgress
 from tests.report.test_write import OUTCOME
 
@@ -56,7 +56,7 @@ def test_a_terminal_shows_what_was_said(text: str) -> None:
 @pytest.mark.parametrize("text", SAID)
 def test_a_bar_shows_a_files_name(text: str) -> None:
     terminal = Terminal()
-    with bar(terminal, f"reading {text}.rec", 3) as progress:
+    with progress_bar(terminal, f"reading {text}.rec", 3) as progress:
         progress(2)
     assert f"reading {text}.rec" in shown(terminal.getvalue())
 

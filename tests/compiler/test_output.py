@@ -182,7 +182,7 @@ def test_tests_that_are_gone_leave_the_output(generated: Path, monkeypatch: pyte
     (generated / "mine" / "notes.txt").write_text("keep")
     others = count(generated) - 1
     code, out, _ = run("compile", "sil-closed-straight")
-    removed = f"removed {others} tests of before that are not among them: dil-kiwi-track, "
+    removed = f"removed {others} stale tests: dil-kiwi-track, "
     assert (code, out[: out.index(removed)]) == (0, "1 test compiled into generated\n")
     assert out.endswith(f" and {others - 8} more\n")
     assert not (generated / "sil-closed-left-curve").exists()

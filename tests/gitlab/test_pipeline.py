@@ -99,12 +99,12 @@ def test_long_job_names_are_errors_at_the_matrix(plan: Plan) -> None:
 def test_a_file_over_5_mb_is_an_error(plan: Plan) -> None:
     assert problems(plan, text="#" * (5 << 20)) == []
     (problem,) = problems(plan, text="#" * ((5 << 20) + 1))
-    assert (problem.severity, problem.message) == ("error", "the child pipeline has 5.0 MB, GitLab takes 5 MB")
+    assert (problem.severity, problem.message) == ("error", "the child pipeline has 5.0 MB, GitLab accepts 5 MB")
 
 
 @pytest.mark.parametrize(
     ("number", "said"),
-    [(501, "501 jobs, gitlab.com takes 500 on its free tier"), (851, "851 jobs, which take more than the 2 MB")],
+    [(501, "501 jobs, gitlab.com allows 500 on its free tier"), (851, "851 jobs, which take more than the 2 MB")],
 )
 def test_many_jobs_are_a_warning_at_the_test_with_most_instances(plan: Plan, number: int, said: str) -> None:
     small = replace(plan, spec="small/small.dodo.yml", slug="small")

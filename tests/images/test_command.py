@@ -79,7 +79,7 @@ def test_a_failed_build_shows_why_and_says_so(docker: Path) -> None:
     script(docker, 'case "$2" in bake) echo "#9 sh /opt/tools/requirements/install base: failed"; exit 1;; esac')
     code, said = run("build")
     assert code == Exit.ERROR
-    assert "dodo images: the images cannot be built, the reason stands above; where a build cannot reach" in said
+    assert "dodo images: the images cannot be built; the output above says why; if a build cannot reach" in said
     assert "#9 sh /opt/tools/requirements/install base: failed" in said
 
 
@@ -94,7 +94,7 @@ def test_push_asks_for_a_registry(docker: Path) -> None:
     code, said = run("push")
     assert (code, said) == (
         Exit.USAGE,
-        "dodo images: to which registry? name it with --prefix, or as images.prefix in dodo.yml\n",
+        "dodo images: no registry; name it with --prefix or as images.prefix in dodo.yml\n",
     )
 
 
@@ -114,7 +114,9 @@ def test_push_without_a_log_in_says_how(docker: Path) -> None:
     code, said = run("push", "base", "--prefix", "registry.example.org/team", "--tag", "1")
     assert code == Exit.ERROR
     assert said.endswith("unauthorized: access to it is denied\n")
-    assert "base:1 cannot be pushed, the reason stands above; log in with: docker login registry.example.org\n" in said
+    assert (
+        "base:1 cannot be pushed; the output above says why; log in with: docker login registry.example.org\n" in said
+    )
 
 
 def test_a_broken_deployment_is_usage(docker: Path, tmp_path: Path) -> None:

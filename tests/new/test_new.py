@@ -68,19 +68,19 @@ def test_editors_find_the_schema(repository: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["First"], "'First' cannot name a test, expected lower-case letters and digits in words joined by"),
-        (["../first"], "'../first' cannot name a test"),
+        (["First"], "'First' is not a valid test name, expected lower-case letters and digits in words joined by"),
+        (["../first"], "'../first' is not a valid test name"),
         (["a" * 61], "at most 60 characters"),
         (["variables"], "'variables' is a keyword of GitLab's pipelines"),
         (["there"], "there is a test 'there' already; names are unique over all registries"),
-        (["half"], "there is a file 'tests/half/README.md' already; nothing was written"),
+        (["half"], "'tests/half/README.md' exists already; nothing was written"),
         (["new", "--extends", "their"], "there is no test 'their' to extend; did you mean 'there'?"),
-        (["new", "--extends", "there", "--level", "hil"], "write no --level or --kind"),
+        (["new", "--extends", "there", "--level", "hil"], "--level and --kind do not apply with --extends"),
         (["new", "--level", "dil"], "a dil test cannot be closed-loop"),
-        (["new", "--level", "dil"], "; dodo new new --level dil --kind open-loop begins another"),
-        (["new", "--level", "hil", "--kind", "open-loop"], "a hil test begins closed-loop; open-loop ones are"),
-        (["new", "--level", "hil", "--kind", "open-loop"], ": dodo new new --kind open-loop begins one"),
-        (["--deployment", "--level", "hil"], "--level, --kind and --extends belong to a test"),
+        (["new", "--level", "dil"], "; try: dodo new new --level dil --kind open-loop"),
+        (["new", "--level", "hil", "--kind", "open-loop"], "a new hil test is closed-loop; open-loop tests are"),
+        (["new", "--level", "hil", "--kind", "open-loop"], "; try: dodo new new --kind open-loop"),
+        (["--deployment", "--level", "hil"], "--level, --kind and --extends apply to a test"),
     ],
     ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
 )
@@ -112,13 +112,13 @@ def test_what_no_start_is_made_up_for_has_a_test_to_copy(repository: Path, level
 def test_outside_a_deployment_it_says_the_way(empty: Path) -> None:
     code, _, err = dodo("new", "first")
     assert (code, list(empty.iterdir())) == (2, [])
-    assert err == "dodo new: there is no dodo.yml here or above; dodo new --deployment writes one\n"
+    assert err == "dodo new: there is no dodo.yml in this folder or above; dodo new --deployment writes one\n"
 
 
 def test_a_deployment_without_folders_of_its_own_is_said(empty: Path) -> None:
     (empty / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:"]\n')
     code, _, err = dodo("new", "first")
-    assert (code, err) == (2, "dodo new: dodo.yml names no folder of this repository under 'registry'\n")
+    assert (code, err) == (2, "dodo new: dodo.yml has no folder of this repository in 'registry'\n")
 
 
 def with_shipped(repository: Path, registry: str = '["dodo:", tests]') -> None:
@@ -143,7 +143,7 @@ def test_a_shipped_test_is_copied_with_what_it_refers_to(repository: Path, shipp
     (repository / "docker-compose.yml").write_text("services: {anything: {image: example, command: --cid=111}}\n")
     code, out, err = dodo("new", "my-own", "--extends", shipped)
     assert (code, err) == (0, "")
-    assert f"a copy, as '{shipped}' ships with DoDo" in out
+    assert f"copied, because '{shipped}' ships with DoDo" in out
     code, out, err = dodo("compile", "--check")
     assert (code, err) == (0, ""), out
     spec = yaml.safe_load((repository / "tests/my-own/my-own.dodo.yml").read_text())
@@ -192,7 +192,7 @@ def test_an_installed_dodo_is_no_folder_of_the_repository(repository: Path, monk
     with_shipped(repository, '["dodo:"]')
     installed_in(repository, monkeypatch)
     code, out, err = dodo("new", "first")
-    assert (code, out, err) == (2, "", "dodo new: dodo.yml names no folder of this repository under 'registry'\n")
+    assert (code, out, err) == (2, "", "dodo new: dodo.yml has no folder of this repository in 'registry'\n")
 
 
 def test_a_deployment_is_written_once(repository: Path) -> None:
@@ -200,7 +200,7 @@ def test_a_deployment_is_written_once(repository: Path) -> None:
     code, out, err = dodo("new", "--deployment")
     assert (code, err) == (0, "")
     assert out.endswith("\nnothing to write\n")
-    assert out.count("left as it is: ") == len(before)
+    assert out.count("kept: ") == len(before)
     assert contents(repository) == before
 
 

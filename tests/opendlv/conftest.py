@@ -54,7 +54,7 @@ class Peer:
 
 @pytest.fixture
 def peer(cid: int) -> Iterator[Peer]:
-    """libcluon itself, in a session of number `cid`."""
+    """libcluon itself, in a session of number ``cid``."""
     pytest.importorskip("pycluon")
     process = Peer(cid)
     yield process

@@ -156,7 +156,7 @@ def test_arrays_stay_valid_after_the_end(mode: str, memory_name: str) -> None:
 
 
 def test_memory_that_is_not_there(memory_name: str) -> None:
-    with pytest.raises(SharedMemoryError, match=f"`{memory_name}` does not exist: /tmp/{memory_name}"):
+    with pytest.raises(SharedMemoryError, match=f"'{memory_name}' does not exist: /tmp/{memory_name}"):
         SharedMemory.attach(memory_name)
     token = Path("/tmp", memory_name)
     token.touch()
@@ -198,7 +198,7 @@ def test_waiting_for_posix_memory_ends(memory_name: str) -> None:
         until_waiting(memory, 1)
         memory.close()
         thread.join(10.0)
-    assert failures == [f"shared memory `{memory_name}` was removed by its creator"]
+    assert failures == [f"shared memory '{memory_name}' was removed by its creator"]
 
 
 def test_waiting_takes_no_processor_time(mode: str, memory_name: str) -> None:
@@ -213,7 +213,7 @@ def test_two_tokens_of_one_memory_are_told(memory_name: str) -> None:
     with SharedMemory.create(memory_name, 10):
         os.link(path, twin)
         try:
-            with pytest.raises(SharedMemoryError, match=rf"cannot be told from `{twin.name}`: the keys .* collide"):
+            with pytest.raises(SharedMemoryError, match=rf"cannot be told from '{twin.name}': the keys .* collide"):
                 SharedMemory.attach(memory_name)
         finally:
             twin.unlink()
@@ -257,5 +257,5 @@ def test_a_killed_reader_blocks_nobody(mode: str, memory_name: str) -> None:
             except SharedMemoryError as error:
                 failure = str(error)
                 break
-    told = f"shared memory `{memory_name}` can notify no more: a reader was killed while it waited"
+    told = f"shared memory '{memory_name}' cannot notify any more: a reader was killed while it waited"
     assert failure == ("" if mode == "sysv" else told)

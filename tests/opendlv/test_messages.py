@@ -91,7 +91,7 @@ def test_large_integers_lose_their_upper_bits_as_in_libcluon() -> None:
     [(1090, b"\x0d\x00"), (1090, b"\x0b"), (1104, b"\x0a\x02\xff\xfe"), (1104, b"\x0a\xff\xff\xff\xff\x0f")],
 )
 def test_malformed_payloads(id_: int, payload: bytes) -> None:
-    with pytest.raises(MessageError, match=r"^the payload is no opendlv\."):
+    with pytest.raises(MessageError, match=r"^the payload is not a valid opendlv\."):
         STANDARD.decode(id_, payload)
 
 
@@ -112,9 +112,9 @@ def test_names_and_ids() -> None:
     ("key", "text"),
     [
         (1, "there is no message with id 1"),
-        ("GroundSteeringRequest", "did you mean `opendlv.proxy.GroundSteeringRequest`?"),
-        ("opendlv.proxy.GroundStearingRequest", "did you mean `opendlv.proxy.GroundSteeringRequest`?"),
-        ("x", "there is no message `x`"),
+        ("GroundSteeringRequest", "did you mean 'opendlv.proxy.GroundSteeringRequest'?"),
+        ("opendlv.proxy.GroundStearingRequest", "did you mean 'opendlv.proxy.GroundSteeringRequest'?"),
+        ("x", "there is no message 'x'"),
     ],
 )
 def test_unknown_messages(key: str | int, text: str) -> None:
@@ -156,8 +156,8 @@ def test_nested_messages_and_fields_out_of_order(message_set: Callable[[str], Me
     ("text", "error"),
     [
         ("message M [id = 2950] {}", ":1:9: ids 2900 to 2999 are DoDo's own"),
-        ("message M [id = 3000] { Nothing x; }", ":1:33: `Nothing` is neither a type nor a message"),
-        ("message M [id = 3000] { M x; }", "`M` nests messages without end"),
+        ("message M [id = 3000] { Nothing x; }", ":1:33: 'Nothing' is neither a type nor a message"),
+        ("message M [id = 3000] { M x; }", "'M' nests messages without end"),
     ],
 )
 def test_specifications_that_cannot_be_used(message_set: Callable[[str], MessageSet], text: str, error: str) -> None:
@@ -172,5 +172,5 @@ def test_files_may_repeat_but_not_contradict_each_other(tmp_path: Path) -> None:
     same.write_text("\nmessage M [id = 3000] { float x [id = 1]; }")
     other.write_text("message M [id = 3000] { float y; }")
     assert MessageSet.load(one, same).name(3000) == "M"
-    with pytest.raises(OdvdError, match=r"other\.odvd:1:9: `M` is another message at .*one\.odvd:1:9"):
+    with pytest.raises(OdvdError, match=r"other\.odvd:1:9: 'M' is another message at .*one\.odvd:1:9"):
         MessageSet.load(one, other)

@@ -31,9 +31,9 @@ def test_the_order_of_the_bytes() -> None:
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: pixels.size("rgb", 2, 2), "no pixel format `rgb`"),
+        (lambda: pixels.size("rgb", 2, 2), "unknown pixel format 'rgb'"),
         (lambda: pixels.size("i420", 3, 2), "even width and height, not 3 x 2"),
-        (lambda: pixels.format_of("video0.argb", 100, 64, 48), "100 bytes, which is no picture of 64 x 48"),
+        (lambda: pixels.format_of("video0.argb", 100, 64, 48), "100 bytes, not a picture of 64 x 48"),
         (lambda: pixels.view(bytes(11), "bgr", 2, 2), "11 bytes are too few for bgr of 2 x 2 pixels, 12 bytes"),
     ],
 )

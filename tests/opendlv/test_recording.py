@@ -109,7 +109,7 @@ def test_any_bytes_are_read_or_skipped_once(folder: Path, data: bytes) -> None:
             read_bytes = int(recording.index["size"].sum())
             assert recording.damage == damage
     except RecordingError as error:
-        assert not found and str(error).endswith(f"there is no message in its {len(data)} bytes")
+        assert not found and str(error).endswith(f"its {len(data)} bytes hold no message")
         read_bytes = 0
     assert read_bytes + damage.size == len(data)
 
@@ -173,7 +173,7 @@ def test_a_file_that_shrinks_is_told(tmp_path: Path) -> None:
 
 
 def test_files_that_are_no_recordings(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"some\.rec is no recording: there is no message in its 5 bytes"):
+    with pytest.raises(RecordingError, match=r"some\.rec is not a recording: its 5 bytes hold no message"):
         Recording(write(tmp_path, b"hello"))
     with Recording(write(tmp_path, b"")) as recording:
         assert len(recording) == 0 and list(recording.envelopes()) == []

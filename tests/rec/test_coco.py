@@ -81,7 +81,7 @@ def test_the_boxes_of_a_truth_for_every_frame(drive: Path, tmp_path: Path) -> No
         (text([Mark("yellow", 0, 4, 8, 6)], "", 7, 7), (), "box 1 (yellow 0 4 8 6): lies outside"),
         (text([], "", 7, 7).replace("7,", "0,"), (), "images[0].width: expected a whole number of pixels above 0"),
         ('{"images": []}', (), "has 0 images, expected one picture"),
-        (text([], "", 7, 7), ("--labels", "3"), "--truth does not go with --labels"),
+        (text([], "", 7, 7), ("--labels", "3"), "--truth and --labels exclude each other"),
         (text([], "", 7, 7), (), "truth.json: has no box"),
     ],
 )
@@ -95,20 +95,20 @@ def test_a_truth_that_is_none(drive: Path, tmp_path: Path, content: str, words: 
 def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_path: Path) -> None:
     path = record([*video(12)[2:], *cone(BEGIN + 700_000, 0, "yellow", 0.25)])
     answer = dodo_rec("export", path, "--coco", "-o", tmp_path / "set")
-    assert (answer.code, answer.stderr) == (0, "dodo rec: 3 of 10 packets gave no frame\n")
+    assert (answer.code, answer.stderr) == (0, "dodo rec: 3 of 10 packets cannot be decoded\n")
 
 
 @pytest.mark.parametrize(
     ("envelopes", "words", "text"),
     [
         (cone(BEGIN, 0, "", 0.0), [], "the selection of {path} holds no camera frames (opendlv.proxy.ImageReading)"),
-        (video(3), [], "{path} holds no detections with a box; --all exports frames without them"),
-        (video(3), ["--camera", "2"], "{path} holds no frames of camera 2; there is 0"),
+        (video(3), [], "{path} has no detections with a box; --all exports frames without them"),
+        (video(3), ["--camera", "2"], "{path} holds no frames of camera 2, expected one of 0"),
         ([*video(2), *video(2, 5, 1)], ["--all"], "{path} holds frames of the cameras 0, 1; choose one with --camera"),
         (
             video(3),
             ["--message", "1055"],
-            "--message does not go with --coco; choose senders with --camera and --labels",
+            "--message does not apply to --coco; choose senders with --camera and --labels",
         ),
         (
             [*video(3), *cone(5, 0, "", 0.0)],
@@ -129,6 +129,6 @@ def test_what_cannot_be_exported(
 def test_what_is_there_is_kept(drive: Path, tmp_path: Path) -> None:
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / "annotations.json").write_text("{}")
-    assert "annotations.json is there already" in dodo_rec("export", drive, "--coco", "-o", tmp_path / "set").stderr
+    assert "annotations.json' exists already" in dodo_rec("export", drive, "--coco", "-o", tmp_path / "set").stderr
     assert (tmp_path / "set" / "annotations.json").read_text() == "{}"
     assert dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--force").code == 0

@@ -96,8 +96,8 @@ def test_what_is_left_out_is_told(tmp_path: Path, record: Callable[..., Path]) -
     code, stdout, stderr = dodo_rec("export", path, "--csv", "-o", tmp_path / "out")
     assert (code, stdout) == (0, f"{tmp_path / 'out'}: 1 tables with 1 rows\n")
     assert stderr == (
-        "dodo rec: 1 payloads of opendlv.proxy.DistanceReading cannot be decoded and have no row\n"
-        "dodo rec: left out, as nothing is known of them: messages 1144\n"
+        "dodo rec: skipped 1 payload of opendlv.proxy.DistanceReading that cannot be decoded\n"
+        "dodo rec: skipped unknown messages: 1144\n"
     )
     assert dodo_rec("export", record([good._replace(data_type=1144)]), "--csv").code == 2
 
@@ -109,8 +109,8 @@ def test_the_default_folder_and_what_is_there(
     record([message("opendlv.proxy.DistanceReading", BEGIN)])
     assert dodo_rec("export", "drive.rec", "--csv").code == 0
     again = dodo_rec("export", "drive.rec", "--csv")
-    text = "drive/opendlv.proxy.DistanceReading-0.csv is there already; --force replaces it"
+    text = "'drive/opendlv.proxy.DistanceReading-0.csv' exists already; --force replaces it"
     assert (again.code, again.stderr) == (2, f"dodo rec: {text}\n")
     assert dodo_rec("export", "drive.rec", "--csv", "--force").code == 0
-    assert "is no folder" in dodo_rec("export", "drive.rec", "--csv", "-o", "drive.rec").stderr
+    assert "is not a folder" in dodo_rec("export", "drive.rec", "--csv", "-o", "drive.rec").stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["drive", "drive.rec"]

@@ -31,7 +31,7 @@ def test_times_of_another_day_make_no_duration(record: Callable[..., Path]) -> N
     head, begin, apart = dodo_rec("info", path).stdout.splitlines()[:3]
     assert head.startswith(f"{path}: 5 messages in 0.5 s, ")
     assert begin == "begins 2023-11-14 22:13:20 UTC"
-    assert apart == "1 message is of another day than these, and not counted in them"
+    assert apart == "1 message is more than a day away from these and not counted"
     found = json.loads(dodo_rec("info", "--json", path).stdout)
     assert (found["duration"], found["apart"], found["unordered"]) == (0.5, 1, 0)
     path = record([message(status, BEGIN - years, 1), *envelopes, *[message(status, BEGIN + years, 1)] * 2])
@@ -75,7 +75,7 @@ def test_a_codec_that_is_not_known_is_told_once(record: Callable[..., Path]) -> 
     answer = dodo_rec("info", path)
     assert "3 packets, 0 decoded" in answer.stdout
     assert answer.stderr == (
-        "dodo rec: frames of format `AV99` cannot be decoded; known are h264, H264, VP80, VP90, mjpg, MJPG\n"
+        "dodo rec: frames of format 'AV99' cannot be decoded, expected one of h264, H264, VP80, VP90, mjpg, MJPG\n"
     )
 
 
@@ -124,7 +124,7 @@ def test_what_cannot_be_looked_into(tmp_path: Path, record: Callable[..., Path])
     for words, text in (
         ([tmp_path / "nowhere.rec"], "nowhere.rec: No such file or directory"),
         ([tmp_path], f"{tmp_path}: Is a directory"),
-        ([tmp_path / "text.rec"], "text.rec is no recording: there is no message in its 5 bytes"),
+        ([tmp_path / "text.rec"], "text.rec is not a recording: its 5 bytes hold no message"),
         ([path, "--messages", "0.8"], "0.8: cannot be read: No such file or directory"),
     ):
         code, stdout, stderr = dodo_rec("info", *words)

@@ -66,7 +66,7 @@ def test_a_deployment_that_cannot_be_used_is_told_and_left_out(
     (tmp_path / "cone.odvd").write_text(odvd)
     found, stderr = names(rec, "--messages=../../gate.odvd")
     assert found == [None, "team.Gate"]
-    assert stderr.startswith(f"dodo rec: {tmp_path}/{said}") and stderr.endswith("messages are left out\n")
+    assert stderr.startswith(f"dodo rec: {tmp_path}/{said}") and stderr.endswith("messages are skipped\n")
     assert len(stderr.splitlines()) == 1
 
 
@@ -74,7 +74,7 @@ def test_a_file_that_disagrees_with_the_repository(rec: Path, tmp_path: Path) ->
     (tmp_path / "other.odvd").write_text(CONE.replace("uint32 colour", "float size"))
     found, stderr = names(rec, "--messages=../../other.odvd")
     assert found == ["team.Cone", None]
-    assert stderr.startswith("dodo rec: ") and stderr.endswith(f"; the messages of {tmp_path}/dodo.yml are left out\n")
+    assert stderr.startswith("dodo rec: ") and stderr.endswith(f"; the messages of {tmp_path}/dodo.yml are skipped\n")
 
 
 def test_a_broken_file_of_the_command_line_is_an_error(rec: Path, tmp_path: Path) -> None:

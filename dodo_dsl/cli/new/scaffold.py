@@ -1,4 +1,4 @@
-"""What ``dodo new`` writes: starting points for a test and for a repository, as files that are not there yet."""
+"""What ``dodo new`` writes: the files of a new test and of a new repository."""
 
 import functools
 import os
@@ -29,7 +29,7 @@ _SHIPPED = {
     "sil-perception": "sil-perception",
     "hil-perception": "hil-camera",
 }
-"""Shipped tests to copy, where a test needs a recording or true boxes that cannot be made up."""
+"""Shipped tests to copy for kinds that need a recording or true boxes."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,12 @@ def _filled(template: str, **values: str) -> bytes:
 
 
 def check_name(name: str, taken: list[str]) -> None:
-    """Raises UsageError for a name that no test may have, or that one has already."""
+    """Raises UsageError for an invalid name, or one that is taken."""
     if not _NAME.fullmatch(name) or len(name) > _LONGEST:
         expected = "lower-case letters and digits in words joined by single hyphens, at most 60 characters"
-        raise UsageError(f"'{name}' cannot name a test, expected {expected}")
+        raise UsageError(f"'{name}' is not a valid test name, expected {expected}")
     if name in KEYWORDS:
-        raise UsageError(f"'{name}' is a keyword of GitLab's pipelines and cannot name a job")
+        raise UsageError(f"'{name}' is a keyword of GitLab's pipelines, expected a name for a job")
     if name in taken:
         raise UsageError(f"there is a test '{name}' already; names are unique over all registries")
 
@@ -86,14 +86,14 @@ def _template(name: str, level: str, kind: str) -> str:
         return template
     if (level, kind) == ("dil", "closed-loop"):
         reason = "a dil test cannot be closed-loop: what was recorded does not react to the application"
-        raise UsageError(f"{reason}; dodo new {name} --level dil --kind open-loop begins another")
+        raise UsageError(f"{reason}; try: dodo new {name} --level dil --kind open-loop")
     shipped = _SHIPPED.get(f"{level}-{kind}")
     if shipped is None:
-        reason = f"a {level} test begins closed-loop; {kind} ones are sil or dil"
-        raise UsageError(f"{reason}: dodo new {name} --kind {kind} begins one")
+        reason = f"a new {level} test is closed-loop; {kind} tests are sil or dil"
+        raise UsageError(f"{reason}; try: dodo new {name} --kind {kind}")
     needs = "a recording" if level == "dil" else "the true boxes of its pictures"
     raise UsageError(
-        f"a {level} test of kind {kind} needs {needs}; copy one that has: dodo new {name} --extends {shipped}"
+        f"a {level} test of kind {kind} needs {needs}; copy a shipped test: dodo new {name} --extends {shipped}"
     )
 
 
@@ -121,7 +121,7 @@ def spec_files(name: str, folder: Path, root: Path, text: bytes) -> list[New]:
 
 
 def _schema_line(folder: Path, root: Path) -> bytes:
-    """What tells an editor the language, where the repository has its schema."""
+    """The line that tells an editor the schema, if the repository has it."""
     for place in (SCHEMAS, "schemas"):
         schema = root / place / "dodo.schema.json"
         if schema.is_file():
@@ -130,7 +130,7 @@ def _schema_line(folder: Path, root: Path) -> bytes:
 
 
 def deployment_files(root: Path) -> list[New]:
-    """dodo.yml, the application's compose file where there is none, the pipeline with its templates, and schemas."""
+    """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas."""
     application = next((name for name in COMPOSE_FILES if (root / name).is_file()), COMPOSE_FILES[0])
     pipelines = sorted((package_data.templates() / "gitlab").iterdir())
     schemas = [package_data.schemas() / f"{name}.schema.json" for name in ("deployment", "dodo")]

@@ -1,4 +1,4 @@
-"""A copy of a test that ships with DoDo, in a registry of the user's own, where it may be changed and extended."""
+"""A copy of a shipped test in the user's registry, where it can be changed and extended."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ _EDITOR = re.compile(r"^# yaml-language-server:.*\n")
 def copied_files(
     name: str, instances: Sequence[Spec], manifests: Mapping[str, Manifest], registry: Path, root: Path
 ) -> list[New]:
-    """The test of ``instances`` by another name in ``registry``, with what it refers to and the registry has not."""
+    """The test of ``instances`` as ``name`` in ``registry``, with the files that it needs and the registry lacks."""
     return [
         *spec_files(name, registry / name, root, _text(name, instances[0])),
         *_files(instances, manifests, registry),
@@ -31,7 +31,7 @@ def copied_files(
 
 
 def _text(name: str, base: Spec) -> bytes:
-    """The spec as it was written; one that extends others is written out, for it leaves them."""
+    """The spec's own text; one that extends others is resolved first, as the copy leaves them behind."""
     node, _ = read(base.path)
     text = base.path.read_text(encoding="utf-8")
     if isinstance(node, Written) and extends.KEY not in node.entries and len(_NAME.findall(text)) == 1:
@@ -47,7 +47,7 @@ def _text(name: str, base: Spec) -> bytes:
 
 
 def _files(instances: Sequence[Spec], manifests: Mapping[str, Manifest], registry: Path) -> Iterator[New]:
-    """The files that the test names, each once; a map or recording that is there already stays as it is."""
+    """The files that the test names, each once; existing maps and recordings are kept."""
     for path in dict.fromkeys(path for spec in instances for path in _paths(spec, manifests)):
         root = instances[0].location.root.resolve()
         if (registry / path.relative_to(root)).exists():

@@ -1,4 +1,4 @@
-"""dodo rec: look into recordings, cut them, export them."""
+"""dodo rec: inspect, cut and export recordings."""
 
 import argparse
 import math
@@ -10,10 +10,10 @@ from dodo_dsl.cli.exits import Exit
 
 EXAMPLES = """examples:
   dodo rec info drive.rec                                         messages, rates, gaps, frames, damage
-  dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5         a stretch of time, in seconds since the begin
+  dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5         a time range, in seconds since the start
   dodo rec cut drive.rec -o front.rec --message opendlv.proxy.DistanceReading/0
-  dodo rec export drive.rec --csv -o tables                       as cluon-rec2csv does
-  dodo rec export drive.rec --coco -o labelled                    frames with their detections, as a data set
+  dodo rec export drive.rec --csv -o tables                       the same as cluon-rec2csv
+  dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
 """
 _CUT = """examples:
   dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5
@@ -33,27 +33,29 @@ _INFO = """examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    info = _action(actions, "info", "messages, rates, gaps, frames and damage of a recording", _INFO)
-    info.add_argument("--json", action="store_true", help="as JSON")
-    info.add_argument("--no-decode", action="store_true", help="count camera frames, but do not decode them")
-    cut = _action(actions, "cut", "a part of a recording as a recording of its own, byte for byte", _CUT)
-    cut.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="the new recording")
-    export = _action(actions, "export", "a recording as tables or as a labelled data set", _EXPORT)
+    info = _action(actions, "info", "show messages, rates, gaps, frames and damage of a recording", _INFO)
+    info.add_argument("--json", action="store_true", help="output as JSON")
+    info.add_argument("--no-decode", action="store_true", help="count camera frames without decoding them")
+    cut = _action(actions, "cut", "copy a part of a recording into a new one, byte for byte", _CUT)
+    cut.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="new recording")
+    export = _action(actions, "export", "export a recording as CSV tables or as a labelled data set", _EXPORT)
     what = export.add_mutually_exclusive_group(required=True)
-    what.add_argument("--csv", action="store_true", help="a file for each message and sender stamp")
-    what.add_argument("--coco", action="store_true", help="pictures with the boxes of the detections in the recording")
-    export.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: the recording's name without .rec")
-    export.add_argument("--pictures", choices=("png", "jpg"), default="png", help="file type of --coco (default: png)")
+    what.add_argument("--csv", action="store_true", help="write one table per message and sender stamp")
+    what.add_argument("--coco", action="store_true", help="write pictures with the boxes of the detections")
     export.add_argument(
-        "--camera", metavar="N", type=int, help="sender stamp of the frames of --coco, if there are more"
+        "-o", "--output", metavar="DIR", type=Path, help="output folder (default: the recording's name without .rec)"
+    )
+    export.add_argument("--pictures", choices=("png", "jpg"), default="png", help="file type for --coco (default: png)")
+    export.add_argument(
+        "--camera", metavar="N", type=int, help="sender stamp of the camera for --coco, if there are several"
     )
     export.add_argument(
-        "--labels", metavar="N", type=int, help="sender stamp of the detections of --coco (default: all)"
+        "--labels", metavar="N", type=int, help="sender stamp of the detections for --coco (default: all)"
     )
     export.add_argument(
-        "--truth", metavar="FILE.json", type=Path, help="take the boxes of --coco from a truth file, for every frame"
+        "--truth", metavar="FILE.json", type=Path, help="truth file with the boxes for --coco, the same for every frame"
     )
-    export.add_argument("--all", action="store_true", help="with --coco: also frames without a detection")
+    export.add_argument("--all", action="store_true", help="with --coco: also export frames without a detection")
     for action in (cut, export):
         _selection(action)
 
@@ -70,22 +72,24 @@ def _action(
         metavar="SET",
         action="append",
         default=[],
-        help="message set 0.9 or 1.0 (default: what fits the content), or an .odvd file beside dodo.yml's; repeatable",
+        help="message set 0.9 or 1.0 (default: detected from the content), or an additional .odvd file; repeatable",
     )
     return action
 
 
 def _selection(action: argparse.ArgumentParser) -> None:
-    action.add_argument("--start", metavar="S", type=_seconds, help="first time, seconds since the begin or since 1970")
-    action.add_argument("--end", metavar="S", type=_seconds, help="time to end before")
+    action.add_argument(
+        "--start", metavar="S", type=_seconds, help="start time, in seconds since the recording's start or since 1970"
+    )
+    action.add_argument("--end", metavar="S", type=_seconds, help="end time (exclusive), as --start")
     action.add_argument(
         "--message",
         metavar="M",
         action="append",
         default=[],
-        help="name or id, with /senderStamp for one sender; repeatable (default: all)",
+        help="message by name or id, with /senderStamp for one sender; repeatable (default: all)",
     )
-    action.add_argument("--force", action="store_true", help="replace what is there")
+    action.add_argument("--force", action="store_true", help="replace existing files")
 
 
 def _seconds(text: str) -> float:
@@ -94,7 +98,7 @@ def _seconds(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or value < 0:
-        raise argparse.ArgumentTypeError(f"expected seconds, for example 2.5, not `{text}`")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds, expected for example 2.5")
     return value
 
 

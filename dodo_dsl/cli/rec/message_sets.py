@@ -1,4 +1,4 @@
-"""The messages that `dodo rec` knows: a set by version, those of files, and those of the repository it is called in."""
+"""The messages that ``dodo rec`` knows: a set by version, those of files, and those of the repository around it."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,10 +14,10 @@ Tell = Callable[[str], None]
 
 
 def messages_for(recording: Recording, wanted: Sequence[str], tell: Tell) -> tuple[str, MessageSet]:
-    """The version of the set and its messages; `wanted` are versions and ODVD files of the command line.
+    """The version of the set and its messages; ``wanted`` are versions and ODVD files of the command line.
 
-    The ODVD files of the nearest `dodo.yml` are added. Where they cannot be used, `tell` gets a sentence and the rest
-    counts without them. Raises OdvdError for files of the command line.
+    The ODVD files of the nearest ``dodo.yml`` are added. If they cannot be used, ``tell`` gets a sentence, and the rest
+    is used without them. Raises OdvdError for files of the command line.
     """
     chosen = [word for word in wanted if word in (versions.OLD, versions.NEW)]
     files = [Path(word) for word in wanted if word not in chosen]
@@ -29,16 +29,16 @@ def messages_for(recording: Recording, wanted: Sequence[str], tell: Tell) -> tup
     try:
         return version, versions.load(version, *_own(deployment, tell), *files)
     except OdvdError as error:
-        tell(f"{error}; the messages of {deployment} are left out")
+        tell(f"{error}; the messages of {deployment} are skipped")
         return version, messages
 
 
 def _own(path: Path, tell: Tell) -> tuple[Path, ...]:
-    """The ODVD files that a `dodo.yml` names, as `dodo run` has them; none where that would not take the file."""
+    """The ODVD files that a ``dodo.yml`` names, as ``dodo run`` takes them; none if it would refuse the file."""
     deployment, problems = load_deployment(path)
     errors = [problem for problem in problems if problem.severity == "error"]
     if errors:
-        tell(f"{_place(errors[0])}: {errors[0].message}; its messages are left out")
+        tell(f"{_place(errors[0])}: {errors[0].message}; its messages are skipped")
         return ()
     return deployment.messages
 

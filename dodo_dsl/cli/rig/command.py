@@ -1,4 +1,4 @@
-"""dodo rig: a rig by hand: where it is, home, to a place, calibrated, out of quarantine, and what its camera sees."""
+"""dodo rig: operate a rig manually: its status, motion, calibration, quarantine and camera."""
 
 import argparse
 import json
@@ -20,23 +20,23 @@ from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.values import ValueProblem, convert
 
 EXAMPLES = """examples:
-  dodo rig status                       every rig of dodo.yml: whether it is fit, and where it is
-  dodo rig calibrate kiwi-dynamic       it finds its home; nothing may stand in its way
+  dodo rig status                       every rig of dodo.yml: quarantine and position
+  dodo rig calibrate kiwi-dynamic       find its home; keep its path clear
   dodo rig goto kiwi-dynamic 0.2 -0.1 90
-  dodo rig home kiwi-dynamic            to the place at its switches
-  dodo rig clear kiwi-dynamic           its fault is mended: tests may run on it again
-  dodo rig goto emulated 0 0 0          on any machine with the firmware's emulator
+  dodo rig home kiwi-dynamic            move to its switches
+  dodo rig clear kiwi-dynamic           end its quarantine after a repair
+  dodo rig goto emulated 0 0 0          on any machine with the firmware emulator
   dodo rig truth kiwi-static -o truths/desk.json --box yellow 199 329 36 55
-                                        a snapshot and the truth about it, for object-detection
+                                        a snapshot and its truth, for object-detection
 
-exit codes: 0 done, 1 a rig is in quarantine, 2 usage or a place out of the limits, 3 the rig cannot
+exit codes: 0 done, 1 a rig is in quarantine, 2 wrong usage or a position outside the limits, 3 the rig failed
 """
 ACTIONS = {
-    "status": "whether a rig is fit, and where it is",
-    "home": "to the place at its switches",
-    "goto": "to a place within its limits",
-    "calibrate": "it finds its home",
-    "clear": "its fault is mended, tests may run on it again",
+    "status": "show whether a rig is in quarantine, and its position",
+    "home": "move to its switches",
+    "goto": "move to a position within its limits",
+    "calibrate": "find its home",
+    "clear": "end its quarantine after a repair",
 }
 
 
@@ -45,13 +45,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     for name, text in ACTIONS.items():
         action = actions.add_parser(name, help=text, description=text)
         count = "?" if name == "status" else None
-        action.add_argument("rig", nargs=count, metavar="RIG", help="a name of dodo.yml, or emulated")
+        action.add_argument("rig", nargs=count, metavar="RIG", help="name of a rig in dodo.yml, or emulated")
         for axis, unit in {"x": "m", "y": "m", "yaw": "degrees"}.items() if name == "goto" else ():
-            action.add_argument(axis, type=float, metavar=axis.upper(), help=f"{unit}, 0 the middle")
-        wait = "most time that a busy rig is waited for"
+            action.add_argument(axis, type=float, metavar=axis.upper(), help=f"in {unit}, 0 is the middle")
+        wait = "maximum wait for a busy rig, in s (default: 60)"
         action.add_argument("--wait", type=float, default=60.0, metavar="S", help=wait)
-        action.add_argument("--json", action="store_true", help="as JSON")
-    text = "a snapshot of the camera, and the truth about it for object-detection"
+        action.add_argument("--json", action="store_true", help="output as JSON")
+    text = "take a snapshot of the camera and write its truth for object-detection"
     formatter = argparse.RawDescriptionHelpFormatter
     epilog = truth_command.EXAMPLES
     truth_command.add(
@@ -90,7 +90,7 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Rig]:
 
 
 def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
-    """Does the action on one rig; a fault of it is part of a status."""
+    """The result of the action on one rig; a status includes its fault."""
     result: dict[str, Any] = {"rig": rig.name, "kind": rig.kind, "quarantine": ""}
     if options.action == "clear":
         quarantine.clear(rig.name)
@@ -99,7 +99,7 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
         result["quarantine"] = quarantine.quarantined(rig.name)
     if rig.entry("serial") is None:
         if options.action != "status":
-            raise UsageError(f"rig '{rig.name}' has no serial port: nothing of it moves")
+            raise UsageError(f"rig '{rig.name}' has no serial port, so it cannot move")
         return result
     try:
         return {**result, **_moved(options, rig, say)}
@@ -116,7 +116,7 @@ def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) ->
 
 
 def _flags(rig: Rig) -> list[str]:
-    """The rig's port and ranges as the gantry's flags; raises UsageError for a range that is none."""
+    """The rig's port and ranges as the gantry's flags; raises UsageError for an invalid range."""
     flags = []
     for key, flag, unit in (("serial", "serial", ""), *((f"limits.{a}", f"range-{a}", "m") for a in "xy"), YAW):
         entry = rig.entry(key)
@@ -148,5 +148,5 @@ def _sentence(result: dict[str, Any]) -> str:
             at = f", x = {result['x']:.3f} m, y = {result['y']:.3f} m, " + (f"yaw = {result['yaw']:.1f} degrees")
         parts.append(f"{result['says']}{at}")
     if result["quarantine"]:
-        parts.append(f"in quarantine: {result['quarantine']}; `dodo rig clear {result['rig']}` ends that")
+        parts.append(f"in quarantine: {result['quarantine']}; 'dodo rig clear {result['rig']}' ends it")
     return f"{name} {'; '.join(parts) or 'not in quarantine'}"

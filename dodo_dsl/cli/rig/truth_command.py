@@ -1,4 +1,4 @@
-"""dodo rig truth: a snapshot of a rig's camera, and the truth about it for object-detection."""
+"""dodo rig truth: a snapshot of a rig's camera, and its truth for object-detection."""
 
 import argparse
 import tempfile
@@ -23,10 +23,10 @@ EXAMPLES = """examples:
   dodo rig truth emulated --test hil-camera --classes cone_yellow=yellow,cone_blue=blue -o truths/board.json
                                         the boxes of the virtual scene that the test's camera sees
   dodo rig truth kiwi-static -o truths/desk.json
-                                        a snapshot alone, truths/desk.png, to look where things are
+                                        only a snapshot, truths/desk.png, to see where objects are
   dodo rig truth kiwi-static -o truths/desk.json --picture truths/desk.png \\
       --box yellow 199 329 36 55 --box blue 440 347 43 67
-                                        the truth about that snapshot, with boxes marked by hand
+                                        the truth of that snapshot, with boxes marked manually
   dodo rig truth kiwi-static -o truths/desk.json --boxes marked.json --force
                                         a new snapshot, with the boxes of a COCO file
 
@@ -35,17 +35,19 @@ It writes FILE.json (COCO, in pixels), FILE.png (the snapshot) and FILE-boxes.pn
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("rig", metavar="RIG", help="a name of dodo.yml, or emulated")
-    parser.add_argument("-o", "--output", metavar="FILE.json", type=Path, required=True, help="the truth file")
-    parser.add_argument("--test", metavar="TEST", help="the test whose camera looks; the emulated rig needs one")
+    parser.add_argument("rig", metavar="RIG", help="name of a rig in dodo.yml, or emulated")
+    parser.add_argument("-o", "--output", metavar="FILE.json", type=Path, required=True, help="truth file to write")
+    parser.add_argument("--test", metavar="TEST", help="test whose camera is used; required for the emulated rig")
     parser.add_argument("--box", nargs=5, action="append", default=[], metavar=("CLASS", "X", "Y", "WIDTH", "HEIGHT"),
-                        help="a box in pixels from the upper left corner; may be repeated")  # fmt: skip
-    parser.add_argument("--boxes", metavar="FILE.json", type=Path, help="take the boxes of a COCO file of one picture")
-    parser.add_argument("--classes", metavar="A,B", default="", help="the classes that there are, MODEL=CLASS of a "
-                        "virtual scene (default: those that the test judges, else any)")  # fmt: skip
-    parser.add_argument("--picture", metavar="FILE", type=Path, help="mark boxes in this picture, not in a new one")
-    parser.add_argument("--force", action="store_true", help="replace what is there")
-    parser.add_argument("--wait", type=float, default=60.0, metavar="S", help="most time that a busy rig is waited for")
+                        help="a box in pixels from the upper left corner; repeatable")  # fmt: skip
+    parser.add_argument("--boxes", metavar="FILE.json", type=Path, help="COCO file with the boxes of one picture")
+    parser.add_argument("--classes", metavar="A,B", default="", help="known classes, as MODEL=CLASS for a virtual "
+                        "scene (default: those that the test judges, else any)")  # fmt: skip
+    parser.add_argument("--picture", metavar="FILE", type=Path, help="picture to use instead of a new snapshot")
+    parser.add_argument("--force", action="store_true", help="replace existing files")
+    parser.add_argument(
+        "--wait", type=float, default=60.0, metavar="S", help="maximum wait for a busy rig, in s (default: 60)"
+    )
 
 
 def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Callable[[str], None]) -> str:
@@ -60,30 +62,30 @@ def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Cal
     has_boxes = is_scene or options.box or options.boxes
     refuse_existing(files.wanted(bool(has_boxes), is_new), options.force)
     marks = [truth.mark(words[0], words[1:], f"--box {' '.join(words)}") for words in options.box]
-    png, said = _looked(options, rig, manifests, spec, say)
+    png, answer = _looked(options, rig, manifests, spec, say)
     picture = decoded(png, str(options.picture or rig.name))
     height, width = picture.shape[:2]
     marks += truth.read(options.boxes, width, height) if options.boxes else []
-    marks += [_of_scene(box) for box in said.get("boxes", ())] if is_scene else []
+    marks += [_of_scene(box) for box in answer.get("boxes", ())] if is_scene else []
     classes = [word.partition("=")[2] or word for word in options.classes.split(",") if word]
     classes = classes or (camera.judged_classes(rig, manifests, spec) if spec else [])
     if is_scene and classes and not options.classes:
         _require_names(marks, classes)
     truth.check(marks, width, height, classes)
     if has_boxes and not marks:
-        raise TruthError("there is no box: a truth has at least one")
+        raise TruthError("no boxes, expected at least one")
     files.write(picture, marks, is_new)
     return _sentence(files, marks, width, height)
 
 
 def _test(word: str | None, deployment: Deployment) -> tuple[dict[str, Manifest], Spec | None]:
-    """The services that there are, and the one test that a word means. Its other faults do not count here."""
+    """The services, and the one test that a word names; its other problems do not matter here."""
     if word is None:
         return load_manifests(deployment.services)[0], None
     checked = selection.select([word], (), [])
     if len(checked.specs) != 1:
         names = ", ".join(spec.title for spec in checked.specs[:3])
-        raise TruthError(f"--test {word} means {len(checked.specs)} tests, expected one: {names} ...")
+        raise TruthError(f"--test {word} matches {len(checked.specs)} tests, expected one: {names} ...")
     return dict(checked.manifests), checked.specs[0]
 
 
@@ -94,7 +96,7 @@ def _looked(
     spec: Spec | None,
     say: Callable[[str], None],
 ) -> tuple[bytes, dict[str, Any]]:
-    """The bytes of the picture, and what the camera's program said of it."""
+    """The bytes of the picture, and the answer of the camera's program."""
     if options.picture:
         if rig.is_emulated and not (options.box or options.boxes):
             raise TruthError("--picture has no virtual scene: mark its boxes with --box or --boxes")
@@ -104,14 +106,14 @@ def _looked(
         path = Path(folder) / "snapshot.png"
         words = [*snapshot.words, f"--output={path}"]
         words += [f"--truth-classes={options.classes}"] if snapshot.is_rendered and "=" in options.classes else []
-        said = query_exclusively(rig.cid, "'dodo rig truth'", (snapshot.program, words), say, options.wait)
-        if said.get("reason"):
-            say(f"warning: {said['reason']}")
-        return path.read_bytes(), said
+        answer = query_exclusively(rig.cid, "'dodo rig truth'", (snapshot.program, words), say, options.wait)
+        if answer.get("reason"):
+            say(f"warning: {answer['reason']}")
+        return path.read_bytes(), answer
 
 
 def _require_names(marks: Sequence[Mark], classes: Sequence[str]) -> None:
-    """The models of a scene bear their own names until --classes says which class each is."""
+    """The models of a scene have their own names unless --classes maps them to classes."""
     strange = next((each.label for each in marks if each.label not in classes), "")
     if strange:
         expected = f"the test judges {', '.join(classes)}"
@@ -127,6 +129,6 @@ def _sentence(files: TruthFiles, marks: Sequence[Mark], width: int, height: int)
         how = f"mark boxes with --picture {files.picture} --box CLASS X Y WIDTH HEIGHT"
         return f"{files.picture}: a snapshot of {width} x {height} pixels; {how}"
     counts = Counter(mark.label for mark in marks)
-    told = ", ".join(f"{count} {label}" for label, count in sorted(counts.items()))
+    classes = ", ".join(f"{count} {label}" for label, count in sorted(counts.items()))
     boxes = f"{len(marks)} box{'es' * (len(marks) > 1)}"
-    return f"{files.truth}: {boxes} ({told}) in {width} x {height} pixels; look at {files.marked}"
+    return f"{files.truth}: {boxes} ({classes}) in {width} x {height} pixels; look at {files.marked}"

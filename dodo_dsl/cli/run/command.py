@@ -14,7 +14,7 @@ from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast
 from dodo_dsl.cli.run.jobs import prepare
-from dodo_dsl.cli.run.uninterrupted import Robust, more_descriptors, stop_like_interrupt, undisturbed
+from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
 from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
@@ -34,10 +34,10 @@ EXAMPLES = """examples:
   dodo run sil-closed-straight                 one test
   dodo run 'sil-*' -j 4                        by pattern, four at a time
   dodo run --application ../app/docker-compose.yml --level sil
-  dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, up to the first that does not
+  dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
   dodo run --compiled generated/sil-closed-straight --report dodo-report
 
-exit codes: 0 all passed, 1 some failed, 2 usage or spec, 3 some ended in error, 130 interrupted
+exit codes: 0 all passed, 1 some failed, 2 wrong usage or spec, 3 some ended in error, 130 interrupted
 """
 
 
@@ -46,29 +46,35 @@ _MOST_SECONDS = 864_000.0
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
-    parser.add_argument("--level", action="append", choices=LEVELS, default=[], help="may be repeated")
-    parser.add_argument("--backend", choices=("process", "docker"), help="default: process when the application can")
     parser.add_argument(
-        "-j", "--jobs", type=_positive, metavar="N", help="tests at once (default: as many as the cores carry)"
+        "--level", action="append", choices=LEVELS, default=[], help="only tests of this level; repeatable"
     )
-    parser.add_argument("--clock", choices=("realtime", "lockstep"), help="instead of the specs'")
-    parser.add_argument("--wall-timeout", type=_seconds, metavar="S", help="most wall time of a test in lockstep")
-    parser.add_argument("--isolation", choices=("network", "host"), help="instead of the specs'")
-    parser.add_argument("--report", type=Path, default=REPORT, metavar="DIR", help="default: dodo-report")
-    parser.add_argument("--seed", type=_seed, metavar="N", help="instead of the specs'")
+    parser.add_argument(
+        "--backend", choices=("process", "docker"), help="default: process, if the application allows it"
+    )
+    parser.add_argument(
+        "-j", "--jobs", type=_positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
+    )
+    parser.add_argument("--clock", choices=("realtime", "lockstep"), help="replaces the specs' clock")
+    parser.add_argument("--wall-timeout", type=_seconds, metavar="S", help="maximum wall time of a test in lockstep")
+    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the specs' isolation")
+    parser.add_argument(
+        "--report", type=Path, default=REPORT, metavar="DIR", help="folder of the report (default: dodo-report)"
+    )
+    parser.add_argument("--seed", type=_seed, metavar="N", help="replaces the specs' seed")
     parser.add_argument("--repeat", type=_positive, default=1, metavar="N", help="run every test N times")
-    parser.add_argument("--fail-fast", action="store_true", help="begin no further test when one did not pass")
+    parser.add_argument("--fail-fast", action="store_true", help="start no further test after one that did not pass")
     parser.add_argument("--retry-errors", type=_positive, nargs="?", const=1, default=0, metavar="N",
-                        help="run a test that ended in error again, up to N times (1 when not written)")  # fmt: skip
-    parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="a test that dodo compile wrote")
-    parser.add_argument("--keep", action="store_true", help="leave everything up and say how to look inside")
+                        help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
+    parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="folder of a compiled test")
+    parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
     selection.add_application(parser)
 
 
 def _seed(text: str) -> int:
     number = int(text) if text.isdecimal() and len(text) < 12 else -1
     if not 0 <= number < 1 << 32:
-        raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 to 4294967295")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 to 4294967295")
     return number
 
 
@@ -78,14 +84,14 @@ def _seconds(text: str) -> float:
     except ValueError:
         seconds = 0.0
     if not 0.0 < seconds <= _MOST_SECONDS:
-        raise argparse.ArgumentTypeError(f"'{text}' is no time in seconds, above 0 and at most {_MOST_SECONDS:g}")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds above 0 and at most {_MOST_SECONDS:g}")
     return seconds
 
 
 def _positive(text: str) -> int:
     number = int(text) if text.isdecimal() else 0
     if number < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is no whole number of 1 or more")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return number
 
 
@@ -93,7 +99,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop_like_interrupt)
     more_descriptors()
-    stdout = cast(TextIO, Robust(stdout))
+    stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
     with work_folder() as folder:
         jobs, deployment = prepare(options, folder.path, stdout)
@@ -109,7 +115,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 def _refuse_to_keep(plans: Sequence[Plan]) -> None:
     for plan in plans:
         if is_real(plan):
-            raise UsageError(f"{plan.name} runs on rig '{plan.rig}', which --keep would leave driven: run it without")
+            raise UsageError(
+                f"{plan.name} runs on rig '{plan.rig}', which --keep would leave in motion: run it without --keep"
+            )
 
 
 def _runner(
@@ -134,13 +142,15 @@ def _backends(
         return Containers(subnets(deployment.subnets))
     without = sorted({s.name for p in plans for s in p.application.services if not s.process})
     if without:
-        way = "write for example 'x-dodo-process: [python, main.py]' at it, or run with --backend docker"
-        raise UsageError(f"application service '{without[0]}' has no 'x-dodo-process', which processes need; {way}")
+        advice = "add for example 'x-dodo-process: [python, main.py]', or run with --backend docker"
+        raise UsageError(
+            f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
+        )
     return Processes(deployment.cids, options.isolation, (descriptor,))
 
 
 def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> tuple[list[Outcome], bool]:
-    """The outcomes, and whether the report holds all of them; without it they are told all the same."""
+    """The outcomes, and whether the report holds all of them; they are printed in any case."""
     gone = forget(report.resolve(), [job.plan.slug for job in jobs])
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
@@ -153,13 +163,13 @@ def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> t
         problems, unwritten = [], ""
         try:
             problems = write_report(report, outcomes, drawables, times)
-        except Exception as error:  # noqa: BLE001  (the outcomes are told all the same)
+        except Exception as error:  # noqa: BLE001  (the outcomes are printed in any case)
             why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
             unwritten = f"'{report}' cannot take the whole report: {why}"
         history.save()
     stdout.writelines(f"{printable(problem)}\n" for problem in problems)
     summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
-    instead = f", in place of an earlier one with {progress.count(gone)} that did not run now" if gone else ""
+    instead = f"; it replaces an earlier one with {progress.count(gone, 'other test')}" if gone else ""
     stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}{instead}\n")
     return outcomes, not unwritten
 

@@ -16,7 +16,7 @@ def at_once(order: Schedule, jobs: Sequence[Job]) -> str:
 
 
 def forecast(order: Schedule, jobs: Sequence[Job], backend: str) -> str:
-    """How long the run will take, in words; a test that never ran here may take its whole time."""
+    """How long the run will take, in words; a test without history may take its whole timeout."""
     history = History()
     known = all(history.seconds(j.plan.spec, j.test, backend, j.plan.clock) is not None for j in jobs)
     seconds = order.forecast(order.ordered(jobs))
@@ -24,7 +24,7 @@ def forecast(order: Schedule, jobs: Sequence[Job], backend: str) -> str:
 
 
 def expectation(backend: str) -> Callable[[Job], float]:
-    """How long a job takes as the history has it; an unknown one may take its whole time."""
+    """How long a job takes according to the history; an unknown one may take its whole timeout."""
     history = History()
 
     @functools.cache

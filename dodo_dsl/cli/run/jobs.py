@@ -1,4 +1,4 @@
-"""From a command line of ``dodo run`` to jobs: tests compiled or as they are, and where their reports go."""
+"""From a command line of ``dodo run`` to jobs: compiled tests and the folders of their reports."""
 
 import argparse
 import os
@@ -25,7 +25,7 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     settings = Settings(options.clock, options.isolation, options.seed, options.wall_timeout, options.repeat)
     if options.compiled:
         if options.test or options.level or options.application:
-            raise UsageError("--compiled runs a test as it was compiled: no TEST, --level or --application beside it")
+            raise UsageError("--compiled runs a test as it was compiled: TEST, --level and --application do not apply")
         plans, deployment = [_compiled(options.compiled, settings)], _deployment(stdout)
         folders = {plans[0].slug: options.compiled.resolve()}
     else:
@@ -66,7 +66,7 @@ def _usable(report: Path, slugs: Sequence[str]) -> Path:
         if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
             raise UsageError(f"'{report}' holds tests; name another folder with --report")
     if not os.access(report, os.W_OK):
-        raise UsageError(f"'{report}' cannot take the report: it may not be written")
+        raise UsageError(f"'{report}' cannot take the report: no write permission")
     return report.resolve()
 
 
@@ -80,7 +80,7 @@ def _load_plan(folder: Path, settings: Settings) -> Plan:
 
 
 def _kept_clock(names: Sequence[str]) -> str:
-    """A note about tests on hardware, which run by no other clock than their own."""
+    """A note about tests on hardware, which keep their own clock."""
     if not names:
         return ""
     who = f"{names[0]} runs" if len(names) == 1 else f"{names[0]} and {len(names) - 1} more run"
@@ -93,7 +93,7 @@ def _compile(
     checked = selection.select(options.test, options.level, options.application, settings)
     stdout.write(selection.left_out(checked))
     if not checked.specs:
-        raise UsageError("there is no test to run")
+        raise UsageError("no tests to run")
     if settings.clock:
         stdout.write(_kept_clock([s.title for s in checked.specs if s.clock != settings.clock]))
     if not checked.ok:

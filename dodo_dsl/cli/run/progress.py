@@ -11,7 +11,7 @@ _STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
 
 
 def summary_line(outcome: Outcome, width: int) -> str:
-    """One line on an ended test."""
+    """One line about a finished test."""
     times = ""
     if outcome.setup_s is not None and outcome.execution_s is not None:
         times = f" (set-up {outcome.setup_s:.1f} s, ran {outcome.execution_s:.1f} s)"
@@ -19,7 +19,7 @@ def summary_line(outcome: Outcome, width: int) -> str:
 
 
 class PlainProgress:
-    """A line for each phase, with the seconds since the run began."""
+    """One line per phase, with the seconds since the start of the run."""
 
     def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
         self.stream = stream
@@ -47,7 +47,7 @@ class PlainProgress:
 
 
 class LiveProgress:
-    """A line a test that moves while it runs. What others said is never read as markup, of which rich has its own."""
+    """One moving line per test. Texts of services are never read as rich's markup."""
 
     def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
         from rich.console import Console
@@ -78,8 +78,8 @@ class LiveProgress:
 
     def done(self, outcome: Outcome) -> None:
         style = _STYLES[outcome.outcome]
-        said = f"[{style}]{outcome.outcome}[/]"
-        self._progress.update(self._tasks[outcome.slug], outcome=said, state="", total=1, completed=1)
+        text = f"[{style}]{outcome.outcome}[/]"
+        self._progress.update(self._tasks[outcome.slug], outcome=text, state="", total=1, completed=1)
 
     def rest(self, seconds: float, tests: int) -> None:
         if self._rest is None:
@@ -87,8 +87,8 @@ class LiveProgress:
         self._progress.update(self._rest, state=f"{count(tests)} to go, {about(seconds)}")
 
 
-def count(tests: int) -> str:
-    return f"{tests} test{'s' * (tests != 1)}"
+def count(number: int, what: str = "test") -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def about(seconds: float) -> str:

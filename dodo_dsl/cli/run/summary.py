@@ -1,4 +1,4 @@
-"""What a run says at its end."""
+"""The summary at the end of a run."""
 
 from collections.abc import Mapping, Sequence
 from typing import TextIO
@@ -11,7 +11,7 @@ _KINDS = ("passed", "failed", "error")
 
 
 def write(stream: TextIO, outcomes: Sequence[Outcome], tests: Mapping[str, str], skipped: Sequence[str]) -> None:
-    """A line a test with what explains it, then the counts; ``tests`` are the names that repetitions share, by slug."""
+    """One line per test with its explanation, then the counts; ``tests`` has each slug's name without repetition."""
     stream.write("\n")
     width = max((len(outcome.name) for outcome in outcomes), default=0)
     for outcome in outcomes:
@@ -25,7 +25,7 @@ def write(stream: TextIO, outcomes: Sequence[Outcome], tests: Mapping[str, str],
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in _KINDS}
     stream.write(f"{counts['passed']} passed, {counts['failed']} failed, {counts['error']} in error\n")
     if skipped:
-        stream.write(f"{count(len(skipped))} not begun: {', '.join(skipped[:5])}{' ...' * (len(skipped) > 5)}\n")
+        stream.write(f"{count(len(skipped))} not started: {', '.join(skipped[:5])}{' ...' * (len(skipped) > 5)}\n")
 
 
 def _rates(outcomes: Sequence[Outcome], tests: Mapping[str, str]) -> list[str]:

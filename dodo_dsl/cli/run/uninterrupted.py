@@ -1,4 +1,4 @@
-"""What keeps a run going to its end and report: signals, readers that leave, and limits of this process."""
+"""What lets a run reach its end and report: signals, closed pipes, and limits of this process."""
 
 import contextlib
 import os
@@ -9,7 +9,7 @@ from typing import Any, TextIO
 
 
 def more_descriptors() -> None:
-    """Every service has a pipe and a log: as many descriptors as this process may have."""
+    """Raises the limit of descriptors as far as allowed: every service has a pipe and a log."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
@@ -17,7 +17,7 @@ def more_descriptors() -> None:
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
-    """Results that exist are written, whoever presses Ctrl-C now."""
+    """Ignores Ctrl-C and signals, so that existing results are written."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
     try:
@@ -27,8 +27,8 @@ def undisturbed() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-class Robust:
-    """A stream whose reader may leave (``dodo run | head``): the run goes on to its end and report."""
+class UninterruptedStream:
+    """A stream whose reader may leave (``dodo run | head``) without an end to the run."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

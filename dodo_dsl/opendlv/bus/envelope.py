@@ -1,4 +1,4 @@
-"""The frame in which libcluon sends and records a message: `0D A4`, the length in 3 bytes, an Envelope.
+"""The frame in which libcluon sends and records a message: ``0D A4``, the length in 3 bytes, an Envelope.
 
 All times are microseconds since the epoch; on the wire they are seconds and microseconds, both truncated
 toward zero, so both are negative before 1970.
@@ -23,9 +23,9 @@ class FrameError(ValueError):
 
 
 class Envelope(NamedTuple):
-    """A message on its way: `data_type` is its id, `payload` its encoding.
+    """A message on its way: ``data_type`` is its id, ``payload`` its encoding.
 
-    `sent`, `received` and `sample_time` are microseconds since the epoch; `sender_stamp` tells senders of the
+    ``sent``, ``received`` and ``sample_time`` are microseconds since the epoch; ``sender_stamp`` tells senders of the
     same message apart.
     """
 
@@ -63,7 +63,7 @@ def encode_frame(envelope: Envelope) -> bytes:
 
 
 def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
-    """The envelope of a frame, `received` at a time of its own or the one given. Raises FrameError.
+    """The envelope of a frame, ``received`` at a time of its own or the one given. Raises FrameError.
 
     Bytes after the frame are ignored, as libcluon does.
     """
@@ -76,7 +76,7 @@ def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
 def body_length(header: bytes) -> int:
     """The length in bytes of the envelope that follows a header of 5 bytes; raises FrameError."""
     if len(header) < HEADER_BYTES or header[:2] != MAGIC:
-        raise FrameError("the bytes do not begin with a frame's header")
+        raise FrameError("not a frame: the header is missing")
     return int.from_bytes(header[2:5], "little")
 
 
@@ -117,7 +117,7 @@ def decode_body(body: bytes, received: int | None = None) -> Envelope:
 
 
 def decode_parts(body: bytes) -> tuple[int, bytes, list[int], int]:
-    """An envelope as it stands on the wire: id, payload, six numbers, sender stamp; raises FrameError.
+    """The fields of an encoded envelope: id, payload, six numbers, sender stamp; raises FrameError.
 
     The numbers are seconds and microseconds of sent, received and sample time.
     """

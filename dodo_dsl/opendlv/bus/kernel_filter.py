@@ -1,4 +1,4 @@
-"""A filter that lets the kernel drop datagrams with other messages, so that nobody is woken for them.
+"""A filter that lets the kernel drop datagrams with other messages, so that they wake no process.
 
 Linux: Documentation/networking/filter.rst, "classic" BPF. A program sees a datagram from its UDP header on.
 """
@@ -22,7 +22,7 @@ Instruction = tuple[int, int, int, int]
 
 
 def attach(receiver: socket.socket, ids: Iterable[int]) -> bool:
-    """Let pass only messages with these ids, and what does not begin with an id; False where the kernel will not.
+    """Passes only messages with these ids, and datagrams that do not begin with an id; False where the kernel cannot.
 
     Dropped datagrams count as lost in the kernel's counter of the socket.
     """

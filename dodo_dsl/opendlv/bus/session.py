@@ -38,7 +38,7 @@ class Session:
     """One member of the group 225.0.0.<cid>; a context manager.
 
     Datagrams of the session itself are dropped, as libcluon does. Bytes of others that are no frame are
-    counted in `garbage`, and in `lost` the datagrams for which the receive buffer had no room. Raises SessionError
+    counted in ``garbage``, and in ``lost`` the datagrams for which the receive buffer had no room. Raises SessionError
     for a cid outside 1 to 254 and where there is no route for multicast.
     """
 
@@ -67,7 +67,7 @@ class Session:
         self._poll.register(self._receiver, select.POLLIN)
 
     def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> bytes:
-        """Send a message sampled at `sample_time` (microseconds since the epoch; by default: now); returns the frame.
+        """Send a message sampled at ``sample_time`` (microseconds since the epoch; by default: now); returns the frame.
 
         Raises MessageError, FrameError or SessionError.
         """
@@ -77,7 +77,7 @@ class Session:
         return self.send_envelope(Envelope(id_, payload, now, 0, sampled, sender_stamp))
 
     def send_envelope(self, envelope: Envelope) -> bytes:
-        """Send an envelope as it is, and return its frame; raises FrameError, and SessionError above 65,507 bytes."""
+        """Sends an envelope unchanged and returns its frame; raises FrameError, and SessionError above 65,507 bytes."""
         frame = encode_frame(envelope)
         if len(frame) > MAX_DATAGRAM_BYTES:
             raise SessionError(
@@ -90,9 +90,9 @@ class Session:
         return frame
 
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
-        """The next envelope of another member, with `received` set; None when `timeout` seconds are over.
+        """The next envelope of another member, with ``received`` set; None when ``timeout`` seconds are over.
 
-        `None` waits without end. A signal whose handler returns does not end the wait.
+        ``None`` waits without end. A signal whose handler returns does not end the wait.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
         for dropped in itertools.count():
@@ -121,7 +121,7 @@ class Session:
         kernel_filter.attach(self._receiver, self._only)
 
     def deafen(self) -> None:
-        """Hear nothing from now on, so that this process is not woken for it; sending goes on."""
+        """Stops receiving, so that messages no longer wake this process; sending goes on."""
         if self.is_member:
             membership = _membership(group(self.cid)[0])
             self._receiver.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
@@ -189,7 +189,7 @@ def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
 
 
 def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
-    """How many datagrams the kernel dropped so far; it says so once there are any."""
+    """The number of datagrams that the kernel has dropped so far."""
     return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
 
 

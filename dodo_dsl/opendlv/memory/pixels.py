@@ -1,7 +1,7 @@
 """The pixel formats of camera frames in shared memory, and pictures from and to them.
 
-`argb` has 4 bytes a pixel, in memory blue, green, red, alpha; `bgr` 3; `i420` planes of brightness and, at half the
-width and height, of two colours (12 bits a pixel).
+``argb`` has 4 bytes per pixel, in memory blue, green, red, alpha; ``bgr`` 3; ``i420`` planes of brightness and, at half
+the width and height, of two colours (12 bits per pixel).
 """
 
 from typing import Any
@@ -22,18 +22,18 @@ class PixelError(ValueError):
 def size(format_: str, width: int, height: int) -> int:
     """Bytes of a picture; raises PixelError for an unknown format, and for i420 with an odd width or height."""
     if format_ not in FORMATS:
-        raise PixelError(f"there is no pixel format `{format_}`; known are {', '.join(FORMATS)}")
+        raise PixelError(f"unknown pixel format '{format_}', expected one of {', '.join(FORMATS)}")
     if format_ == "i420" and (width % 2 or height % 2):
         raise PixelError(f"i420 needs an even width and height, not {width} x {height}")
     return width * height * _HALF_BYTES[format_] // 2
 
 
 def format_of(name: str, memory_size: int, width: int, height: int) -> str:
-    """The format of a memory by its size (names lie: some `.argb` have 3 bytes a pixel); raises PixelError."""
+    """The format of a memory by its size (names lie: some ``.argb`` have 3 bytes a pixel); raises PixelError."""
     for format_, half_bytes in _HALF_BYTES.items():
         if 0 < memory_size == width * height * half_bytes // 2:
             return format_
-    raise PixelError(f"memory `{name}` has {memory_size} bytes, which is no picture of {width} x {height} pixels")
+    raise PixelError(f"memory '{name}' has {memory_size} bytes, not a picture of {width} x {height} pixels")
 
 
 def view(data: Any, format_: str, width: int, height: int) -> Picture:
@@ -56,7 +56,7 @@ def to_bgr(picture: Picture, format_: str) -> Picture:
 
 
 def from_bgr(picture: Picture, format_: str) -> Picture:
-    """A picture of blue, green, red in another format, shaped as `view` has it; alpha is 255."""
+    """A picture of blue, green, red in another format, shaped as ``view`` has it; alpha is 255."""
     return _converted(picture, {"argb": "COLOR_BGR2BGRA", "i420": "COLOR_BGR2YUV_I420"}.get(format_))
 
 

@@ -22,17 +22,17 @@ _FLAGS = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 def path_of(name: str) -> Path:
-    """The object's file: `foo` and `/foo` are the same; raises SharedMemoryError."""
+    """The object's file: ``foo`` and ``/foo`` are the same; raises SharedMemoryError."""
     short = name.removeprefix("/")
     if not short or "/" in short or "\0" in short or short in (".", ".."):
-        raise SharedMemoryError(f"`{name}` is no name for POSIX shared memory")
+        raise SharedMemoryError(f"'{name}' is not a name of POSIX shared memory")
     if len(short) >= MAX_NAME:
-        raise SharedMemoryError(f"the name of shared memory `{name[:40]}...` is longer than {MAX_NAME} characters")
+        raise SharedMemoryError(f"the name of shared memory '{name[:40]}...' is longer than {MAX_NAME} characters")
     return FOLDER / short
 
 
 class PosixSegment:
-    """The object at `path`; `token` is its descriptor."""
+    """The object at ``path``; ``token`` is its descriptor."""
 
     def __init__(self, path: Path, token: int, memory: mmap.mmap, header: Header) -> None:
         self.path, self.token, self.size = path, token, header.size
@@ -47,7 +47,7 @@ class PosixSegment:
         except SharedMemoryError:
             raise
         except OSError as error:
-            raise SharedMemoryError(f"shared memory `{path.name}` cannot be made: {path}: {error.strerror}") from None
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {path}: {error.strerror}") from None
         try:
             fcntl.flock(token, fcntl.LOCK_SH | fcntl.LOCK_NB)  # tells other creators that we live
             os.posix_fallocate(token, 0, HEADER_BYTES + size)  # a full memory is an error now, not a SIGBUS later
@@ -57,7 +57,7 @@ class PosixSegment:
         except OSError as error:
             path.unlink(missing_ok=True)
             os.close(token)
-            raise SharedMemoryError(f"shared memory `{path.name}` cannot be made: {error.strerror}") from None
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {error.strerror}") from None
         return cls(path, token, memory, header)
 
     @classmethod
@@ -66,7 +66,7 @@ class PosixSegment:
         try:
             token = os.open(path, _FLAGS)
         except OSError as error:
-            raise SharedMemoryError(f"shared memory `{path.name}` does not exist: {path}: {error.strerror}") from None
+            raise SharedMemoryError(f"shared memory '{path.name}' does not exist: {path}: {error.strerror}") from None
         whole = os.fstat(token).st_size
         if whole > HEADER_BYTES:
             memory = mmap.mmap(token, whole)
@@ -74,14 +74,14 @@ class PosixSegment:
             if 0 < header.size <= whole - HEADER_BYTES:
                 return cls(path, token, memory, header)
         os.close(token)
-        raise SharedMemoryError(f"shared memory `{path.name}` has no content (yet): {path} has {whole} bytes")
+        raise SharedMemoryError(f"shared memory '{path.name}' has no content (yet): {path} has {whole} bytes")
 
     def view(self) -> memoryview:
         """A view of the data, which keeps the memory mapped."""
         return memoryview(self._memory)[HEADER_BYTES : HEADER_BYTES + self.size]
 
     def lock(self, timeout: float) -> Result:
-        """Take the mutex; TIMEOUT when another holds it for `timeout` seconds. Raises OSError where it is broken."""
+        """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError where it is broken."""
         return Result.DONE if self._header.lock(timeout) else Result.TIMEOUT
 
     def unlock(self) -> None:
@@ -135,6 +135,6 @@ def _remove_orphan(path: Path) -> None:
             fcntl.flock(token, fcntl.LOCK_EX | fcntl.LOCK_NB)
             path.unlink()
         except BlockingIOError:
-            raise SharedMemoryError(f"shared memory `{path.name}` cannot be made: a living process uses it") from None
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: a living process uses it") from None
         finally:
             os.close(token)

@@ -1,6 +1,6 @@
 """Mutex and condition of the C library inside of shared memory, as libcluon's POSIX mode uses them.
 
-The mutex is robust (a dead holder holds it no more) and, as the condition, shared between processes; the condition
+The mutex is robust (the death of its holder releases it) and, as the condition, shared between processes; the condition
 counts on the monotonic clock. Reference: POSIX.1-2008, pthread_mutex_lock and pthread_cond_wait; the layouts are
 those of glibc.
 """
@@ -60,7 +60,7 @@ class Header:
         self._size.value = size
 
     def lock(self, timeout: float) -> bool:
-        """Take the mutex; False when `timeout` seconds are over."""
+        """Take the mutex; False when ``timeout`` seconds are over."""
         code = _libc.pthread_mutex_clocklock(self._mutex, CLOCK_MONOTONIC, ctypes.byref(_deadline(timeout)))
         return self._taken(code)
 
@@ -69,7 +69,7 @@ class Header:
         _call("pthread_mutex_unlock", self._mutex)
 
     def wait(self, timeout: float) -> bool:
-        """Wait for a notification with the mutex held; False when `timeout` seconds are over."""
+        """Wait for a notification with the mutex held; False when ``timeout`` seconds are over."""
         until = ctypes.byref(_deadline(timeout))
         return self._taken(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
 

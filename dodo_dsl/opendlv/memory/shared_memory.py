@@ -25,10 +25,10 @@ MODE = "CLUON_SHAREDMEMORY_POSIX"
 
 
 class SharedMemory:
-    """A named piece of memory; a context manager. Made by `create` (the writer) or `attach` (a reader).
+    """A named piece of memory; a context manager. Made by ``create`` (the writer) or ``attach`` (a reader).
 
-    `size` is in bytes, `buffer` a writable view of them all; take the lock to use it. Views and arrays of it stay
-    valid after `close`.
+    ``size`` is in bytes, ``buffer`` a writable view of them all; take the lock to use it. Views and arrays of it stay
+    valid after ``close``.
     """
 
     def __init__(self, segment: Segment | PosixSegment, name: str, owner: bool) -> None:
@@ -42,13 +42,13 @@ class SharedMemory:
 
     @classmethod
     def create(cls, name: str, size: int, posix: bool | None = None) -> Self:
-        """Make memory of `size` bytes, all zero, and what belongs to it; `close` removes it all.
+        """Make memory of ``size`` bytes, all zero, and what belongs to it; ``close`` removes it all.
 
-        What a dead creator left under this name is removed first. `posix` selects the mode (by default the environment
-        does). Raises SharedMemoryError, also where a living process holds memory of this name.
+        What a dead creator left under this name is removed first. ``posix`` selects the mode (by default the
+        environment does). Raises SharedMemoryError, also where a living process holds memory of this name.
         """
         if not 0 < size < 2**32:
-            raise SharedMemoryError(f"shared memory `{name}` cannot have {size} bytes")
+            raise SharedMemoryError(f"shared memory '{name}' cannot have {size} bytes")
         if _wants_posix() if posix is None else posix:
             return cls(PosixSegment.create(posix_segment.path_of(name), size), name, owner=True)
         return cls(Segment.create(token_file.path_of(name), size), name, owner=True)
@@ -67,11 +67,11 @@ class SharedMemory:
 
     @contextmanager
     def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
-        """Hold the mutex; raises SharedMemoryError when another holds it for `timeout` seconds."""
+        """Hold the mutex; raises SharedMemoryError when another holds it for ``timeout`` seconds."""
         deadline = time.monotonic() + timeout
         while (result := self._take(deadline - time.monotonic())) is not Result.DONE:
             if result is Result.TIMEOUT:
-                raise SharedMemoryError(f"shared memory `{self.name}` was locked by another for {timeout:g} s")
+                raise SharedMemoryError(f"shared memory '{self.name}' was locked by another for {timeout:g} s")
         self._locked = True
         try:
             yield
@@ -80,7 +80,7 @@ class SharedMemory:
             self._release()
 
     def stamp(self, time_us: int) -> None:
-        """Say when the content was sampled (microseconds since the epoch); only while locked."""
+        """Sets when the content was sampled (microseconds since the epoch); only while locked."""
         self._need_lock()
         accessed = os.fstat(self._segment.token).st_atime_ns
         os.utime(self._segment.token, ns=(accessed, time_us * 1000))
@@ -94,7 +94,7 @@ class SharedMemory:
         """Wake all processes that wait now, each once.
 
         It happens under the lock: a quick reader would else come back while the condition is still 0 and read the
-        same content again. Raises SharedMemoryError as `lock` does.
+        same content again. Raises SharedMemoryError as ``lock`` does.
         """
         if self._locked:
             self._wake()
@@ -103,7 +103,7 @@ class SharedMemory:
             self._wake()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for a notification without spinning: False when `timeout` seconds are over, or (SysV) a signal came.
+        """Wait for a notification without spinning: False when ``timeout`` seconds are over, or (SysV) a signal came.
 
         Raises SharedMemoryError when the creator has removed the memory.
         """
@@ -157,15 +157,15 @@ class SharedMemory:
 
     def _need_lock(self) -> None:
         if not self._locked:
-            raise SharedMemoryError(f"shared memory `{self.name}` must be locked for its time stamp")
+            raise SharedMemoryError(f"shared memory '{self.name}' must be locked for its time stamp")
 
     def _failed(self, error: OSError) -> SharedMemoryError:
         reasons = {
-            errno.ETIMEDOUT: "can notify no more: a reader was killed while it waited",
-            errno.ENOTRECOVERABLE: "can be locked no more: its holder was killed",
+            errno.ETIMEDOUT: "cannot notify any more: a reader was killed while it waited",
+            errno.ENOTRECOVERABLE: "cannot be locked any more: its holder was killed",
         }
         return SharedMemoryError(
-            f"shared memory `{self.name}` {reasons.get(error.errno or 0, 'was removed by its creator')}"
+            f"shared memory '{self.name}' {reasons.get(error.errno or 0, 'was removed by its creator')}"
         )
 
 

@@ -20,7 +20,7 @@ MODE = 0o666
 
 @dataclass(frozen=True)
 class Segment:
-    """Handles of the objects; `token` is the descriptor of the token file at `path`."""
+    """Handles of the objects; ``token`` is the descriptor of the token file at ``path``."""
 
     path: Path
     token: int
@@ -41,7 +41,7 @@ class Segment:
                 pass  # another creator had the same key in the same moment
             except (OSError, ValueError, sysv_ipc.Error) as error:
                 os.close(token)
-                raise SharedMemoryError(f"shared memory `{path.name}` cannot be made: {error}") from None
+                raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {error}") from None
             os.close(token)
             token_file.move_to_other_inode(path)
         raise SharedMemoryError(f"{path}: no free key for shared memory")
@@ -62,7 +62,7 @@ class Segment:
             )
         except sysv_ipc.Error as error:
             os.close(token)
-            raise SharedMemoryError(f"shared memory `{path.name}` has no content (yet): {error}") from None
+            raise SharedMemoryError(f"shared memory '{path.name}' has no content (yet): {error}") from None
         except SharedMemoryError:
             os.close(token)
             raise
@@ -79,7 +79,7 @@ class Segment:
         return int(self.memory.size)
 
     def lock(self, timeout: float) -> Result:
-        """Take the mutex; TIMEOUT when another holds it for `timeout` seconds. Raises OSError when it is gone."""
+        """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError when it is gone."""
         return operate(self.mutex.id, -1, timeout, undo=True)
 
     def unlock(self) -> None:
@@ -152,13 +152,13 @@ def _clear(path: Path, status: os.stat_result, existed: bool) -> bool:
 
 
 def _refuse_twin(path: Path) -> None:
-    """Two token files with the same keys name one memory, and nobody can tell whose it is."""
+    """Refuses two token files with the same keys, which name one memory."""
     with suppress(FileNotFoundError):
         twin = token_file.twin(path)
         if twin is not None and twin.stat().st_size == 0:
             raise SharedMemoryError(
-                f"shared memory `{path.name}` cannot be told from `{twin.name}`: the keys of {path} and {twin} collide "
-                f"(ftok); remove the one that is not used, or start its creator anew"
+                f"shared memory '{path.name}' cannot be told from '{twin.name}': the keys of {path} and {twin} collide "
+                f"(ftok); remove the unused one, or restart its creator"
             )
 
 

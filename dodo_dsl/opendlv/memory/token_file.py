@@ -18,12 +18,12 @@ class SharedMemoryError(OSError):
 
 
 def path_of(name: str) -> Path:
-    """The token file: `foo` and `/foo` are /tmp/foo, what begins with /tmp stays. Raises SharedMemoryError."""
+    """The token file: ``foo`` and ``/foo`` are /tmp/foo, what begins with /tmp stays. Raises SharedMemoryError."""
     if not name.strip("/") or "\0" in name:
-        raise SharedMemoryError(f"`{name}` is no name for shared memory")
+        raise SharedMemoryError(f"'{name}' is not a name of shared memory")
     path = name if name.startswith(FOLDER) else f"{FOLDER}/{name.removeprefix('/')}"
     if len(path) > MAX_NAME:
-        raise SharedMemoryError(f"the name of shared memory `{name[:40]}...` is longer than {MAX_NAME} characters")
+        raise SharedMemoryError(f"the name of shared memory '{name[:40]}...' is longer than {MAX_NAME} characters")
     return Path(path)
 
 
@@ -37,7 +37,7 @@ def open_existing(path: Path) -> int:
     try:
         return os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     except OSError as error:
-        raise SharedMemoryError(f"shared memory `{path.name}` does not exist: {path}: {error.strerror}") from None
+        raise SharedMemoryError(f"shared memory '{path.name}' does not exist: {path}: {error.strerror}") from None
 
 
 def open_or_create(path: Path) -> tuple[int, bool]:
@@ -91,4 +91,4 @@ def _same_key(entry: "os.DirEntry[str]", own: os.stat_result) -> bool:
 
 
 def _not_made(path: Path, error: OSError) -> SharedMemoryError:
-    return SharedMemoryError(f"shared memory `{path.name}` cannot be made: {path}: {error.strerror}")
+    return SharedMemoryError(f"shared memory '{path.name}' cannot be made: {path}: {error.strerror}")

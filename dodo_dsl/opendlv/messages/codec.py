@@ -36,7 +36,7 @@ def decode(layout: Layout, payload: bytes) -> Any:
             message.DiscardUnknownFields()
         _check_decoded(message, layout)
     except (DecodeError, wire.WireError) as error:
-        raise MessageError(f"the payload is no {layout.definition.name}: {error}") from None
+        raise MessageError(f"the payload is not a valid {layout.definition.name}: {error}") from None
     return message
 
 
@@ -52,7 +52,7 @@ def _check_decoded(message: Message, layout: Layout) -> None:
     """Strings must be UTF-8 (others are bytes in protobuf); large integers lose their upper bits as in C++."""
     for field in layout.texts:
         if not isinstance(getattr(message, field), str):
-            raise wire.WireError(f"`{field}` is no UTF-8 text")
+            raise wire.WireError(f"'{field}' is not UTF-8 text")
     for field, type_ in layout.narrow:
         value = getattr(message, field)
         if value not in integer_range(type_):

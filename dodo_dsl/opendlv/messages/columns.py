@@ -22,9 +22,9 @@ _MAX_SIZE = 1 << 25
 
 @dataclass(frozen=True)
 class Column:
-    """A field's values, a row each: an array of numbers, or a list of bytes, also for texts (UTF-8 or not).
+    """A field's values, a row each: an array of numbers, or a list of bytes, also for strings (UTF-8 or not).
 
-    Fields of inner messages are named `outer.inner`, as libcluon's CSV has them.
+    Fields of inner messages are named ``outer.inner``, as libcluon's CSV has them.
     """
 
     name: str
@@ -42,9 +42,9 @@ def names(layout: Layout, prefix: str = "") -> Iterator[tuple[str, str]]:
 
 
 def decode(layout: Layout, data: bytes, starts: Numbers, ends: Numbers) -> tuple[list[Column], Marks]:
-    """The columns of the payloads between `starts` and `ends`, and which of them could be decoded.
+    """The columns of the payloads between ``starts`` and ``ends``, and which of them could be decoded.
 
-    `data` has 128 bytes to spare behind the last payload. Rows that could not be decoded hold anything.
+    ``data`` has 128 bytes to spare behind the last payload. Rows that could not be decoded hold anything.
     """
     reader = _Reader(data, ends)
     at = reader.message(layout, starts)
@@ -69,7 +69,7 @@ def usual_rows(layout: Layout, data: bytes, starts: Numbers, ends: Numbers) -> M
 
 
 class _Reader:
-    """Moves over all payloads field by field; `usual` tells which of them still look as libcluon writes them."""
+    """Moves over all payloads field by field; ``usual`` tells which of them still look as libcluon writes them."""
 
     def __init__(self, data: bytes, ends: Numbers) -> None:
         self.columns: list[tuple[str, str, Any]] = []

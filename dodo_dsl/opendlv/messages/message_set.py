@@ -27,7 +27,7 @@ class UnknownMessage(MessageError, KeyError):
 
 
 class MessageSet:
-    """Messages by full name (`opendlv.proxy.GroundSteeringRequest`) and by id (1090).
+    """Messages by full name (``opendlv.proxy.GroundSteeringRequest``) and by id (1090).
 
     Message classes are protobuf's, with the field names of the specification.
     """
@@ -100,7 +100,7 @@ class MessageSet:
             return f"there is no message with id {key}"
         close = [name for name in self._layouts if name.rpartition(".")[2] == key.rpartition(".")[2]]
         close = close or difflib.get_close_matches(key, self._layouts, 1)
-        return f"there is no message `{key}`" + (f": did you mean `{close[0]}`?" if close else "")
+        return f"there is no message '{key}'" + (f": did you mean '{close[0]}'?" if close else "")
 
 
 def besides(first: Iterable[Definition], others: Iterable[Definition]) -> list[Definition]:
@@ -128,5 +128,5 @@ def _merged(definitions: Iterable[Definition]) -> list[Definition]:
         for key in (definition.name, definition.id):
             earlier = by_key.setdefault(key, definition)
             if not earlier.same_layout(definition):
-                raise OdvdError(f"{definition.place}: `{key}` is another message at {earlier.place}")
+                raise OdvdError(f"{definition.place}: '{key}' is another message at {earlier.place}")
     return list({id(definition): definition for definition in by_key.values()}.values())

@@ -1,4 +1,4 @@
-"""Message classes of the protobuf package, made at run time from the definitions of an `.odvd` file."""
+"""Message classes of the protobuf package, made at run time from the definitions of an ``.odvd`` file."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -36,9 +36,9 @@ _FIXED_SIZE = frozenset({"bool", "float", "double"})
 class Layout:
     """A message class and what its codec needs to know.
 
-    `filled` is the encoding of a message with nothing set, every field written; `fixed_size` its length where
-    that never varies. `narrow` are the integers of less than 32 bits, `texts` the strings, `inner` the fields
-    that are messages. `reorder` says that the fields are not declared in the order of their numbers.
+    ``filled`` is the encoding of a message with nothing set, every field written; ``fixed_size`` its length where
+    that never varies. ``narrow`` are the integers of less than 32 bits, ``texts`` the strings, ``inner`` the fields
+    that are messages. ``reorder`` says that the fields are not declared in the order of their numbers.
     """
 
     type: type[Message]
@@ -71,7 +71,7 @@ class _Builder:
             return self.layouts[name]
         definition = self.definitions[name]
         if depth > MAX_NESTING:
-            raise OdvdError(f"{definition.place}: `{name}` nests messages without end or deeper than {MAX_NESTING}")
+            raise OdvdError(f"{definition.place}: '{name}' nests messages without end or deeper than {MAX_NESTING}")
         inner = {
             field.name: self.layout(self._resolved(definition, field), depth + 1)
             for field in definition.fields
@@ -85,7 +85,7 @@ class _Builder:
         for name in (prefix + field.type, field.type):
             if name in self.definitions:
                 return name
-        raise OdvdError(f"{field.place}: `{field.type}` is neither a type nor a message")
+        raise OdvdError(f"{field.place}: '{field.type}' is neither a type nor a message")
 
     def _message_type(self, definition: Definition, inner: Mapping[str, Layout]) -> type[Message]:
         package, _, short_name = definition.name.rpartition(".")
@@ -99,7 +99,7 @@ class _Builder:
             return message_factory.GetMessageClass(self._pool.FindMessageTypeByName(definition.name))
         except (TypeError, KeyError):
             raise OdvdError(
-                f"{definition.place}: the name `{definition.name}` clashes with that of another message"
+                f"{definition.place}: the name '{definition.name}' clashes with that of another message"
             ) from None
 
 

@@ -24,7 +24,7 @@ _ONE, _SEVEN, _TOP_BYTE = np.uint64(1), np.uint64(7), np.uint64(56)
 
 
 def words(data: bytes) -> Words:
-    """The 8 bytes that begin at each position of `data`, as one little-endian number."""
+    """The 8 bytes that begin at each position of ``data``, as one little-endian number."""
     return np.ndarray((max(0, len(data) - WORD_BYTES + 1),), "<u8", data, strides=(1,))
 
 
@@ -41,6 +41,6 @@ def read(source: Words, at: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def signed(value: Numbers) -> Numbers:
-    """What a zigzag number stands for."""
+    """The value of a zigzag number."""
     result: Numbers = (value >> 1) ^ -(value & 1)
     return result

@@ -19,7 +19,7 @@ class WireError(ValueError):
 
 @dataclass(frozen=True)
 class Chunk:
-    """One field on the wire: `head` is its key (and length), `body` its value."""
+    """One field on the wire: ``head`` is its key (and length), ``body`` its value."""
 
     number: int
     wire_type: int
@@ -28,7 +28,7 @@ class Chunk:
 
 
 def chunks(data: bytes) -> Iterator[Chunk]:
-    """The fields of `data` in their order; raises WireError."""
+    """The fields of ``data`` in their order; raises WireError."""
     position = 0
     while position < len(data):
         start = position
@@ -52,7 +52,7 @@ def chunks(data: bytes) -> Iterator[Chunk]:
 
 
 def read_varint(data: bytes, position: int) -> tuple[int, int]:
-    """The number at `position` and the position after it."""
+    """The number at ``position`` and the position after it."""
     value = shift = 0
     for index in range(position, min(position + MAX_VARINT_BYTES, len(data))):
         byte = data[index]
@@ -74,7 +74,7 @@ def varint(value: int) -> bytes:
 
 
 def keep_first(data: bytes, shape: Shape) -> bytes:
-    """`data` with only the first occurrence of each field, inside of messages too."""
+    """``data`` with only the first occurrence of each field, inside of messages too."""
     found: dict[int, bytes] = {}
     for chunk in chunks(data):
         if chunk.number not in found:
@@ -83,7 +83,7 @@ def keep_first(data: bytes, shape: Shape) -> bytes:
 
 
 def in_order(data: bytes, shape: Shape) -> bytes:
-    """`data`, which has every field once, with its fields in the shape's order."""
+    """``data``, which has every field once, with its fields in the shape's order."""
     found = {chunk.number: _rewritten(chunk, shape, in_order) for chunk in chunks(data)}
     return b"".join(found[number] for number in shape)
 

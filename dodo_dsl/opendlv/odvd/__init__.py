@@ -1,4 +1,4 @@
-"""Message specifications (`.odvd`): tokens, field types, parser, and the files that ship with DoDo."""
+"""Message specifications (``.odvd``): tokens, field types, parser, and the files that ship with DoDo."""
 
 from pathlib import Path
 

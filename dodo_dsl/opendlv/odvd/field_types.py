@@ -1,4 +1,4 @@
-"""The field types of message specifications, their ranges, and what may stand as a default."""
+"""The field types of message specifications, their ranges, and their default values."""
 
 import re
 
@@ -21,7 +21,7 @@ Default = bool | int | float | str | None
 
 
 def integer_range(type_: str) -> range:
-    """The values that an integer type holds; a `char` is 0 to 255."""
+    """The values that an integer type holds; a ``char`` is 0 to 255."""
     bits = INTEGER_BITS[type_]
     return range(-(2 ** (bits - 1)), 2 ** (bits - 1)) if type_.startswith("int") else range(2**bits)
 
@@ -29,7 +29,7 @@ def integer_range(type_: str) -> range:
 def default_of(type_: str, token: Token) -> Default:
     value = _value(type_, token)
     if value is None:
-        raise OdvdError(f"{token.place}: {token} is no default for a field of type `{type_}`")
+        raise OdvdError(f"{token.place}: {token} is not a default for a field of type '{type_}'")
     return value
 
 

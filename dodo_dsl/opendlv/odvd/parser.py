@@ -1,4 +1,4 @@
-"""Parser of message specifications (`.odvd`), the language of libcluon's `cluon-msc`.
+"""Parser of message specifications (``.odvd``), the language of libcluon's ``cluon-msc``.
 
     package a.b;                                  // optional
     message Name [id = 1] {
@@ -26,7 +26,7 @@ MAX_MESSAGE_ID = 2**31 - 1
 
 @dataclass(frozen=True)
 class Field:
-    """One field: `type` is a scalar's name, or the message's as it was written."""
+    """One field: ``type`` is a scalar's name, or the message's as it was written."""
 
     name: str
     type: str
@@ -46,7 +46,7 @@ class Definition:
     place: Place
 
     def same_layout(self, other: "Definition") -> bool:
-        """Whether both describe the same name, id and fields, wherever they stand."""
+        """Whether both describe the same name, id and fields, wherever they are defined."""
         return self._layout() == other._layout()
 
     def _layout(self) -> tuple[object, ...]:
@@ -62,7 +62,7 @@ def load(path: Path) -> tuple[Definition, ...]:
     except OSError as error:
         raise OdvdError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise OdvdError(f"{path}: is not UTF-8 text") from None
+        raise OdvdError(f"{path}: not UTF-8 text") from None
     if len(data) > MAX_FILE_BYTES:
         raise OdvdError(f"{path}: is larger than {MAX_FILE_BYTES} bytes")
     return parse(text, str(path))
@@ -94,7 +94,7 @@ class _Parser:
 
     def _message(self, package: str) -> Definition:
         if self._token.text != "message" or self._token.kind != "name":
-            self._fail("`message`")
+            self._fail("'message'")
         self._next()
         name = self._expect("name", "the message's name")
         self._sign("[")
@@ -113,10 +113,10 @@ class _Parser:
         return Definition(full_name, id_, package, tuple(fields), name.place)
 
     def _field(self, counted: int) -> tuple[Field, int]:
-        type_ = self._expect("name", "a field's type or `}`")
+        type_ = self._expect("name", "a field's type or '}'")
         name = self._expect("name", "the field's name")
         if "." in name.text:
-            raise OdvdError(f"{name.place}: a field's name has no dots: `{name.text}`")
+            raise OdvdError(f"{name.place}: the field name '{name.text}' has a dot, expected a simple name")
         options = self._options(type_.text)
         self._sign(";")
         if options.number is None:
@@ -144,12 +144,12 @@ class _Parser:
 
     def _identifier(self, maximum: int) -> int:
         if self._token.text != "id" or self._token.kind != "name":
-            self._fail("`id`")
+            self._fail("'id'")
         self._next()
         self._sign("=")
         token = self._expect("number", "a number")
         if not re.fullmatch(r"[1-9][0-9]*", token.text) or int(token.text[:11]) > maximum:
-            raise OdvdError(f"{token.place}: an id is a whole number from 1 to {maximum}, not `{token.text}`")
+            raise OdvdError(f"{token.place}: expected an id, a whole number from 1 to {maximum}, found '{token.text}'")
         return int(token.text)
 
     def _next(self) -> None:
@@ -164,7 +164,7 @@ class _Parser:
 
     def _sign(self, sign: str) -> None:
         if not self._optional(sign):
-            self._fail(f"`{sign}`")
+            self._fail(f"'{sign}'")
 
     def _optional(self, sign: str) -> bool:
         if self._token.kind != "sign" or self._token.text != sign:
@@ -194,5 +194,5 @@ class _Used:
             earlier = self.places.setdefault((key, value), place)
             if earlier is not place:
                 raise OdvdError(
-                    f"{place}: the {key} `{value}` of this {self.what} is already used at line {earlier.line}"
+                    f"{place}: the {key} '{value}' of this {self.what} is already used at line {earlier.line}"
                 )

@@ -1,4 +1,4 @@
-"""The words of a message specification (`.odvd`) with their places; comments and blanks are dropped."""
+"""The words of a message specification (``.odvd``) with their places; comments and blanks are dropped."""
 
 import re
 from collections.abc import Iterator
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 
 class OdvdError(ValueError):
-    """A specification that cannot be used; the text begins with `file:line:column`."""
+    """A specification that cannot be used; the text begins with ``file:line:column``."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where something stands; line and column count from 1."""
+    """A place in a file; line and column count from 1."""
 
     file: str
     line: int
@@ -39,7 +39,7 @@ class Token:
     place: Place
 
     def __str__(self) -> str:
-        return "the end of the file" if self.kind == "end" else f"`{self.text}`"
+        return "the end of the file" if self.kind == "end" else f"'{self.text}'"
 
 
 def tokens(text: str, file: str) -> Iterator[Token]:
@@ -48,7 +48,7 @@ def tokens(text: str, file: str) -> Iterator[Token]:
         place = Place(file, line, position - line_start + 1)
         match = _TOKEN.match(text, position)
         if match is None:
-            raise OdvdError(f"{place}: `{text[position]}` does not belong here")
+            raise OdvdError(f"{place}: '{text[position]}' is not allowed here")
         kind = match.lastgroup or ""
         if kind != "space":
             yield Token(kind, match[kind], place)

@@ -1,1 +1,1 @@
-"""Recordings (`.rec`): read, indexed, written."""
+"""Recordings (``.rec``): read, indexed, written."""

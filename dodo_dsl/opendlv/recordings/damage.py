@@ -7,7 +7,7 @@ MAX_PLACES = 1000
 
 @dataclass
 class Place:
-    """Bytes of a file that are no frame: `size` of them from byte `offset`."""
+    """Bytes of a file that are no frame: ``size`` of them from byte ``offset``."""
 
     offset: int
     size: int
@@ -20,7 +20,7 @@ class Place:
 
 @dataclass
 class Damage:
-    """All that was passed over: `count` places with `size` bytes together; the first thousand are kept as `places`."""
+    """All skipped bytes: ``count`` places with ``size`` bytes in total; ``places`` has the first thousand."""
 
     places: list[Place] = field(default_factory=list)
     count: int = 0

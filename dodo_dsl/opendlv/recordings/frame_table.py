@@ -19,7 +19,7 @@ _MAX_UINT32 = 1 << 32
 
 
 class Fact(IntEnum):
-    """The columns; positions are in the data at hand, sizes in bytes, times as they stand in the file."""
+    """The columns; positions are in the data at hand, sizes in bytes, times as in the file."""
 
     START = 0
     END = 1
@@ -45,9 +45,9 @@ def empty() -> Table:
 
 
 def read_frames(data: bytes, starts: list[int], ends: list[int], known: bool = False) -> Table:
-    """The rows of frames up to the first that holds no envelope; `data` ends with PADDING.
+    """The rows of frames up to the first that holds no envelope; ``data`` ends with PADDING.
 
-    `known` frames were read before and are not doubted again.
+    ``known`` frames were read before and are not checked again.
     """
     if len(starts) < FEW:
         rows = _one_by_one(data, starts, ends, known)

@@ -1,7 +1,7 @@
 """Recordings (``.rec``): frames one after the other, without header or footer, read as a stream or by an index.
 
-A recording may be cut, hold garbage, be unsorted or have sample times of zero: what is no frame is passed over
-and noted in a :class:`Damage`.
+A recording may be cut, hold garbage, be unsorted or have sample times of zero: what is not a frame is skipped
+and noted in a :class:``Damage``.
 """
 
 import os
@@ -39,11 +39,11 @@ _INDEX = np.dtype(
 
 
 class RecordingError(ValueError):
-    """A file that is no recording, or that changed while it was read."""
+    """A file that is not a recording, or that changed while it was read."""
 
 
 def read_envelopes(path: Path, damage: Callable[[Damage], None] | None = None) -> Iterator[Envelope]:
-    """The envelopes of a recording in file order; what was passed over is told to `damage` at the end.
+    """The envelopes of a recording in file order; ``damage`` gets what was skipped at the end.
 
     Memory is bounded by the largest frame, 16 MiB. Raises OSError for an unreadable file.
     """
@@ -58,13 +58,13 @@ def read_envelopes(path: Path, damage: Callable[[Damage], None] | None = None) -
 class Recording:
     """A recording with an index: a context manager whose rows can be chosen, sorted and read in any order.
 
-    The index takes 36 bytes of memory a message; `index` has the columns offset, size (bytes), data_type,
+    The index takes 36 bytes of memory a message; ``index`` has the columns offset, size (bytes), data_type,
     sender_stamp, sampled and time (microseconds since the epoch), a row for each message in the order of the file.
-    `time` is the sample time, or where that is zero when the message was received, or else sent.
+    ``time`` is the sample time, or where that is zero when the message was received, or else sent.
     """
 
     def __init__(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
-        """Read all of a file once; `progress` is told how many bytes are behind.
+        """Read all of a file once; ``progress`` gets the number of bytes read.
 
         Raises OSError for an unreadable file, RecordingError for one without a single message.
         """
@@ -88,7 +88,7 @@ class Recording:
         end: int | None = None,
         sender_stamps: Collection[int] | None = None,
     ) -> Numbers:
-        """Rows in the order of the file: of some messages and senders, their `time` from `start` to before `end`."""
+        """Rows in the order of the file: of some messages and senders, ``time`` from ``start`` to before ``end``."""
         chosen: Marks = np.ones(len(self.index), np.bool_)
         if messages is not None:
             chosen &= np.isin(self.index["data_type"], list(messages))
@@ -109,7 +109,7 @@ class Recording:
     def batches(self, rows: Numbers | None = None) -> Iterator[Batch]:
         """The frames of some rows in the order given (by default all), some at a time.
 
-        Raises RecordingError where the file is no longer what it was.
+        Raises RecordingError if the file has changed.
         """
         wanted = np.arange(len(self.index)) if rows is None else rows
         ends = np.cumsum(self.index["size"][wanted].astype(np.int64))
@@ -142,7 +142,7 @@ class Recording:
 
     def _refuse_others(self) -> None:
         if self.size and not len(self.index):
-            raise RecordingError(f"{self.path} is no recording: there is no message in its {self.size} bytes")
+            raise RecordingError(f"{self.path} is not a recording: its {self.size} bytes hold no message")
 
     def _gathered(self, rows: Numbers) -> Batch:
         """Read frames that lie near one another with one call."""

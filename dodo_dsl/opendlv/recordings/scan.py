@@ -1,4 +1,4 @@
-"""A recording read as a stream, in batches of frames; what is no frame is passed over and noted.
+"""A recording read as a stream, in batches of frames; what is not a frame is skipped and noted.
 
 Memory is bounded by one chunk and the largest frame, 16 MiB, however large the file is.
 """
@@ -25,9 +25,9 @@ _CUT, _GARBAGE, _NO_ENVELOPE = "a frame that is cut short", "no frame begins her
 
 @dataclass(frozen=True)
 class Batch:
-    """Some frames of a recording: positions in `table` count in `data`, which begins at byte `base` of the file.
+    """Some frames of a recording: positions in ``table`` count in ``data``, which begins at byte ``base`` of the file.
 
-    `base` is -1 where the frames were gathered from several places.
+    ``base`` is -1 where the frames were gathered from several places.
     """
 
     data: bytes
@@ -63,7 +63,7 @@ class Batch:
 
 
 class Scanner:
-    """Reads a stream once, from where it stands; `damage` fills while batches are taken."""
+    """Reads a stream once, from its position; ``damage`` fills while batches are taken."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self.damage = Damage()

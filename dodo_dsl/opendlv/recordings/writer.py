@@ -11,7 +11,7 @@ _MOST_BYTES = 1 << 20
 
 
 class RecordingWriter:
-    """A new `.rec` file; a context manager. Nothing is held back in the process.
+    """A new ``.rec`` file; a context manager. Nothing is held back in the process.
 
     Each call appends whole frames with one write of the kernel; what a full disk cut off is taken back. Raises
     FileExistsError for a file that is there, OSError where none can be made.
@@ -24,11 +24,11 @@ class RecordingWriter:
         self._file = path.open("xb", buffering=0)
 
     def write(self, envelope: Envelope) -> None:
-        """Append an envelope as it is; raises FrameError where it fits in none, OSError when the disk is full."""
+        """Appends an envelope unchanged; raises FrameError where it fits in none, OSError when the disk is full."""
         self.write_frames((encode_frame(envelope),))
 
     def write_frames(self, frames: Iterable[bytes]) -> None:
-        """Append encoded frames, up to a mebibyte with one write; raises OSError as `write` does."""
+        """Append encoded frames, up to a mebibyte with one write; raises OSError as ``write`` does."""
         pending: list[bytes] = []
         size = 0
         for frame in frames:

@@ -1,4 +1,4 @@
-"""Compressed camera frames of recordings (`opendlv.proxy.ImageReading`) back to pictures, through PyAV."""
+"""Compressed camera frames of recordings (``opendlv.proxy.ImageReading``) back to pictures, through PyAV."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ class VideoError(ValueError):
 
 
 class Frame:
-    """A decoded frame of `width` by `height` pixels."""
+    """A decoded frame of ``width`` by ``height`` pixels."""
 
     def __init__(self, frame: Any) -> None:
         self._frame = frame
@@ -24,8 +24,8 @@ class Frame:
         self.height: int = frame.height
 
     def pixels(self, kind: str) -> NDArray[np.uint8]:
-        """The picture as OpenDLV's memories have it: `argb` (height, width, 4: B, G, R, A), `bgr` (height, width, 3)
-        or `i420` (height * 3 / 2, width: the planes Y, U, V).
+        """The picture as in OpenDLV's memory: ``argb`` (height, width, 4: B, G, R, A), ``bgr`` (height, width, 3)
+        or ``i420`` (height * 3 / 2, width: the planes Y, U, V).
         """
         array: NDArray[np.uint8] = self._frame.to_ndarray(format=_AV_NAMES[kind])
         return array
@@ -39,7 +39,7 @@ class VideoDecoder:
 
     def __init__(self, format_: str) -> None:
         if format_ not in CODECS:
-            raise VideoError(f"frames of format `{format_}` cannot be decoded; known are {', '.join(CODECS)}")
+            raise VideoError(f"frames of format '{format_}' cannot be decoded, expected one of {', '.join(CODECS)}")
         self._av = _av()
         self._is_h264 = CODECS[format_] == "h264"
         self._codec: Any = self._av.CodecContext.create(CODECS[format_], "r")
@@ -77,5 +77,5 @@ def _av() -> Any:
     try:
         import av
     except ImportError:
-        raise VideoError("frames cannot be decoded: the package `av` is not installed (pip install av)") from None
+        raise VideoError("frames cannot be decoded: the package 'av' is not installed (pip install av)") from None
     return av

@@ -15,10 +15,10 @@ _PLANAR = "yuv420p"
 
 
 class VideoEncoder:
-    """Encodes the pictures of one camera, `kind` being `argb`, `bgr` or `i420` as `pixels` has them.
+    """Encodes the pictures of one camera, ``kind`` being ``argb``, ``bgr`` or ``i420`` as ``pixels`` has them.
 
-    Every `key_interval`-th picture stands alone and brings what a decoder needs. `quality` is x264's constant rate
-    factor, 0 (best) to 51; lossy packets are of the baseline profile, which all decoders know. `lossless` packets
+    Every ``key_interval``-th picture stands alone and brings what a decoder needs. ``quality`` is x264's constant rate
+    factor, 0 (best) to 51; lossy packets are of the baseline profile, which all decoders know. ``lossless`` packets
     give back the same bytes (alpha aside) and need a decoder of the High 4:4:4 profile, such as FFmpeg.
     One thread, no look-ahead: a packet comes with its picture, the same for the same pictures.
     Raises VideoError for sizes that h264 cannot have, and where PyAV is not installed.
@@ -48,7 +48,7 @@ class VideoEncoder:
         return self._pixels != _PLANAR
 
     def encode(self, picture: NDArray[np.uint8]) -> bytes:
-        """The packet of a picture, shaped as `pixels.view` has it; raises VideoError."""
+        """The packet of a picture, shaped as ``pixels.view`` has it; raises VideoError."""
         frame = self._frame(picture)
         frame.pts = self._next * 100_000
         self._next += 1
@@ -77,5 +77,5 @@ def _av() -> Any:
     try:
         import av
     except ImportError:
-        raise VideoError("frames cannot be encoded: the package `av` is not installed (pip install av)") from None
+        raise VideoError("frames cannot be encoded: the package 'av' is not installed (pip install av)") from None
     return av

@@ -105,7 +105,7 @@ def test_boxes_marked_by_hand_on_a_snapshot(place: Path) -> None:
     assert boxes(place / "desk-1.json") == [("yellow", [40, 0, 40, 40.5]), ("blue", [280, 200, 40, 40])]
     assert files(place, "desk-1") == ["desk-1-boxes.png", "desk-1.json", "desk-1.png"]
     assert (place / "desk-1.png").read_bytes() == before
-    assert "desk-1.json is there already; --force replaces it" in rig("desk", "-o", "desk-1.json", *words, code=2)
+    assert "'desk-1.json' exists already; --force replaces it" in rig("desk", "-o", "desk-1.json", *words, code=2)
     rig("desk", "-o", "desk-1.json", "--boxes", "desk-1.json", "--box", "blue", 0, 0, 9, 9, "--force")
     assert [label for label, _ in boxes(place / "desk-1.json")] == ["blue", "yellow", "blue"]
 
@@ -118,7 +118,7 @@ DESK = ("desk", "--picture", "desk.png")
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((*DESK, "--box", "yellow", 300, 20, 30, 40), "lies outside of the picture, which has 320 x 240 pixels"),
+        ((*DESK, "--box", "yellow", 300, 20, 30, 40), "lies outside the picture of 320 x 240 pixels"),
         ((*DESK, "--box", "yellow", -1, 20, 30, 40), "box 1 (yellow -1 20 30 40): lies outside"),
         ((*DESK, "--box", "yellow", 10, 20, 0, 40), "has no area, expected a width and a height above 0"),
         ((*DESK, "--box", "yellow", 10, 20, "nan", 40), "expected a class and four numbers X Y WIDTH HEIGHT"),
@@ -131,7 +131,7 @@ DESK = ("desk", "--picture", "desk.png")
         ),
         ((*DESK, "--boxes", "desk.png"), "desk.png: cannot be read as COCO JSON"),
         (("desk", *BOX, "--picture", "none.png"), "none.png: cannot be read: No such file"),
-        (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: holds no picture"),
+        (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: not a picture"),
         (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),
         (("desk", *BOX, "--test", "sil-open-straight"), "has no service 'camera'"),
         (("blind", *BOX), "rig 'blind' has no camera in dodo.yml"),

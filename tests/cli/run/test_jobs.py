@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import parser
-from dodo_dsl.cli.run.jobs import Usage, prepare
+from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.backends import Job
 from dodo_dsl.spec.deployment import Deployment
@@ -36,7 +37,7 @@ def prepared(folder: Path, *words: str) -> tuple[list[Job], Deployment]:
 
 def test_a_changed_clock_replaces_what_was_wrong_in_the_first(folder: Path) -> None:
     examples.write(LOCKSTEP_ONLY, folder)
-    with pytest.raises(Usage):
+    with pytest.raises(UsageError):
         prepared(folder)
     jobs, _ = prepared(folder, "--clock", "realtime")
     assert jobs[0].plan.clock == "realtime"
@@ -87,7 +88,7 @@ def test_a_compiled_test_takes_cids_and_subnets_from_the_deployment(folder: Path
 
 def test_a_compiled_test_refuses_a_deployment_with_errors(folder: Path, compiled: Path) -> None:
     (folder / "dodo.yml").write_text("dodo: 1\ncids: 300\n")
-    with pytest.raises(Usage, match=r"dodo\.yml"):
+    with pytest.raises(UsageError, match=r"dodo\.yml"):
         run_compiled(folder, compiled)
 
 
@@ -99,5 +100,5 @@ def test_a_compiled_test_takes_seed_wall_timeout_and_repetitions(folder: Path, c
 
 
 def test_a_compiled_test_keeps_its_clock(folder: Path, compiled: Path) -> None:
-    with pytest.raises(Usage, match="compiled for clock lockstep"):
+    with pytest.raises(UsageError, match="compiled for clock lockstep"):
         run_compiled(folder, compiled, "--clock", "realtime")

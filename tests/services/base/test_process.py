@@ -127,7 +127,7 @@ def test_memory_that_another_process_has(start: Start) -> None:
     with SharedMemory.create(name, 10):
         code, out, err = start("--role=echo", f"--name={name}").end()
         assert (code, out) == (2, "")
-        assert f"shared memory `{name}` cannot be made: process" in err
+        assert f"shared memory '{name}' cannot be made: process" in err
         assert Path("/tmp", name).exists()
 
 

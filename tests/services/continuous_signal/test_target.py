@@ -166,7 +166,7 @@ def test_recordings_that_are_refused(tmp_path: Path, samples: list[tuple[int, in
 def test_a_recorded_message_that_cannot_be_decoded_is_named(tmp_path: Path) -> None:
     path = recording(tmp_path, broken=encode_frame(Envelope(1090, b"\xff", 1, 0, 1, 3)))
     with pytest.raises(
-        TargetError, match=r"target.rec: opendlv.proxy.GroundSteeringRequest/3 number 1: the payload is no"
+        TargetError, match=r"target.rec: opendlv.proxy.GroundSteeringRequest/3 number 1: the payload is not a valid"
     ):
         read_recording(path, STEERING, MessageSet.standard())
     with pytest.raises(TargetError, match=r"cannot be read as a recording: No such file"):
@@ -186,7 +186,7 @@ def test_a_recorded_message_that_cannot_be_decoded_is_named(tmp_path: Path) -> N
             Signal("opendlv.proxy.ImageReading", 0, "data"),
             "the field data of opendlv.proxy.ImageReading is not a number",
         ),
-        (Signal("opendlv.proxy.GroundSteering", 0, "x"), "there is no message `opendlv.proxy.GroundSteering`"),
+        (Signal("opendlv.proxy.GroundSteering", 0, "x"), "there is no message 'opendlv.proxy.GroundSteering'"),
     ],
 )
 def test_signals_that_are_none(signal: Signal, said: str) -> None:
