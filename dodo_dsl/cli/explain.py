@@ -91,8 +91,7 @@ def _services(one: Explanation) -> str:
 
 
 def _wiring(one: Explanation) -> str:
-    rows = [[_port(line), ", ".join(line.says) or _producers(line, one), "->", ", ".join(line.hears) or _consumers(line)]
-            for line in one.wiring]  # fmt: skip
+    rows = [[_port(line), _producers(line, one), "->", _consumers(line)] for line in one.wiring]
     parts = ["producers and consumers\n" + _table(rows, "  ")]
     for title, required in (("the application must provide", True), ("the application may provide", False)):
         asked = [a for a in one.asked if a.required is required]
@@ -109,11 +108,12 @@ def _port(line: Line | Asked) -> str:
 
 
 def _consumers(line: Line) -> str:
-    return "any reader" if line.kind == "memory" else "no consumer"
+    return ", ".join(line.hears) or ("any reader" if line.kind == "memory" else "no consumer")
 
 
 def _producers(line: Line, one: Explanation) -> str:
-    return "the application" if any(line.port == a.port for a in one.asked) else "no producer"
+    is_asked = any(line.port == a.port for a in one.asked)
+    return ", ".join(line.says) or ("the application" if is_asked else "no producer")
 
 
 def _declared(asked: Asked, one: Explanation) -> str:
