@@ -1,0 +1,58 @@
+"""``dodo rig`` without a rig; with one it is tested where rigs run."""
+
+import argparse
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.cli.main import main
+from dodo_dsl.cli.rig import command
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def rig(*words: str) -> tuple[int, str, str]:
+    stdout, stderr = StringIO(), StringIO()
+    return main(["rig", *words], stdout, stderr), stdout.getvalue(), stderr.getvalue()
+
+
+def test_without_rigs_the_emulated_one_is_named() -> None:
+    said = "dodo.yml has no rigs; every machine has 'emulated': dodo rig status emulated\n"
+    assert rig("status") == (0, said, "")
+    assert rig("status", "--json") == (0, "[]\n", "")
+
+
+def test_an_unknown_rig_and_those_that_are_known(folder: Path) -> None:
+    (folder / "dodo.yml").write_text("dodo: 1\nrigs: {desk: {kind: static, cid: 120, camera: {source: a.png}}}\n")
+    assert rig("home", "dask") == (2, "", "dodo rig: there is no rig 'dask', expected one of emulated, desk\n")
+    assert rig("home", "desk") == (2, "", "dodo rig: rig 'desk' has no serial port, so it cannot move\n")
+
+
+def test_a_deployment_with_errors_is_shown_with_all_of_them(folder: Path) -> None:
+    (folder / "dodo.yml").write_text("dodo: 1\nrigs: {desk: {kind: stattic}}\ngates: 1\n")
+    code, out, err = rig("status")
+    assert (code, out, err.splitlines()[0]) == (2, "", "dodo rig: dodo.yml has problems:")
+    assert err.count("error[") >= 2 and not err.endswith("\n\n")
+
+
+def test_a_result_in_words() -> None:
+    result = {"rig": "desk", "quarantine": "", "says": "ready", "x": 0.1, "y": -0.25, "yaw": 90.0}
+    assert command._sentence(result) == "desk: ready, x = 0.100 m, y = -0.250 m, yaw = 90.0 degrees"
+    assert command._sentence({**result, "x": None}) == "desk: ready"
+    assert command._sentence({"rig": "desk", "quarantine": ""}) == "desk: not in quarantine"
+    broken = {"rig": "desk", "quarantine": "belt", "error": "no answer"}
+    assert command._sentence(broken) == "desk: no answer; in quarantine: belt; 'dodo rig clear desk' ends it"
+
+
+@pytest.mark.parametrize("action", [*command.ACTIONS, "truth"])
+def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = argparse.ArgumentParser(prog="dodo rig")
+    command.add(parser)
+    with pytest.raises(SystemExit, match="0"):
+        parser.parse_args([action, "--help"])
+    assert "--wait S" in capsys.readouterr().out
