@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -82,6 +82,11 @@ class Hardware:
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
 
+    def now(self) -> float:
+        """The rig's time, in s, once it has done all that it was ordered; ``ramps`` begins anew."""
+        self.ramps()
+        return self.poses[-1].t
+
     def ramps(self) -> list[float]:
         """The largest acceleration of each axis (m/s2, m/s2, rad/s2) since the last order `extremes`."""
         known = len(self._extremes)
@@ -112,6 +117,7 @@ class Run:
     folder: Path
     rig: Hardware
     runner: "subprocess.Popen[str]"
+    found: dict[str, int] = field(default_factory=dict)
 
     def processes(self) -> Iterator[Path]:
         """All of this very run; a service that was forked has the runner's variables."""
@@ -122,11 +128,13 @@ class Run:
                     yield entry
 
     def find(self, module: str) -> int:
-        """The one process that was started to run a module."""
+        """The one process that was started to run a module; from the second time on without a look."""
+        if module in self.found:
+            return self.found[module]
         for entry in self.processes():
             with contextlib.suppress(OSError):
                 if module.encode() in (entry / "cmdline").read_bytes().split(b"\0"):
-                    return int(entry.name)
+                    return self.found.setdefault(module, int(entry.name))
         raise AssertionError(f"no process {module}")
 
     def kill(self, word: str, number: signal.Signals = signal.SIGKILL) -> None:
@@ -169,7 +177,12 @@ def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
         runner.communicate()
 
 
+def at_its_start(rig: Hardware) -> Pose:
+    """The pose at which it stands and waits for the drive."""
+    return rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 120)
+
+
 def on_its_way(rig: Hardware) -> Pose:
     """The pose at which it drives, after it has stood at its start."""
-    rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 120)
+    at_its_start(rig)
     return rig.until(lambda pose: pose.vx > 0.2, 120)

@@ -6,25 +6,52 @@ the test's own, so that it goes on when those who use it are killed.
 
 import itertools
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import pytest
 
 from services.gantry.rig_table import ACCELERATION
 from tests.drive.applications import results
-from tests.drive.rig import REST, Hardware, Pose, Run, on_its_way, running
+from tests.drive.rig import REST, Hardware, Pose, Run, at_its_start, on_its_way, running
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("unplugged")]
 
 BEGIN, AT_ONCE, REST_YAW = 0.55, 0.1, 0.05
 """s until braking begins, s in which a rig without current stands, rad/s below which it does (rotors swing)."""
 SLACK = 0.05
-"""s that this machine may be late with what it does and sees."""
+"""s that an idle machine may be late with what it does and sees."""
+CHAIN = 3
+"""Programs, one after the other, through which a fault gets to the rig; each may be as late as this one is."""
+
+
+class Lateness:
+    """How much too late this machine has woken a program that slept, at worst and in s, while it is entered."""
+
+    def __init__(self) -> None:
+        self.worst = 0.0
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._sleep)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _sleep(self) -> None:
+        while not self._over.is_set():
+            begin = time.monotonic()
+            time.sleep(0.002)
+            self.worst = max(self.worst, time.monotonic() - begin - 0.002)
 
 
 def unplug(run: Run) -> None:
@@ -43,77 +70,86 @@ def reset(run: Run) -> None:
     run.rig.order("reset")
 
 
-def kill_gantry(run: Run) -> None:
-    run.kill("services.gantry")
+def kill(run: Run, module: str) -> None:
+    run.kill(module)
 
 
-def stop_gantry(run: Run) -> None:
-    run.kill("services.gantry", signal.SIGSTOP)
-
-
-def kill_model(run: Run) -> None:
-    run.kill("services.dynamic_model")
-
-
-def stop_model(run: Run) -> None:
-    run.kill("services.dynamic_model", signal.SIGSTOP)
-
-
-def kill_sandbox(run: Run) -> None:
-    run.kill("dodo_dsl.run.process.sandbox")
+def stop(run: Run, module: str) -> None:
+    run.kill(module, signal.SIGSTOP)
 
 
 def kill_runner(run: Run) -> None:
     run.runner.kill()
 
 
+GANTRY, MODEL, SANDBOX = "services.gantry", "services.dynamic_model", "dodo_dsl.run.process.sandbox"
+
+
 @dataclass(frozen=True)
 class Way:
     """What is done, and what is said then; a killed runner says nothing."""
 
+    name: str
     pull: Callable[[Run], None]
     reason: str
     isolation: str = "host"
     """As on a real rig."""
     begin: float = BEGIN
     """s until braking begins, or the rig stands."""
+    module: str = ""
+    """The program that it is done to."""
+
+
+def killed(name: str, module: str, reason: str) -> Way:
+    return Way(name, partial(kill, module=module), reason, module=module)
+
+
+def stopped(name: str, module: str, reason: str) -> Way:
+    return Way(name, partial(stop, module=module), reason, module=module)
 
 
 WAYS = (
-    Way(unplug, "is lost: "),
-    Way(unplug_with_power, "is lost: ", begin=AT_ONCE),
-    Way(kill_rig, "is lost: "),
-    Way(reset, "RESTARTED"),
-    Way(kill_gantry, "service 'pose' of layer action was killed by SIGKILL"),
-    Way(stop_gantry, "no Frame of the vehicle has come for 2 s"),
-    Way(kill_model, "service 'vehicle' of layer action was killed by SIGKILL"),
-    Way(stop_model, "no KinematicState of the vehicle has come for 1 s"),
-    Way(kill_sandbox, "the test's sandbox ended unexpectedly"),
-    Way(kill_runner, ""),
-    Way(kill_runner, "", isolation="network"),
+    Way("unplug", unplug, "is lost: "),
+    Way("unplug_with_power", unplug_with_power, "is lost: ", begin=AT_ONCE),
+    Way("kill_rig", kill_rig, "is lost: "),
+    Way("reset", reset, "RESTARTED"),
+    killed("kill_gantry", GANTRY, "service 'pose' of layer action was killed by SIGKILL"),
+    stopped("stop_gantry", GANTRY, "no Frame of the vehicle has come for 2 s"),
+    killed("kill_model", MODEL, "service 'vehicle' of layer action was killed by SIGKILL"),
+    stopped("stop_model", MODEL, "no KinematicState of the vehicle has come for 1 s"),
+    killed("kill_sandbox", SANDBOX, "the test's sandbox ended unexpectedly"),
+    Way("kill_runner", kill_runner, ""),
+    Way("kill_runner", kill_runner, "", isolation="network"),
 )
 
 
-def brakes(before: Pose, poses: list[Pose], begin: float) -> None:
-    """From ``begin`` s on it gets only slower, and it stands v / a later."""
-    first = next(pose for pose in poses if pose.t >= before.t + begin + SLACK)
+def brakes(at: float, poses: list[Pose], begin: float, slack: float) -> None:
+    """From ``begin`` s after ``at`` on it gets only slower, and it stands v / a later."""
+    first = next(pose for pose in poses if pose.t >= at + begin + slack)
     for axis in ("vx", "vy"):
         speeds = [abs(getattr(pose, axis)) for pose in poses if pose.t >= first.t]
         assert all(after <= speed + 0.01 for speed, after in itertools.pairwise(speeds)), axis
     rests = max(first.speed / ACCELERATION["x"], abs(first.vyaw) / ACCELERATION["yaw"])
-    last = next(pose for pose in poses if pose.t >= first.t + rests + SLACK)
-    assert abs(last.vyaw) < REST_YAW
-    assert last.speed < REST and (begin == BEGIN or first.speed < REST), (before, first, last)
+    last = next(pose for pose in poses if pose.t >= first.t + rests + slack)
+    assert abs(last.vyaw) < REST_YAW, (at, first, last, slack)
+    assert last.speed < REST and (begin == BEGIN or first.speed < REST), (at, first, last, slack)
 
 
-def pulled(run: Run, way: Way) -> tuple[Pose, list[Pose]]:
-    """The pose at which the plug was pulled, and those of the time in which the rig has to come to rest."""
-    before = on_its_way(run.rig)
-    seen = len(run.rig.poses)
-    way.pull(run)
-    if way.pull is not kill_rig:
-        run.rig.until(lambda pose: pose.t > before.t + BEGIN + 1.5, 60)
-    return before, run.rig.poses[seen - 1 :]
+def pull_the_plug(run: Run, way: Way) -> None:
+    """Pull it as the rig drives, and see it come to rest in its own time."""
+    at_its_start(run.rig)
+    if way.module:
+        run.find(way.module)
+    on_its_way(run.rig)
+    with Lateness() as lateness:
+        way.pull(run)
+        if way.pull is kill_rig:
+            return
+        at, seen = run.rig.now(), len(run.rig.poses)
+        run.rig.until(lambda pose: pose.t > at + BEGIN, 60)
+    slack = SLACK + CHAIN * lateness.worst
+    run.rig.until(lambda pose: pose.t > at + BEGIN + 2 * slack + 1.5, 60)
+    brakes(at, run.rig.poses[seen - 1 :], way.begin, slack)
 
 
 def judged(run: Run) -> dict[str, Any]:
@@ -140,16 +176,14 @@ def tries(
         yield {way: pool.submit(tried, tmp_path_factory.mktemp("way"), way) for way in asked}
 
 
-@pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way.pull.__name__}-{way.isolation}")
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way.name}-{way.isolation}")
 def test_the_outcome_is_error_and_the_rig_comes_to_rest(tries: dict[Way, "Future[None]"], way: Way) -> None:
     tries[way].result()
 
 
 def tried(folder: Path, way: Way) -> None:
     with Hardware(folder / "port") as rig, running(folder, rig, way.isolation) as run:
-        before, poses = pulled(run, way)
-        if way.pull is not kill_rig:
-            brakes(before, poses, way.begin)
+        pull_the_plug(run, way)
         if way.reason:
             test = judged(run)
             assert test["outcome"] == "error"
