@@ -65,7 +65,7 @@ format:
 
 goldens:
 	@scripts/setup dev
-	.venv/bin/pytest -q tests/compiler --update-goldens
+	.venv/bin/pytest -q tests/application tests/check tests/emit --update-goldens
 
 schema:
 	@scripts/setup dev

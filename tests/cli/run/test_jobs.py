@@ -12,7 +12,7 @@ from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.backends import Job
 from dodo_dsl.spec.deployment import Deployment
-from tests.compiler import examples
+from tests.check import examples
 
 LOCKSTEP_ONLY = """\
 clock: lockstep

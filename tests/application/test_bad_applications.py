@@ -1,0 +1,28 @@
+"""Each bad application is a pair of files: the compose file, and the text about its problems."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.application.read import read_application
+from dodo_dsl.diagnostics import format_text, ordered
+
+FOLDER = Path(__file__).parent / "bad"
+CASES = sorted(p.stem for p in FOLDER.glob("*.yml"))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_diagnostics(case: str, monkeypatch: pytest.MonkeyPatch, update_goldens: bool) -> None:
+    monkeypatch.chdir(FOLDER)
+    source, problems = read_application(Path(f"{case}.yml"))
+    text = format_text(ordered(problems))
+    expected = FOLDER / f"{case}.out"
+    if update_goldens:
+        expected.write_text(text)
+    assert text == expected.read_text()
+    assert text
+    assert (source is None) == any(p.severity == "error" for p in problems)
+
+
+def test_every_expectation_has_its_file() -> None:
+    assert sorted(p.stem for p in FOLDER.glob("*.out")) == CASES

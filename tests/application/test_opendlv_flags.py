@@ -1,0 +1,93 @@
+"""Flags in commands: split as compose does, with a test's CID and memories."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dodo_dsl.application import opendlv_flags
+from dodo_dsl.run.process.environment import interpolate
+from tests.application.composed import config
+
+COMMANDS = {
+    "--cid=111 --name=video0.argb": ["--cid=111", "--name=video0.argb"],
+    r"""prog a\tb "c\td\e" 'x\y' --x="1 2"y "" end""": ["prog", "atb", "ctde", r"x\y", "--x=1 2y", "", "end"],
+    "one --two=${A:-${B:-x}} $A ${C:-c d}e $$A '$$A'": ["one", "--two=a", "a", "ce", "$A", "$A"],
+    r"nice -n -5 /usr/bin/camera --camera=http://host/video.cgi\\?channel=0": [
+        *("nice", "-n", "-5", "/usr/bin/camera"),
+        r"--camera=http://host/video.cgi\?channel=0",
+    ],
+    'sh -c "prog --cid=111 && other; last" more': ["sh", "-c", "prog --cid=111 && other; last", "more"],
+    "prog > file": ["prog"],
+    "  spaces   around\tand tabs  ": ["spaces", "around", "and", "tabs"],
+    "first\nsecond": ["first", "second"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands_are_split(command: str) -> None:
+    assert [interpolate(word, {"A": "a", "C": "c"}) for word in opendlv_flags.split(command)] == COMMANDS[command]
+
+
+@pytest.mark.slow
+def test_compose_splits_them_equally(tmp_path: Path) -> None:
+    services = {f"s{n}": {"image": "x", "command": command} for n, command in enumerate(COMMANDS)}
+    (tmp_path / "c.yml").write_text(yaml.safe_dump({"services": services}))
+    (tmp_path / ".env").write_text("A=a\nC=c\n")
+    found = config(tmp_path, "-f", "c.yml")
+    words = [[word.replace("$$", "$") for word in found[name]["command"]] for name in services]
+    assert words == list(COMMANDS.values())
+
+
+@pytest.mark.parametrize("command", ["prog 'open", 'prog "open', "(prog)"])
+def test_what_is_no_command_is_refused(command: str) -> None:
+    with pytest.raises(ValueError, match=r"quotation mark|parenthesis"):
+        opendlv_flags.split(command)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("--cid=${CID:-${X:-3}} -v", "--cid=140 -v"),
+        ('sh -c "p --cid=111;x --cid 5 && q --cid --verbose"', 'sh -c "p --cid=140;x --cid 140 && q --cid --verbose"'),
+        ('--cid="111" a', "--cid=140 a"),
+        (r"\"--cid=111\" --cid=\"111\"", r"\"--cid=140\" --cid=140"),
+        ("--cid=$$(cat /cid) x", "--cid=140 x"),
+        ("--cid-file=3 x--cid=4 --cidr=2", "--cid-file=3 x--cid=4 --cidr=2"),
+        ("--cid= --verbose", "--cid=140 --verbose"),
+        ("(prog --cid=$CID)", "(prog --cid=140)"),
+    ],
+)
+def test_cid_in_strings(text: str, expected: str) -> None:
+    assert opendlv_flags.with_cid_text(text, 140) == expected
+
+
+def test_cid_and_memories_in_words() -> None:
+    words = ("--cid", "111", "--cid=3", "--name=/video0.argb", "--name.i420=video0.i420", "--named=x", "cid=4")
+    assert opendlv_flags.with_cid(words, 150) == ("--cid", "150", "--cid=150", *words[3:])
+    assert opendlv_flags.with_memory_prefix(words, "p-")[3:] == (
+        "--name=/p-video0.argb",
+        "--name.i420=p-video0.i420",
+        *words[5:],
+    )
+    shell = ("sh", "-c", "run --cid=111 --verbose")
+    assert opendlv_flags.with_cid(shell, 150) == ("sh", "-c", "run --cid=150 --verbose")
+
+
+@pytest.mark.parametrize(
+    ("words", "variables", "expected"),
+    [
+        (["prog", "--cid=1"], {}, True),
+        (["prog", "--cid", "1"], {}, True),
+        (["sh", "-c", "prog $OD4SESSION_CID"], {}, True),
+        (["prog"], {"CID": None}, True),
+        (["prog", "--cidr=1"], {"ACID": "1"}, False),
+    ],
+)
+def test_where_a_cid_can_be_set(words: list[str], variables: dict[str, object], expected: bool) -> None:
+    assert opendlv_flags.takes_cid(words, variables) is expected
+
+
+def test_where_a_memory_is_named() -> None:
+    assert opendlv_flags.takes_memory(["prog", "--name.i420=video0.i420"])
+    assert not opendlv_flags.takes_memory(["prog", "--name=", "--names=x"])

@@ -1,0 +1,93 @@
+"""Compose files of many styles, rewritten as the goldens have it and accepted by compose as part of a test."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.application.read import read_application
+from dodo_dsl.diagnostics import format_text
+from dodo_dsl.emit.render import render_plan
+from dodo_dsl.plan.model import Plan, Service
+from dodo_dsl.plan.plan_json import from_json, to_json
+from dodo_dsl.plan.rewrite.rewrite import plan_application
+from tests.emit.readers import compose
+
+FOLDER = Path(__file__).parent
+STYLES = sorted(p.name for p in (FOLDER / "good").iterdir())
+WAYS = ("network", "host", "hil")
+
+
+def files(folder: Path) -> list[Path]:
+    """The files that ``docker compose -f`` would be given."""
+    return sorted(p for p in folder.iterdir() if p.suffix in (".yml", ".yaml"))[::-1]
+
+
+def plan(folder: Path, way: str, out: Path) -> tuple[Plan, str]:
+    """The Plan of a test with the application in a folder, and the text about its problems."""
+    source, problems = read_application(files(folder))
+    assert source is not None, format_text(problems)
+    hil = way == "hil"
+    isolation = "network" if way == "network" else "host"
+    application = plan_application(source, 140, isolation, out, ("judge-of-test",), hil=hil, privileged_allowed=hil)
+    judge = Service("evaluation", "judge-of-test", "collision", "dodo/collision:1", (), (), True)
+    subnet = "10.213.0.0/28" if way == "network" else ""
+    common = (
+        "",
+        "hil" if hil else "sil",
+        "closed-loop",
+        10.0,
+        "realtime",
+        isolation,
+        1,
+        140,
+        subnet,
+        "sil",
+        "dodo/sandbox:1",
+    )
+    return Plan("t", "t", "t.dodo.yml", *common, (judge,), application), format_text(problems)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("style", STYLES)
+def test_goldens(style: str, way: str, monkeypatch: pytest.MonkeyPatch, update_goldens: bool) -> None:
+    monkeypatch.chdir(FOLDER / "good" / style)
+    made, said = plan(Path(), way, Path("../../generated/t").resolve())
+    texts = {file.path: file.text for file in render_plan(made)}
+    variables = "".join(f"# .env: {line}\n" for line in texts["t/.env"].splitlines()[3:])
+    text = texts["t/application.compose.yml"] + variables + "".join(f"# {line}\n" for line in said.splitlines())
+    golden = FOLDER / "golden" / f"{style}.{way}.yml"
+    if update_goldens:
+        golden.write_text(text)
+    assert text == golden.read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("style", STYLES)
+def test_compose_accepts_them(style: str, tmp_path: Path) -> None:
+    command = compose()
+    shutil.copytree(FOLDER / "good", tmp_path / "team")
+    for way in WAYS:
+        made, _ = plan(tmp_path / "team" / style, way, tmp_path / "generated" / way / "t")
+        for file in render_plan(made):
+            path = tmp_path / "generated" / way / file.path
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(file.text)
+        folder = tmp_path / "generated" / way / "t"
+        result = subprocess.run([*command, "config", "-q"], cwd=folder, capture_output=True, text=True, check=False)
+        unset = [line for line in result.stderr.splitlines() if "variable is not set" not in line]
+        assert (result.returncode, unset) == (0, []), way
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_plans_survive_their_file(style: str, tmp_path: Path) -> None:
+    made, _ = plan(FOLDER / "good" / style, "network", tmp_path)
+    text = to_json(made)
+    assert to_json(from_json(text)) == text
+    assert from_json(text).application == made.application
+
+
+def test_every_golden_has_its_style() -> None:
+    names = {f"{style}.{way}.yml" for style in STYLES for way in WAYS}
+    assert {p.name for p in (FOLDER / "golden").iterdir()} == names

@@ -1,0 +1,57 @@
+"""GitLab, the compose specification and compose itself accept the compiled registry."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.plan.plan_json import from_json
+from tests.emit.readers import check_schema, compose, first_instances
+
+pytestmark = pytest.mark.slow
+
+
+def test_gitlab_accepts_the_child_pipeline(generated: Path) -> None:
+    transform = ("--builtin-schema", "vendor.gitlab-ci", "--data-transform", "gitlab-ci")
+    check_schema(*transform, str(generated / "child.gitlab-ci.yml"))
+
+
+def test_the_compose_specification_accepts_every_layer(generated: Path) -> None:
+    layers = [str(layer) for folder in first_instances(generated) for layer in sorted(folder.glob("*.compose.yml"))]
+    check_schema("--builtin-schema", "vendor.compose-spec", *layers)
+
+
+def test_compose_accepts_every_test(generated: Path) -> None:
+    for folder in first_instances(generated):
+        result = subprocess.run([*compose(), "config", "-q"], cwd=folder, capture_output=True, text=True, check=False)
+        assert (result.returncode, result.stderr) == (0, ""), folder.name
+
+
+def assert_one_project(folder: Path) -> None:
+    """Compose sees one project with all services of the test, isolated and with its CID."""
+    result = subprocess.run([*compose(), "config", "--format", "json"], cwd=folder, capture_output=True, check=True)
+    project = json.loads(result.stdout)
+    plan = from_json((folder / "test.json").read_text())
+    expected = {"sandbox", *(s.name for s in plan.services), *(s.name for s in plan.application.services)}
+    assert project["name"] == f"dodo-{folder.name}"
+    assert set(project["services"]) == expected
+    for name, service in project["services"].items():
+        assert "network_mode" not in service, name
+        assert service["ipc"] == ("shareable" if name == "sandbox" else "service:sandbox")
+        assert any(f"--cid={plan.cid}" in word for word in service["command"]) or name == "sandbox"
+
+
+def test_compose_sees_one_project_with_all_services(generated: Path) -> None:
+    assert_one_project(generated / "sil-closed-straight")
+
+
+@pytest.mark.parametrize("name", ["docker-compose.yml", "compose.yaml"])
+def test_compose_sees_the_test_whatever_is_above_it(generated: Path, name: str) -> None:
+    """Compose looks for a file in all folders above, and takes one before it reads the test's ``.env``."""
+    foreign = generated.parent / name
+    foreign.write_text("services: {stranger: {image: stranger, network_mode: host}}\n")
+    try:
+        assert_one_project(generated / "sil-closed-straight")
+    finally:
+        foreign.unlink()

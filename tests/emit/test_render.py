@@ -1,0 +1,52 @@
+"""Compiled output: equal to the goldens, and the same for any folder and hash seed."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl import compiler
+from dodo_dsl.emit.pipeline import CHILD
+from dodo_dsl.emit.render import render_plan
+from tests.emit.readers import ROOT, tree
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    checked = compiler.load([])
+    made = compiler.plan(checked, Path("generated"))
+    assert not made.problems
+    first = {plan.spec: plan.slug for plan in reversed(made.compiled.suite.plans)}  # one instance of a matrix
+    plans = [plan for plan in made.compiled.suite.plans if first[plan.spec] == plan.slug]
+    files = {file.path: file.text for plan in plans for file in render_plan(plan)} | {CHILD: made.pipeline.text}
+    if update_goldens:
+        shutil.rmtree(GOLDEN, ignore_errors=True)
+        for path, text in files.items():
+            (GOLDEN / path).parent.mkdir(parents=True, exist_ok=True)
+            (GOLDEN / path).write_text(text)
+    golden = {p.relative_to(GOLDEN).as_posix(): p.read_text() for p in GOLDEN.rglob("*") if p.is_file()}
+    assert files == golden
+
+
+@pytest.mark.slow
+def test_output_is_the_same_for_any_hash_seed_and_folder(generated: Path, tmp_path: Path) -> None:
+    """Against the output of this process, whose hash seed is another one."""
+    place = tmp_path / "deeper" / "b"
+    shutil.copytree(generated.parent, place, ignore=shutil.ignore_patterns("generated"))
+    for seed in ("1", "2"):
+        shutil.rmtree(place / "generated", ignore_errors=True)
+        environment = {**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)}
+        subprocess.run([sys.executable, "-m", "dodo_dsl", "compile"], cwd=place, env=environment, check=True)
+        assert tree(place / "generated") == tree(generated)
+
+
+def test_no_absolute_path_and_nothing_temporary(generated: Path) -> None:
+    for name, content in tree(generated).items():
+        assert str(generated.parent).encode() not in content, name
+    hidden = {path.name for path in generated.rglob(".*")}
+    assert hidden == {".env"}

@@ -1,0 +1,88 @@
+"""The application's compose file in a test: what is rewritten, and what stays."""
+
+from pathlib import Path
+
+from dodo_dsl.application.read import read_application
+from dodo_dsl.plan.model import Application
+from dodo_dsl.plan.rewrite.rewrite import plan_application
+
+COMPOSE = """\
+version: "3.6"
+services:
+  perception:
+    build: .
+    container_name: perception
+    network_mode: "host"
+    ipc: "host"
+    restart: always
+    volumes:
+      - /tmp:/tmp
+      - ./weights:/weights:ro
+    command: "--cid=111 --name=video0.argb --threshold=${THRESHOLD:-3}"
+    x-dodo-process: [python, perception.py]
+    x-dodo: {in: [], out: [opendlv.logic.perception.DetectionType]}
+  steering:
+    image: registry.example.org/team/steering:latest
+    network_mode: host
+    environment:
+      - OD4SESSION_CID=111
+      - GAIN=2
+    depends_on: [perception]
+    ports: ["8081:8081"]
+"""
+
+
+def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> Application:
+    folder = tmp_path / "team"
+    folder.mkdir()
+    (folder / "docker-compose.yml").write_text(text)
+    (folder / "perception.py").touch()
+    source, problems = read_application(folder / "docker-compose.yml")
+    assert problems == []
+    assert source is not None
+    return plan_application(source, 140, isolation, tmp_path / "generated" / "my-test", ("track",))
+
+
+def test_own_network(tmp_path: Path) -> None:
+    application = planned(tmp_path)
+    waits = {"sandbox": {"condition": "service_started"}, "track": {"condition": "service_healthy"}}
+    assert application.folder == "../../team"
+    assert application.compose == {
+        "services": {
+            "perception": {
+                "build": "../../team",
+                "image": "${DODO_IMAGE_PERCEPTION:-}",
+                "ipc": "service:sandbox",
+                "volumes": ["tmp:/tmp:nocopy", "../../team/weights:/weights:ro"],
+                "command": "--cid=140 --name=video0.argb --threshold=${THRESHOLD:-3}",
+                "depends_on": waits,
+            },
+            "steering": {
+                "image": "${DODO_IMAGE_STEERING:-registry.example.org/team/steering:latest}",
+                "environment": ["OD4SESSION_CID=140", "GAIN=2"],
+                "depends_on": {"perception": {"condition": "service_started"}, **waits},
+                "ipc": "service:sandbox",
+            },
+        }
+    }
+    assert "perception: --cid=140" in application.changes
+    assert "steering: OD4SESSION_CID=140" in application.changes
+    assert "steering: ports removed, tests publish none" in application.changes
+
+
+def test_host_network_keeps_what_is_host(tmp_path: Path) -> None:
+    perception = planned(tmp_path, isolation="host").compose["services"]["perception"]
+    assert perception["network_mode"] == "host"
+    assert perception["ipc"] == "host"
+    assert "/tmp:/tmp" in perception["volumes"]
+    assert perception["depends_on"] == {"track": {"condition": "service_healthy"}}
+
+
+def test_processes(tmp_path: Path) -> None:
+    perception, steering = planned(tmp_path).services
+    assert perception.process == ("python", "perception.py")
+    assert perception.command == ("--cid=140", "--name=video0.argb", "--threshold=${THRESHOLD:-3}")
+    assert (perception.takes_cid, perception.takes_memory) == (True, True)
+    assert steering.process is None
+    assert (steering.takes_cid, steering.takes_memory) == (True, False)
+    assert steering.environment == {"OD4SESSION_CID": "140", "GAIN": "2"}
