@@ -5,7 +5,6 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import source
 from tests.emit.readers import compose
 
 
@@ -15,11 +14,3 @@ def config(folder: Path, *words: str) -> Any:
     result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
     return json.loads(result.stdout)["services"]
-
-
-def node(text: str) -> source.Mapping:
-    """A mapping from YAML."""
-    found, problems = source.parse(text, "docker-compose.yml")
-    assert isinstance(found, source.Mapping)
-    assert problems == []
-    return found

@@ -4,7 +4,7 @@ import pytest
 
 from dodo_dsl.application.compose_paths import is_path, mapped_rest, mapped_service, rebased
 from dodo_dsl.source import plain
-from tests.application.composed import node
+from tests.source.nodes import mapping
 
 
 @pytest.mark.parametrize(
@@ -52,11 +52,11 @@ def test_paths_from_another_folder(path: str, expected: str) -> None:
     ],
 )
 def test_paths_of_a_service(written: str, expected: object) -> None:
-    assert plain(mapped_service(node(written), lambda path: f"<{path}>")) == expected
+    assert plain(mapped_service(mapping(written), lambda path: f"<{path}>")) == expected
 
 
 def test_paths_at_the_top_level() -> None:
-    document = node(
+    document = mapping(
         "secrets: {s: {file: a}}\n"
         "volumes: {v: {driver_opts: {o: bind, device: b}}, w: {driver_opts: {o: size=1m, device: c}}}\n"
         "networks: {n: {file: d}}\n"

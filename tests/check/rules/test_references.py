@@ -1,0 +1,52 @@
+"""Entries of files that values name, and timeouts that evaluators need."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.check.rules.references import check
+from tests.check.contexts import context, found
+
+GOAL = "evaluation: {track: {uses: collision, with: {goal: finnish}}}\n"
+
+
+def test_an_entry_that_is_missing(tmp_path: Path) -> None:
+    (problem,) = check(context(GOAL, tmp_path))
+    assert (problem.rule, problem.message) == ("unknown-name", "'finnish' is not among the obstacles of plain/map.json")
+    assert problem.hint == "did you mean 'finish'?"
+
+
+def test_each_entry_of_a_list(tmp_path: Path) -> None:
+    example = "evaluation: {track: {uses: collision, with: {goal: finish, walls: [a, finish, b]}}}\n"
+    assert [message.split("'")[1] for _, message in found(check, example, tmp_path)] == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{", "not JSON: "),
+        ("[]", "expected an object with a list 'obstacles'"),
+        ('{"obstacles": 3}', "expected an object with a list 'obstacles'"),
+        ("[" * 100_000, "not JSON: "),
+    ],
+)
+def test_a_file_that_has_no_entries(content: str, message: str, tmp_path: Path) -> None:
+    ((rule, found_message),) = found(check, f"{GOAL}# tests/maps/plain/map.json\n{content}\n", tmp_path)
+    assert rule == "wrong-file"
+    assert found_message.startswith(f"plain/map.json: {message}")
+
+
+def test_a_file_of_another_map(tmp_path: Path) -> None:
+    other = json.dumps({"obstacles": [{"name": "finnish"}, {"other": 1}]})
+    assert found(check, f"{GOAL}# tests/maps/plain/map.json\n{other}\n", tmp_path) == []
+
+
+@pytest.mark.parametrize(("timeout", "rules"), [("40 s", ["short-timeout"]), ("1 min", [])])
+def test_a_timeout_shorter_than_an_evaluator_waits(timeout: str, rules: list[str], tmp_path: Path) -> None:
+    example = (
+        f"timeout: {timeout}\nevaluation: {{track: {{uses: collision, with: {{goal: finish, max-time: 40 s}}}}}}\n"
+    )
+    problems = list(check(context(example, tmp_path)))
+    assert [problem.rule for problem in problems] == rules
+    assert all(problem.severity == "warning" for problem in problems)

@@ -1,0 +1,72 @@
+"""Ports of services and of the application, and who produces what."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.application.model import Declared
+from dodo_dsl.check.wiring import ANYTHING, Port, message, wire
+from dodo_dsl.diagnostics import Span
+from tests.check.contexts import resolved
+
+HERE = Span("x.yml")
+
+
+@pytest.mark.parametrize(
+    ("consumer", "producer", "expected"),
+    [
+        (("a.B", None), ("a.B", 3), True),
+        (("a.B", 3), ("a.B", 3), True),
+        (("a.B", 3), ("a.B", None), True),
+        (("a.B", 3), ("a.B", 4), False),
+        (("a.B", None), ("a.C", None), False),
+        (("a.B", 3), (ANYTHING, None), True),
+    ],
+)
+def test_what_a_port_consumes(
+    consumer: tuple[str, int | None], producer: tuple[str, int | None], expected: bool
+) -> None:
+    assert Port("message", *consumer).consumes(Port("message", *producer)) is expected
+
+
+def test_memories_are_not_messages() -> None:
+    assert not Port("memory", "a.B").consumes(Port("message", "a.B"))
+
+
+def test_what_can_be_required_of_an_application() -> None:
+    assert message("opendlv.proxy.X", None).can_be_required
+    assert not message("opendlv.sim.Frame", None).can_be_required
+    assert Port("memory", "dodo.argb").can_be_required
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"), [("a.B", Port("message", "a.B", 7)), ("a.B/3", Port("message", "a.B", 3))]
+)
+def test_a_message_with_its_stamp(text: str, expected: Port) -> None:
+    assert message(text, 7) == expected
+    assert str(message("a.B/3", 0)) == "a.B/3"
+
+
+def test_a_test_without_application(tmp_path: Path) -> None:
+    wiring = wire(resolved("", tmp_path).services, None)
+    assert not wiring.has_application
+    assert {str(end.port) for end in wiring.produced if end.service == "camera"} == {"video0.argb", "video0.i420"}
+    assert [str(end.port) for end in wiring.produced if end.service == "pose"] == ["opendlv.sim.Frame/0"]
+    assert {str(end.port) for end in wiring.required() if end.port.can_be_required} == {
+        "opendlv.proxy.GroundSteeringRequest",
+        "opendlv.proxy.PedalPositionRequest",
+    }
+    assert wiring.application_may_produce(message("opendlv.proxy.Anything", None))
+
+
+def test_a_test_with_declarations(tmp_path: Path) -> None:
+    own = Declared((("a.In", HERE),), (("a.Out/2", HERE),), (("a.Out", HERE),), ("a.Done", HERE), 0, HERE)
+    wiring = wire(resolved("", tmp_path).services, {"driver": own})
+    assert [(end.layer, str(end.port)) for end in wiring.application_produces] == [("application", "a.Out/2")]
+    assert [str(end.port) for end in wiring.application_consumes] == ["a.In"]
+    assert ([str(end.port) for end in wiring.answers], wiring.done) == (["a.Out"], "a.Done")
+    assert wiring.application_may_produce(message("a.Out", None))
+    assert not wiring.application_may_produce(message("a.Other", None))
+    open_ended = wire((), {"driver": own, "eyes": None})
+    assert open_ended.undeclared == ("eyes",)
+    assert open_ended.application_may_produce(message("a.Other", None))
