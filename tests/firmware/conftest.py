@@ -12,8 +12,8 @@ from tests.firmware.programs import BUILT, ROOT, Bench, Rig
 
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 CLOSE = (-0.8, -0.6, -141.7)
-"""Near home (m, m, degrees), so that homing is short. x and y are whole electrical turns from it, so that no rotor stands
-exactly between two poles in the middle."""
+"""Near home (m, m, degrees), so that homing is short. x and y are whole electrical turns from it, so that no rotor
+stands exactly between two poles in the middle."""
 
 
 def _make(*targets: str) -> None:
