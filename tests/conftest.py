@@ -9,8 +9,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from tests.faults import Book
+
+settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("dodo")  # how fast a machine is decides no test
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

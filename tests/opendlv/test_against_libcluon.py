@@ -19,6 +19,8 @@ from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
 from dodo_dsl.opendlv.odvd.field_types import INTEGER_BITS, integer_range
 from dodo_dsl.opendlv.odvd.parser import Field, load
 
+pytestmark = pytest.mark.slow
+
 TOOLS = Path(sys.executable).parent
 FILES = {STANDARD: MessageSet.standard(), STANDARD_0_9: versions.load(versions.OLD)}
 each_file = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)

@@ -13,6 +13,8 @@ from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
 from tests.rec.conftest import BEGIN, dodo_rec, message, video
 
+pytestmark = pytest.mark.slow
+
 PATIENCE = 20.0
 
 

@@ -35,6 +35,7 @@ def ours(recording: Path, folder: Path, *words: str) -> dict[str, bytes]:
     return tables(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["track-1-2025-05-08.rec", "sim-2023-04-27.rec", "cones-2020-05-15.rec"])
 def test_recordings_of_others_as_libcluon_has_them(
     name: str, shared_data: Callable[[str], Path], tmp_path: Path
@@ -46,6 +47,7 @@ def test_recordings_of_others_as_libcluon_has_them(
         assert old[file] == text
 
 
+@pytest.mark.slow
 def test_every_message_unsorted_with_every_kind_of_number(tmp_path: Path) -> None:
     rng = random.Random(55)
     frames = []

@@ -26,11 +26,14 @@ entries = st.lists(
 )
 
 
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One file for all examples: a folder each would take most of the time."""
+    return tmp_path_factory.mktemp("truth") / "truth.json"
+
+
 @given(st.lists(marks, min_size=1, max_size=9))
-def test_what_is_written_is_read_here_and_by_the_evaluator(
-    tmp_path_factory: pytest.TempPathFactory, written: list[Mark]
-) -> None:
-    path = tmp_path_factory.mktemp("truth") / "truth.json"
+def test_what_is_written_is_read_here_and_by_the_evaluator(path: Path, written: list[Mark]) -> None:
     check(written, WIDTH, HEIGHT, ())
     path.write_text(text(written, "truth.png", WIDTH, HEIGHT))
     assert read(path, WIDTH, HEIGHT) == written
@@ -41,10 +44,7 @@ def test_what_is_written_is_read_here_and_by_the_evaluator(
 
 
 @given(st.fixed_dictionaries({}, optional={"images": entries, "categories": entries, "annotations": entries}) | values)
-def test_whatever_a_file_holds_is_refused_in_a_sentence(
-    tmp_path_factory: pytest.TempPathFactory, document: object
-) -> None:
-    path = tmp_path_factory.mktemp("truth") / "truth.json"
+def test_whatever_a_file_holds_is_refused_in_a_sentence(path: Path, document: object) -> None:
     path.write_text(json.dumps(document))
     with pytest.raises(TruthError, match=r"truth\.json: "):
         read(path, WIDTH, HEIGHT)

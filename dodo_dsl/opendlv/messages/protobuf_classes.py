@@ -98,9 +98,8 @@ class _Builder:
             self._pool.AddSerializedFile(file.SerializeToString())
             return message_factory.GetMessageClass(self._pool.FindMessageTypeByName(definition.name))
         except (TypeError, KeyError):
-            raise OdvdError(
-                f"{definition.place}: the name '{definition.name}' clashes with that of another message"
-            ) from None
+            clash = f"the name '{definition.name}' or the name of a field in it clashes with another"
+            raise OdvdError(f"{definition.place}: {clash}") from None
 
 
 def _field(field: Field, inner: Mapping[str, Layout]) -> "descriptor_pb2.FieldDescriptorProto":

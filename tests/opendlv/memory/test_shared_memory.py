@@ -82,6 +82,7 @@ def _die_while_locked(name: str) -> None:
     os._exit(0)
 
 
+@pytest.mark.slow
 def test_a_dead_holder_of_the_lock_holds_it_no_more(mode: str, memory_name: str) -> None:
     with SharedMemory.create(memory_name, 1) as memory:
         process = multiprocessing.get_context("spawn").Process(target=_die_while_locked, args=(memory_name,))
@@ -116,6 +117,7 @@ def _create_and_die(name: str) -> None:
     os._exit(0)
 
 
+@pytest.mark.slow
 def test_what_a_dead_creator_left_is_replaced(mode: str, memory_name: str) -> None:
     process = multiprocessing.get_context("spawn").Process(target=_create_and_die, args=(memory_name,))
     process.start()
@@ -201,6 +203,7 @@ def test_waiting_for_posix_memory_ends(memory_name: str) -> None:
     assert failures == [f"shared memory '{memory_name}' was removed by its creator"]
 
 
+@pytest.mark.slow
 def test_waiting_takes_no_processor_time(mode: str, memory_name: str) -> None:
     with SharedMemory.create(memory_name, 1) as memory:
         before = time.process_time()
@@ -241,6 +244,7 @@ def _wait_for_ever(name: str) -> None:
             memory.wait(None)
 
 
+@pytest.mark.slow
 def test_a_killed_reader_blocks_nobody(mode: str, memory_name: str) -> None:
     context = multiprocessing.get_context("spawn")
     with SharedMemory.create(memory_name, 1) as memory:

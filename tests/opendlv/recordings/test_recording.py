@@ -156,6 +156,7 @@ def test_rows_by_message_sender_and_time(tmp_path: Path) -> None:
         assert list(recording.envelopes(np.array([7, 2, 7]))) == [frames[7], frames[2], frames[7]]
 
 
+@pytest.mark.slow
 def test_frames_larger_than_a_batch(tmp_path: Path) -> None:
     frames = [Envelope(1055, os.urandom(1_000_000 * i), 1, 1, 9 - i, 0) for i in (15, 1, 9, 0)]
     with Recording(write(tmp_path, b"".join(map(encode_frame, frames)))) as recording:
@@ -193,6 +194,7 @@ print(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0])
 """
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_file(tmp_path: Path) -> None:
     frame = encode_frame(Envelope(1055, bytes(2_000_000), 1, 1, 1, 0))
     path = tmp_path / "large.rec"

@@ -1,0 +1,33 @@
+"""The end of a run in words."""
+
+from dataclasses import replace
+from io import StringIO
+
+from dodo_dsl.cli.run import summary
+from tests.report.test_write import OUTCOME
+
+PASSED = replace(OUTCOME, name="ok", slug="ok", outcome="passed", reason="reached it", setup_s=1.0, execution_s=2.25)
+
+
+def text(outcomes: list[object], tests: dict[str, str], skipped: tuple[str, ...] = ()) -> str:
+    stream = StringIO()
+    summary.write(stream, outcomes, tests, skipped)  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+def test_a_line_each_with_what_explains_it() -> None:
+    failed = replace(OUTCOME, notes=("a note",), last_lines=("the last\x1b",))
+    assert text([PASSED, failed], {"ok": "ok", "test": "test"}) == (
+        "\nPASSED  ok    reached it (set-up 1.0 s, ran 2.2 s)\n"
+        "FAILED  test  hit wall\n"
+        "        note: a note\n"
+        "        | the last�\n"
+        "\n1 passed, 1 failed, 0 in error\n"
+    )
+
+
+def test_repetitions_have_a_rate_and_skipped_tests_are_named() -> None:
+    again = replace(PASSED, slug="ok--run-2", outcome="failed")
+    shown = text([PASSED, again], {"ok": "ok", "ok--run-2": "ok"}, tuple("abcdef"))
+    assert "\nok: 1 of 2 passed (50.0%)\n" in shown
+    assert shown.endswith("6 tests not started: a, b, c, d, e ...\n")

@@ -1,0 +1,65 @@
+"""What lets a run reach its end: closed pipes and signals."""
+
+import io
+import os
+import resource
+import signal
+
+import pytest
+
+from dodo_dsl.cli.run.uninterrupted import (
+    UninterruptedStream,
+    more_descriptors,
+    stop_like_interrupt,
+    undisturbed,
+)
+
+
+def test_a_reader_that_leaves_ends_nothing() -> None:
+    reading, writing = os.pipe()
+    with os.fdopen(writing, "w") as pipe:
+        stream = UninterruptedStream(pipe)
+        assert stream.write("heard\n") == 6
+        stream.flush()
+        assert os.read(reading, 100) == b"heard\n"
+        os.close(reading)
+        for _ in range(3):
+            stream.write("unheard\n")
+            stream.writelines(["more\n", "lines\n"])
+            stream.flush()
+        assert stream.fileno() == pipe.fileno(), "all else is the stream's own"
+
+
+def test_a_stream_without_a_descriptor_may_break_too() -> None:
+    class Broken(io.StringIO):
+        def write(self, text: str) -> int:
+            raise BrokenPipeError
+
+    stream = UninterruptedStream(Broken())
+    assert stream.write("x") == 0
+    stream.flush()
+
+
+def test_signals_wait_until_results_are_written() -> None:
+    def interrupted() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with undisturbed():
+        interrupted()
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+
+
+def test_other_signals_stop_a_run_as_an_interrupt_does() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        stop_like_interrupt(signal.SIGTERM, None)
+
+
+def test_as_many_descriptors_as_are_allowed() -> None:
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(256, before[1]), before[1]))
+    try:
+        more_descriptors()
+        assert resource.getrlimit(resource.RLIMIT_NOFILE) == (before[1], before[1])
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)

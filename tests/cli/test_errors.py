@@ -1,0 +1,108 @@
+"""Every error of a command is one sentence with its name, and an exit code."""
+
+from argparse import Namespace
+from io import StringIO
+from pathlib import Path
+from typing import TextIO
+
+import pytest
+
+from dodo_dsl.cli import errors
+from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.main import COMMANDS, main
+from dodo_dsl.cli.selection import NoSuchTest
+from dodo_dsl.images.docker_command import DockerError
+from dodo_dsl.images.names import NoSuchImage
+from dodo_dsl.images.wheels import WheelsError
+from dodo_dsl.opendlv.bus.session import SessionError
+from dodo_dsl.opendlv.odvd.parser import OdvdError
+from dodo_dsl.opendlv.recordings.recording import RecordingError
+from dodo_dsl.plan.test_files import FilesError
+from dodo_dsl.rec.excerpt import NothingSelected
+from dodo_dsl.rec.outputs import OutputExists
+from dodo_dsl.rec.truth import TruthError
+from dodo_dsl.report.results import ResultsError
+from dodo_dsl.run.leases import LeaseTimeout
+from dodo_dsl.run.rigs.problems import RigProblem
+
+
+def ended(error: BaseException, monkeypatch: pytest.MonkeyPatch, command: str = "list") -> tuple[int, str]:
+    """How ``dodo COMMAND`` ends when its work raises this."""
+
+    def work(_options: Namespace, _stdout: TextIO, _stderr: TextIO) -> int:
+        raise error
+
+    monkeypatch.setattr(COMMANDS[command], "main", work)
+    stdout, stderr = StringIO(), StringIO()
+    code = main([command], stdout, stderr)
+    assert stdout.getvalue() == ""
+    return code, stderr.getvalue()
+
+
+USAGE = (
+    UsageError, NoSuchTest, NoSuchImage, OdvdError, RecordingError, FilesError, NothingSelected, OutputExists,
+    TruthError, ResultsError,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", USAGE)
+def test_errors_of_the_user(kind: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ended(kind("it is so."), monkeypatch) == (2, "dodo list: it is so.\n")
+
+
+@pytest.mark.parametrize("kind", [DockerError, WheelsError, LeaseTimeout, RigProblem, SessionError])
+def test_errors_of_the_machine(kind: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ended(kind("it is so"), monkeypatch, "doctor") == (3, "dodo doctor: it is so\n")
+
+
+def test_a_rig_says_whose_error_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ended(RigProblem("too far", usage=True), monkeypatch) == (2, "dodo list: too far\n")
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(28, "No space left on device"), "No space left on device"),
+        (OSError(28, "No space left on device", "a/b"), "a/b: No space left on device"),
+        (FileNotFoundError(2, "No such file or directory", "a"), "a: No such file or directory"),
+        (OSError("odd"), "odd"),
+    ],
+)
+def test_errors_of_the_system(error: OSError, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ended(error, monkeypatch) == (3, f"dodo list: {said}\n")
+
+
+def test_what_nobody_foresaw_is_an_internal_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DODO_DEBUG", raising=False)
+    said = "dodo list: internal error: KeyError: 'x'\nDODO_DEBUG=1 shows where\n"
+    assert ended(KeyError("x"), monkeypatch) == (3, said)
+    monkeypatch.setenv("DODO_DEBUG", "1")
+    with pytest.raises(KeyError):
+        ended(KeyError("x"), monkeypatch)
+    assert ended(UsageError("still a sentence"), monkeypatch) == (2, "dodo list: still a sentence\n")
+
+
+def test_an_interrupt_has_no_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ended(KeyboardInterrupt(), monkeypatch) == (130, "")
+
+
+@pytest.mark.parametrize("kind", [FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError])
+def test_files_that_the_user_names_are_the_users(kind: type[OSError]) -> None:
+    with pytest.raises(UsageError, match=r"^a\.rec: refused$"), errors.files_of_the_user():
+        raise kind(1, "refused", "a.rec")
+    with pytest.raises(OSError, match="full"), errors.files_of_the_user():
+        raise OSError(28, "full", "a.rec")
+
+
+def test_commands_that_end_in_errors_name_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for words, code, said in (
+        (["rec", "info", "none.rec"], 2, "dodo rec: none.rec: No such file or directory\n"),
+        (["report", "none"], 2, "dodo report: there is no none/results.json\n"),
+        (["compile", "none/"], 2, f"dodo compile: there is no test at '{tmp_path / 'none'}'; specs end in .dodo.yml\n"),
+        (["explain", "no-such"], 2, "dodo explain: there is no test 'no-such'"),
+        (["list", "--services", "beakon"], 2, "dodo list: there is no service 'beakon'; did you mean 'beacon'?\n"),
+    ):
+        stderr = StringIO()
+        assert main(words, StringIO(), stderr) == code, words
+        assert stderr.getvalue().startswith(said)

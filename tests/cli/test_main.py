@@ -1,0 +1,35 @@
+"""The help of every command, which begins with its module's first line."""
+
+import pytest
+
+from dodo_dsl.cli.main import COMMANDS, main, parser
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_examples(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"], None, None) == 0  # type: ignore[arg-type]
+    shown = capsys.readouterr().out
+    assert f"usage: dodo {command}" in shown
+    assert f"\nexamples:\n  dodo {command}" in shown
+    assert (COMMANDS[command].__doc__ or "").startswith(f"dodo {command}: ")
+
+
+@pytest.mark.parametrize("words", [[], ["lst"], ["run", "--jobs"], ["rec", "info"]])
+def test_wrong_words_are_usage_errors(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words, None, None) == 2  # type: ignore[arg-type]
+    assert "usage: dodo" in capsys.readouterr().err
+
+
+def test_every_argument_is_explained() -> None:
+    """No option without help, in any command or action."""
+    pending = [parser()]
+    seen = 0
+    while pending:
+        for action in pending.pop()._actions:
+            choices = action.choices
+            if isinstance(choices, dict):
+                pending += choices.values()
+            elif action.metavar not in ("FILE.rec", "ACTION", "COMMAND"):
+                seen += 1
+                assert action.help, action
+    assert seen > 80

@@ -1,0 +1,57 @@
+"""A planned service as a container."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.emit.containers import containers
+from dodo_dsl.plan.model import Flag, Plan, Service
+from tests.run.helpers import Bench
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Plan:
+    """A service in each layer, under network isolation."""
+    flags = (
+        Flag("map", "a/$b.json", "path"),
+        Flag("rec", "x.rec", "report"),
+        Flag("cid", "130"),
+    )
+    services = (
+        Service("environment", "camera", "x", "image", (), flags, setup_s=2.5),
+        Service("action", "vehicle", "x", "image", ()),
+        Service("evaluation", "judge", "x", "image", (), judge=True),
+    )
+    return replace(Bench(tmp_path).plan(), isolation="network", services=services)
+
+
+def test_paths_and_dollars_of_a_command(plan: Plan) -> None:
+    (camera,) = containers(plan, "environment")
+    assert camera.command == ("--map=/dodo/files/a/$$b.json", "--rec=/dodo/report/x.rec", "--cid=130")
+    assert camera.volumes == ("tmp:/tmp", "./files:/dodo/files:ro", "report:/dodo/report")
+    assert (camera.ready_file, camera.ready_tries) == ("/tmp/dodo-ready-camera", 125)
+
+
+@pytest.mark.parametrize(
+    ("layer", "earlier"), [("environment", []), ("action", ["camera"]), ("evaluation", ["camera", "vehicle"])]
+)
+def test_each_layer_waits_for_those_before_it(plan: Plan, layer: str, earlier: list[str]) -> None:
+    waits = [(name, "service_healthy") for name in earlier]
+    (found,) = containers(plan, layer)
+    assert found.after == (("sandbox", "service_started"), *waits)
+    (on_host,) = containers(replace(plan, isolation="host"), layer)
+    assert on_host.after == tuple(waits)
+    assert on_host.volumes[0] == "/tmp:/tmp"
+
+
+def test_environment_has_what_has_a_value(plan: Plan) -> None:
+    (vehicle,) = containers(plan, "action")
+    assert vehicle.environment == (("DODO_SERVICE", "vehicle"),)
+    (vehicle,) = containers(replace(plan, messages=("a.odvd", "b.odvd"), rig="desk"), "action")
+    assert dict(vehicle.environment) == {
+        "DODO_SERVICE": "vehicle",
+        "DODO_ODVD": "/dodo/files/a.odvd:/dodo/files/b.odvd",
+        "DODO_RIG": "desk",
+    }
+    assert "./files:/dodo/files:ro" in vehicle.volumes, "the messages are there"
