@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.check import catalogue
+from dodo_dsl.check.explanation import explain
 from dodo_dsl.cli.main import main
 from tests.check import examples
+from tests.check.contexts import resolved
 
 GOLDEN = Path(__file__).parent / "explained"
 HIL = """\
@@ -93,3 +95,20 @@ def test_neither(folder: Path) -> None:
     assert (code, out) == (2, "")
     assert err.startswith("dodo explain: there is no test 'wrong-units'; known: base, example; or the rule: did you")
     assert "'wrong-unit'" in err
+
+
+def origins(example: str, folder: Path) -> dict[tuple[str, str], str]:
+    return {(s.name, a.name): a.origin for s in explain(resolved(example, folder)).services for a in s.arguments}
+
+
+def test_origins_of_values(folder: Path) -> None:
+    found = origins("", folder)
+    assert found["camera", "map-path"] == "tests/example/example.dodo.yml:8"
+    assert found["track", "map-path"] == "as camera, tests/example/example.dodo.yml:8"
+    assert found["camera", "freq"] == "default"
+
+
+def test_origins_of_values_on_a_rig(folder: Path) -> None:
+    found = origins(HIL.removeprefix("extends: ../base/base.dodo.yml\n"), folder)
+    assert found["camera", "source"] == "the emulated rig"
+    assert found["pose", "max-speed"] == "tests/example/example.dodo.yml:9"

@@ -1,0 +1,71 @@
+"""Problems of an application as a whole."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.application.applications import FIRST, problems
+
+
+def messages(services: str, folder: Path = Path("/x")) -> list[str]:
+    return [problem.message for problem in problems(f"services: {{{services}}}\n", folder)]
+
+
+def test_a_good_one() -> None:
+    assert messages("a: {image: x, command: --cid=111}, b: {image: y, depends_on: [a]}") == []
+
+
+def test_no_service_starts() -> None:
+    (problem,) = problems("services: {}\n")
+    assert (problem.span, problem.rule) == (FIRST, "application-file")
+    assert problem.message == "no service starts, because each one has a profile or is scaled to 0"
+
+
+def test_missing_files(tmp_path: Path) -> None:
+    (tmp_path / "here.env").touch()
+    service = "image: x, command: --cid=1, env_file: [here.env, gone.env, '$A.env', {path: b.env, required: false}]"
+    assert messages(f"a: {{{service}}}", tmp_path) == ["there is no file 'gone.env'"]
+
+
+@pytest.mark.parametrize(
+    ("process", "expected"),
+    [
+        ("[python, drive.py]", ["there is no file 'drive.py' for python to run"]),
+        ("[python, here.py]", []),
+        ("[python, -m, drive]", []),
+        ("[python, $A]", []),
+        ("[./drive]", []),
+        ("[build/drive, drive.py]", []),
+    ],
+)
+def test_missing_scripts(process: str, expected: list[str], tmp_path: Path) -> None:
+    (tmp_path / "here.py").touch()
+    service = f"a: {{image: x, command: --cid=1, x-dodo-process: {process}}}"
+    assert messages(service, tmp_path) == expected
+
+
+def test_a_cycle() -> None:
+    cycle = "a: {image: x, depends_on: [b]}, b: {image: x, links: [c]}, c: {image: x, network_mode: 'service:a'}"
+    (message,) = messages(f"{cycle}, d: {{image: x, depends_on: [a]}}, e: {{image: x, command: --cid=1}}")
+    assert message == "services depend on one another: a, b, c"
+
+
+def test_two_services_with_one_variable() -> None:
+    services = "a.b: {image: x, command: --cid=1}, a-b: {image: y}"
+    assert messages(services) == ["'a-b' and 'a.b' would both take their image from DODO_IMAGE_A_B"]
+
+
+@pytest.mark.parametrize(
+    ("service", "takes_cid"),
+    [
+        ("command: prog", False),
+        ("command: prog --cid=111", True),
+        ("entrypoint: [prog, --cid, '1']", True),
+        ("environment: [OD4SESSION_CID=111]", True),
+        ("environment: {ARGUMENTS: --cid=3}", True),
+        ("environment: {OTHER: 1}", False),
+    ],
+)
+def test_a_cid_that_can_be_set(service: str, takes_cid: bool) -> None:
+    found = problems(f"services: {{a: {{image: x, {service}}}}}\n")
+    assert [(p.rule, p.severity) for p in found] == ([] if takes_cid else [("application-cid", "warning")])
