@@ -193,4 +193,4 @@ def test_usage_errors_are_sentences(
 
 def test_a_real_rig_is_never_kept_up(dodo: Command) -> None:
     code, _, err = dodo.run("--keep", tested=replace(plan(), rig="kiwi", level="hil", isolation="host"))
-    assert (code, "test runs on rig 'kiwi', which --keep would leave driven" in err) == (2, True)
+    assert (code, "test runs on rig 'kiwi', which --keep would leave in motion" in err) == (2, True)

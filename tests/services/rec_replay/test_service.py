@@ -178,8 +178,6 @@ def test_the_bus_has_what_cluon_replay_sends(
     theirs, ours = replayed_by_libcluon(cid, rec), replayed_by_us(cid, rec, tmp_path)
     assert [key(e) for e in ours] == [key(e) for e in theirs]
     assert len(ours) == count
-    duration, their_duration = (heard[-1].received - heard[0].received for heard in (ours, theirs))
-    assert abs(duration - their_duration) < 0.3 * S + 0.1 * their_duration
 
 
 def test_every_message_of_real_recordings(cid: int, tmp_path: Path, shared_data: Callable[[str], Path]) -> None:
