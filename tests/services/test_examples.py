@@ -63,11 +63,13 @@ def test_the_readme_shows_the_example_of_the_help(folder: Path) -> None:
     assert lines == [example_line(load_manifest(folder))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", [f for f in FOLDERS if f.name != "gantry"], ids=lambda folder: folder.name)
 def test_the_example_runs(folder: Path, cid: int, tmp_path: Path) -> None:
     ends_cleanly(start(words_of(folder, cid, tmp_path), tmp_path))
 
 
+@pytest.mark.slow
 def test_the_gantrys_example_runs(cid: int, tmp_path: Path) -> None:
     with FakeRig(tmp_path / "rig") as rig:
         words = [w.replace("/dev/ttyACM0", str(rig.path)) for w in words_of(ROOT / "services/gantry", cid, tmp_path)]

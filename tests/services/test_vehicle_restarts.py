@@ -4,6 +4,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from dodo_dsl.opendlv.bus.session import Session
 from tests.services.process import PATIENCE, receive, running, send
 
@@ -22,6 +24,7 @@ def pressed(session: Session, message: str, true: Callable[[float], bool], pedal
     raise AssertionError("it did not come to be")
 
 
+@pytest.mark.slow
 def test_the_integrator_survives_a_restart_of_the_dynamic_model(cid: int, tmp_path: Path) -> None:
     with Session(cid) as session, running("integrator", tmp_path, f"--cid={cid}") as integrator:
         with running("dynamic_model", tmp_path, f"--cid={cid}") as first:
@@ -38,6 +41,7 @@ def test_the_integrator_survives_a_restart_of_the_dynamic_model(cid: int, tmp_pa
         assert integrator.poll() is None
 
 
+@pytest.mark.slow
 def test_the_dynamic_model_survives_a_restart_of_the_integrator(cid: int, tmp_path: Path) -> None:
     with Session(cid) as session, running("dynamic_model", tmp_path, f"--cid={cid}") as vehicle:
         for start in (0, 5):

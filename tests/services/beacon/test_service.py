@@ -1,5 +1,4 @@
 import math
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,8 @@ from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.beacon.service import Beacon
 from services.beacon.trajectory import TrajectoryError
-from tests.services.process import PATIENCE, ROOT, launch, receive, running, send
+from tests.services.built import refusal
+from tests.services.process import PATIENCE, ROOT, receive, running, send
 
 FRAME, STATE = "opendlv.sim.Frame", "opendlv.sim.KinematicState"
 SECOND = 1_000_000
@@ -71,14 +71,6 @@ def test_two_ways_are_one_too_many() -> None:
         service("--points=0 0,1 1", "--length=3")
 
 
-def test_a_bad_table_ends_it_with_a_sentence(tmp_path: Path) -> None:
-    (tmp_path / "way.csv").write_text("x,y\n0,0\n1,here\n")
-    process = launch("beacon", tmp_path, "--cid=254", f"--path={tmp_path}/way.csv")
-    out, err = process.communicate(timeout=PATIENCE)
-    assert (process.returncode, out) == (2, "")
-    assert err == f"beacon: CRITICAL: {tmp_path}/way.csv:3: y: 'here' is not a finite number\n"
-
-
 def test_on_the_bus(cid: int, tmp_path: Path) -> None:
     with (
         Session(cid) as session,
@@ -91,8 +83,7 @@ def test_on_the_bus(cid: int, tmp_path: Path) -> None:
         assert process.wait(PATIENCE) == 0
 
 
-def test_a_signal_ends_it(cid: int, tmp_path: Path) -> None:
-    with Session(cid) as session, running("beacon", tmp_path, f"--cid={cid}") as process:
-        receive(session, FRAME)
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(PATIENCE) == 0
+def test_a_bad_table_is_refused_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("x,y\n0,0\n1,here\n")
+    words = f"{tmp_path}/path.csv:3: y: 'here' is not a finite number"
+    assert refusal("beacon", f"--path={tmp_path}/path.csv") == words

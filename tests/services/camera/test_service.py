@@ -10,6 +10,7 @@ import pytest
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from services.camera.v4l2 import V4l2Camera
+from tests.services.built import built, refusal
 from tests.services.process import PATIENCE, launch, receive, running
 
 SIZE = ["--width=64", "--height=48"]
@@ -26,6 +27,7 @@ def attached(names: list[str]) -> tuple[SharedMemory, SharedMemory]:
     return argb, i420
 
 
+@pytest.mark.slow
 def test_a_video_goes_into_both_memories_at_its_times(tmp_path: Path, names: list[str], video: Path) -> None:
     flags = [*names, *SIZE, "--source=file", f"--file={video}", "--freq=20"]
     with running("camera", tmp_path, *flags):
@@ -45,6 +47,7 @@ def test_a_video_goes_into_both_memories_at_its_times(tmp_path: Path, names: lis
     assert len(set(greys)) > 1
 
 
+@pytest.mark.slow
 def test_the_pipe_of_a_raspberry_pi(tmp_path: Path, names: list[str], rpicam: Path) -> None:
     before = time.time_ns() // 1000
     with running("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05") as process:
@@ -59,6 +62,7 @@ def test_the_pipe_of_a_raspberry_pi(tmp_path: Path, names: list[str], rpicam: Pa
         assert process.wait(PATIENCE) == 0
 
 
+@pytest.mark.slow
 def test_its_state_is_told_under_the_stamp_that_is_given(
     tmp_path: Path, cid: int, names: list[str], video: Path
 ) -> None:
@@ -68,6 +72,7 @@ def test_its_state_is_told_under_the_stamp_that_is_given(
     assert (state.code, state.description) == (0, "the camera gives pictures")
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_lost_ends_it_with_a_sentence(
     tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -78,6 +83,7 @@ def test_a_camera_that_is_lost_ends_it_with_a_sentence(
     assert "rpicam-vid ended with code 1: ERROR: *** Device timeout detected ***" in err and "Traceback" not in err
 
 
+@pytest.mark.slow
 def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
     tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -93,6 +99,26 @@ def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
     assert (process.returncode, out, err) == (0, "", "")
 
 
+def test_each_update_shares_a_picture_and_reports_on_the_camera(names: list[str], video: Path) -> None:
+    flags = [*names[1:], *SIZE, "--source=file", f"--file={video}", "--freq=20", "--status-id=6"]
+    with built("camera", *flags) as camera:
+        argb, i420 = attached(names)
+        with argb, i420:
+            outputs, greys = [], []
+            for now in range(1_000_000, 1_350_000, 50_000):
+                outputs += camera.update(now)
+                with i420.lock():
+                    assert i420.sample_time() == now
+                with argb.lock():
+                    assert argb.sample_time() == now
+                    greys.append(round(float(np.frombuffer(argb.buffer, np.uint8).reshape(48, 64, 4)[..., 0].mean())))
+    assert greys == pytest.approx([40, 80, 120, 160, 200, 40, 80], abs=2)
+    assert camera.shared == 7 and camera.period == 50_000
+    assert [(o.sender_stamp, o.message.code, o.message.description) for o in outputs] == [
+        (6, 0, "the camera gives pictures")
+    ]
+
+
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
@@ -106,12 +132,9 @@ def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
         (["--source=file", "--width=63"], "--width=63 and --height=48 must be even"),
     ],
 )
-def test_what_is_not_a_camera(tmp_path: Path, names: list[str], flags: list[str], words: str) -> None:
+def test_what_is_not_a_camera(names: list[str], flags: list[str], words: str) -> None:
     size = [word for word in SIZE if word.partition("=")[0] not in {flag.partition("=")[0] for flag in flags}]
-    process = launch("camera", tmp_path, *names, *size, *flags)
-    out, err = process.communicate(timeout=PATIENCE)
-    assert (process.returncode, out) == (2, "")
-    assert words in err and "Traceback" not in err
+    assert words in refusal("camera", *names[1:], *size, *flags)
 
 
 def test_a_v4l2_device() -> None:

@@ -1,8 +1,5 @@
-"""A snapshot as a process that looks at a picture."""
-
+import io
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +7,13 @@ import cv2
 import numpy as np
 import pytest
 
+from services.camera.snapshot import main
 from tests.services.camera.test_health_check import BOARD
-from tests.services.process import ROOT
 
 
 def snapshot(*words: str) -> tuple[int, dict[str, Any]]:
-    command = [sys.executable, "-m", "services.camera.snapshot", *words]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
-    assert result.stderr == ""
-    return result.returncode, json.loads(result.stdout)
+    output = io.StringIO()
+    return main(words, output), json.loads(output.getvalue())
 
 
 @pytest.mark.parametrize(("divisor", "reason"), [(1, ""), (255, "is it lit?")])

@@ -198,10 +198,10 @@ def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: p
 
 
 def test_silence_is_named_with_frame_and_message(toys: Toys) -> None:
-    toys.patience = Patience(2.0, 0.2)
+    toys.patience = Patience(0.5, 0.2)
     with pytest.raises(ApplicationSilent) as caught:
         toys.run(toys.application(times=0))
-    assert str(caught.value) == "the application did not answer frame 1 within 2 s (GroundSteeringRequest missing)"
+    assert str(caught.value) == "the application did not answer frame 1 within 0.5 s (GroundSteeringRequest missing)"
 
 
 def test_an_end_in_the_middle_is_named(toys: Toys) -> None:

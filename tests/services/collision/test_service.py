@@ -11,9 +11,10 @@ import pytest
 
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base import Context, Flags, UnjudgeableError
+from services.base import Check, Context, Flags, UnjudgeableError
 from services.collision.service import Collision
-from tests.services.process import PATIENCE, launch, running, send
+from tests.services.built import built, hand, refusal
+from tests.services.process import PATIENCE, running, send
 
 FRAME = "opendlv.sim.Frame"
 LANE = {
@@ -171,45 +172,37 @@ def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
     assert checks["wall-margin"]["value"] == pytest.approx(0.07, abs=1e-6)
 
 
-def test_gates_and_margin_come_from_the_flags(lane: Path, cid: int) -> None:
-    flags = (f"--cid={cid}", f"--map-path={lane}", "--gates=finish", "--walls=left,right", "--min-margin=0.05")
-    with Session(cid) as session, running("collision", lane, *flags) as process:
-        send(session, "dodo.TestBegin", sample_time=START)
-        send(session, FRAME, sample_time=START + 10_000, qw=1.0)
-        send(session, FRAME, sample_time=START + 2_010_000, x=3.1, qw=1.0)
-        code, output, errors = finished(process)
-    assert (code, errors) == (0, "")
-    verdict = json.loads(output)
-    assert (verdict["outcome"], verdict["reason"]) == ("passed", "crossed the last gate, finish, after 2.01 s")
-    checks = {check["name"]: check for check in verdict["checks"]}
-    assert checks["gates"] == {"name": "gates", "value": 1, "limit": {"min": 1}, "unit": "", "ok": True}
-    assert checks["wall-margin"]["limit"] == {"min": 0.05}
+def test_gates_and_margin_come_from_the_flags(lane: Path) -> None:
+    with built("collision", f"--map-path={lane}", "--gates=finish", "--walls=left,right", "--min-margin=0.05") as judge:
+        judge.begin(START)
+        hand(judge, FRAME, START + 10_000, 0, qw=1.0)
+        hand(judge, FRAME, START + 2_010_000, 0, x=3.1, qw=1.0)
+    assert (judge.verdict.outcome, judge.verdict.reason) == ("passed", "crossed the last gate, finish, after 2.01 s")
+    checks = {check.name: check for check in judge.verdict.checks}
+    assert checks["gates"] == Check("gates", 1, {"min": 1}, "", True)
+    assert checks["wall-margin"].limit == {"min": 0.05}
 
 
-def test_the_end_of_the_input_of_a_silent_application(lane: Path, cid: int) -> None:
-    flags = (f"--cid={cid}", f"--map-path={lane}", "--goal=finish")
-    with Session(cid) as session, running("collision", lane, *flags) as process:
-        send(session, "dodo.TestBegin")
-        send(session, FRAME, qw=1.0)
-        send(session, "dodo.EndOfInput", source="recording")
-        code, output, _ = finished(process)
-    verdict = json.loads(output)
-    assert (code, verdict["outcome"]) == (0, "failed")
-    assert verdict["reason"].startswith(
-        "the application sent no GroundSteeringRequest and no PedalPositionRequest before the input ended after 0."
+def test_the_end_of_the_input_of_a_silent_application(lane: Path) -> None:
+    with built("collision", f"--map-path={lane}", "--goal=finish") as judge:
+        judge.begin(START)
+        hand(judge, FRAME, START, 0, qw=1.0)
+        judge.end_of_input(START + 500_000)
+    verdict = json.loads(judge.verdict.line(77))
+    assert (verdict["outcome"], verdict["reason"]) == (
+        "failed",
+        "the application sent no GroundSteeringRequest and no PedalPositionRequest before the input ended "
+        "after 0.50 s; the test is on CID 77",
     )
-    assert verdict["reason"].endswith(f" s; the test is on CID {cid}")
 
 
-def test_no_frame_is_an_error_and_no_verdict(lane: Path, cid: int) -> None:
-    with running("collision", lane, f"--cid={cid}", f"--map-path={lane}", "--walls=left", "--max-time=0.05") as process:
-        code, output, errors = finished(process)
-    assert (code, output) == (1, "")
-    assert "no opendlv.sim.Frame of the vehicle came within 0.05 s" in errors
+def test_no_frame_is_an_error_and_no_verdict(lane: Path) -> None:
+    with built("collision", f"--map-path={lane}", "--walls=left", "--max-time=0.05") as judge:
+        judge.begin(START)
+        with pytest.raises(UnjudgeableError, match=r"no opendlv\.sim\.Frame of the vehicle came within 0\.05 s"):
+            judge.update(START + 60_000)
 
 
-def test_a_wrong_name_ends_it_before_it_is_ready(lane: Path, cid: int) -> None:
-    process = launch("collision", lane, f"--cid={cid}", f"--map-path={lane}", "--goal=finnish")
-    code, output, errors = finished(process)
-    assert (code, output) == (2, "")
-    assert errors.endswith(f"--goal: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?\n")
+def test_a_wrong_name_is_refused(lane: Path) -> None:
+    sentence = f"--goal: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"
+    assert refusal("collision", f"--map-path={lane}", "--goal=finnish") == sentence

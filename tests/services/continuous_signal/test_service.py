@@ -13,8 +13,9 @@ from services.base import Context, Flags
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.continuous_signal.service import ContinuousSignal
+from tests.services.built import refusal
 from tests.services.continuous_signal.test_target import recording
-from tests.services.process import PATIENCE, ROOT, launch, running, send
+from tests.services.process import PATIENCE, ROOT, running, send
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
 START = 1_700_000_000_000_000
@@ -120,24 +121,18 @@ def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
     assert checks["samples"]["value"] == 101
 
 
-def test_a_silent_application_fails_when_the_time_is_over(table: Path, cid: int, tmp_path: Path) -> None:
-    words = (f"--cid={cid}", *FLAGS, f"--target={table}", "--max-time=0.05")
-    with running("continuous_signal", tmp_path, *words) as process:
-        code, output, _ = finished(process)
-    verdict = json.loads(output)
-    assert (code, verdict["outcome"]) == (0, "failed")
-    assert (
-        verdict["reason"] == f"no sample of groundSteering of {STEERING}/0 came within 0.05 s; the test is on CID {cid}"
-    )
+def test_a_silent_application_fails_when_the_time_is_over(table: Path) -> None:
+    judge = service(f"--target={table}", "--max-time=0.05")
+    judge.begin(START)
+    judge.update(START + 60_000)
+    assert judge.verdict is not None
+    verdict = json.loads(judge.verdict.line(77))
+    assert verdict["reason"] == f"no sample of groundSteering of {STEERING}/0 came within 0.05 s; the test is on CID 77"
     assert verdict["checks"][0] == {"name": "mean", "value": None, "limit": {"max": 0.05}, "unit": "", "ok": False}
 
 
-def test_a_target_that_cannot_be_used_ends_it_before_it_is_ready(tmp_path: Path, cid: int) -> None:
+def test_a_target_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.csv").write_text("time,value\n0,1\n0,2\n")
-    code, output, errors = finished(
-        launch("continuous_signal", tmp_path, f"--cid={cid}", *FLAGS, f"--target={tmp_path}/bad.csv")
-    )
-    assert (code, output) == (2, "")
-    assert errors.endswith(
-        f"{tmp_path}/bad.csv:3: the time 0 s appears twice, expected times that increase by at least a microsecond\n"
+    assert refusal("continuous_signal", *FLAGS, f"--target={tmp_path}/bad.csv") == (
+        f"{tmp_path}/bad.csv:3: the time 0 s appears twice, expected times that increase by at least a microsecond"
     )

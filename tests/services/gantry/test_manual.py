@@ -1,16 +1,15 @@
-"""Manual control of the rig, as a process against a rig on a pseudo terminal."""
+"""Manual control of a rig on a pseudo terminal."""
 
+import io
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from services.gantry.manual import main
 from tests.services.gantry.fake_rig import FakeRig
-from tests.services.process import ROOT
 
 
 @pytest.fixture
@@ -20,10 +19,9 @@ def rig(tmp_path: Path) -> Iterator[FakeRig]:
 
 
 def manual(rig: FakeRig, *words: str, code: int = 0) -> dict[str, Any]:
-    command = [sys.executable, "-m", "services.gantry.manual", f"--serial={rig.path}", *words]
-    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
-    assert process.returncode == code, process.stdout + process.stderr
-    result: dict[str, Any] = json.loads(process.stdout)
+    output = io.StringIO()
+    assert main([f"--serial={rig.path}", *words], output) == code, output.getvalue()
+    result: dict[str, Any] = json.loads(output.getvalue())
     return result
 
 
@@ -60,6 +58,7 @@ def test_uncalibrated(rig: FakeRig) -> None:
     assert manual(rig, "calibrate")["status"] == 0
 
 
+@pytest.mark.slow
 def test_check_of_a_good_rig_and_of_one_that_loses_steps(rig: FakeRig) -> None:
     rig.homes_slowly, rig.at = True, [-0.85, -0.65, -2.5]
     result = manual(rig, "check")

@@ -1,6 +1,7 @@
 """The service against a rig on a pseudo terminal, as a process and in this one."""
 
 import contextlib
+import itertools
 import math
 import re
 import signal
@@ -16,15 +17,17 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context
 from services.base.flags import parse
 from services.base.manifest import load_manifest
-from services.gantry import start
+from services.gantry import link, start
 from services.gantry.link import Link, RigError
 from services.gantry.port import SerialPort
 from services.gantry.rig_table import Error
 from services.gantry.service import Gantry
+from tests.services.built import built, hand, refusal
 from tests.services.gantry.fake_rig import FakeRig
 from tests.services.process import PATIENCE, ROOT, launch, receive, running, send
 
 FRAME, STATE, STATUS = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.system.SystemStatusMessage"
+INSTANTS = itertools.count(0, 20_000)
 MANIFEST = load_manifest(ROOT / "services" / "gantry")
 
 
@@ -57,6 +60,18 @@ def drive(session: Session, true: Callable[[], object], **fields: float) -> None
     until(arrived)
 
 
+def drive_here(model: Gantry, true: Callable[[], object], **fields: float) -> None:
+    """As `drive`, without a process."""
+
+    def arrived() -> object:
+        hand(model, STATE, 0, 0, **fields)
+        turn(model, 1)
+        return true()
+
+    until(arrived)
+
+
+@pytest.mark.slow
 def test_it_starts_where_it_is_told_and_follows_the_vehicle(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig, "--x=-0.5", "--y=0.1", "--yaw=90", "--status-id=4"):
         assert rig.at == pytest.approx([-0.5, 0.1, math.pi / 2], abs=1e-3)
@@ -74,6 +89,7 @@ def test_it_starts_where_it_is_told_and_follows_the_vehicle(cid: int, rig: FakeR
         assert abs(envelope.sample_time - envelope.sent) < 1_000_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_stops_the_rig(cid: int, rig: FakeRig, number: signal.Signals) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
@@ -83,6 +99,7 @@ def test_a_signal_stops_the_rig(cid: int, rig: FakeRig, number: signal.Signals) 
         assert rig.last() == "STOP" and not any(rig.velocity)
 
 
+@pytest.mark.slow
 def test_the_end_of_the_input_stops_the_rig_and_the_frames_go_on(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig):
         drive(session, lambda: any(rig.velocity), vx=0.3)
@@ -94,6 +111,7 @@ def test_the_end_of_the_input_stops_the_rig_and_the_frames_go_on(cid: int, rig: 
         assert len(rig.commands("RUN")) == runs
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_falls_silent_is_not_driven_on(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig):
         drive(session, lambda: any(rig.velocity), vx=0.3)
@@ -111,23 +129,23 @@ def test_a_vehicle_that_falls_silent_is_not_driven_on(cid: int, rig: FakeRig) ->
         (8, "reports a fault"),
     ],
 )
-def test_a_status_that_ends_the_test(cid: int, rig: FakeRig, status: int, words: str) -> None:
-    with gantry(cid, rig) as process:
+def test_a_status_that_ends_the_test(rig: FakeRig, status: int, words: str) -> None:
+    with ready(rig) as model:
         rig.status = status
-        assert process.wait(PATIENCE) == 1
-        assert process.stderr is not None
-        error = process.stderr.read()
-        assert words in error and f"(status {status})" in error and "at x = 0.000 m" in error and "Trace" not in error
-        assert rig.status == status and not any(rig.velocity), "the fault is left to be seen"
+        with pytest.raises(RigError, match=words) as raised:
+            turn(model)
+    assert f"(status {status})" in str(raised.value) and "at x = 0.000 m" in str(raised.value)
+    assert rig.status == status and not any(rig.velocity), "the fault is left to be seen"
 
 
 @pytest.mark.parametrize(("status", "words"), [(3, "touched a limit switch"), (4, "a motor stalled"), (8, "a fault")])
-def test_a_fault_from_before_is_seen_and_not_erased(cid: int, rig: FakeRig, status: int, words: str) -> None:
+def test_a_fault_from_before_is_seen_and_not_erased(rig: FakeRig, status: int, words: str) -> None:
     rig.status = status
-    assert words in refused(cid, rig, f"--serial={rig.path}", "--calibrate")
+    assert words in refused(rig, f"--serial={rig.path}", "--calibrate")
     assert rig.status == status and not rig.commands("STOP") and not rig.commands("CALIBRATE")
 
 
+@pytest.mark.slow
 def test_a_watchdog_of_its_own_accord_ends_the_test(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         for _ in range(60):  # longer than it is lenient after it opened the line
@@ -138,67 +156,63 @@ def test_a_watchdog_of_its_own_accord_ends_the_test(cid: int, rig: FakeRig) -> N
         assert "got no command for 500 ms and braked by itself" in process.stderr.read()
 
 
-def test_garbage_and_lines_in_parts_do_no_harm(cid: int, rig: FakeRig) -> None:
+def test_garbage_and_lines_in_parts_do_no_harm(rig: FakeRig) -> None:
     rig.noise, rig.chopped = b"\xff\x00$0.\n$$,,\nok\n$12", True
-    with Session(cid) as session, gantry(cid, rig):
-        drive(session, lambda: rig.at[0] > 0.05, vx=0.3)
-        _, frame = receive(session, FRAME)
-        assert abs(frame.x) < 1
+    with ready(rig) as model:
+        drive_here(model, lambda: rig.at[0] > 0.05, vx=0.3)
+        (frame,) = model.update(next(INSTANTS))
+        assert 0 < frame.message.x < 1
 
 
 @pytest.mark.parametrize(("code", "name"), [(8, "TROUBLE"), (99, "unknown to this version")])
-def test_a_rig_that_refuses_to_move_ends_the_test(cid: int, rig: FakeRig, code: int, name: str) -> None:
-    with Session(cid) as session, gantry(cid, rig) as process:
-        drive(session, lambda: any(rig.velocity), vx=0.2)
+def test_a_rig_that_refuses_to_move_ends_the_test(rig: FakeRig, code: int, name: str) -> None:
+    with ready(rig) as model:
+        drive_here(model, lambda: any(rig.velocity), vx=0.2)
         rig.restarted = code
-        assert process.wait(PATIENCE) == 1
-        assert process.stderr is not None
-        assert f"refuses to move: $ERROR:{code} ({name})" in process.stderr.read()
-        assert rig.last() == "STOP" and not any(rig.velocity)
+        with pytest.raises(RigError, match=re.escape(f"refuses to move: $ERROR:{code} ({name})")):
+            turn(model)
+    assert rig.last() == "STOP" and not any(rig.velocity)
 
 
-def test_a_line_that_comes_damaged_is_said_again(cid: int, rig: FakeRig) -> None:
-    with Session(cid) as session, gantry(cid, rig) as process:
-        drive(session, lambda: any(rig.velocity), vx=0.2)
+def test_a_line_that_comes_damaged_is_sent_again(rig: FakeRig, caplog: pytest.LogCaptureFixture) -> None:
+    with ready(rig) as model:
+        drive_here(model, lambda: any(rig.velocity), vx=0.2)
         rig.restarted = int(Error.DAMAGED)
-        time.sleep(0.1)
-        rig.restarted = None
-        drive(session, lambda: rig.at[0] > 0.05, vx=0.2)
-        process.send_signal(signal.SIGTERM)
-        assert "received a damaged line: $ERROR:5 (DAMAGED)" in process.communicate(timeout=PATIENCE)[1]
+        drive_here(model, lambda: "received a damaged line: $ERROR:5 (DAMAGED)" in caplog.text, vx=0.2)
+        rig.restarted, at = None, rig.at[0]
+        drive_here(model, lambda: rig.at[0] > at + 0.02, vx=0.2)
 
 
-def test_an_outage_of_the_line_ends_the_test(cid: int, rig: FakeRig) -> None:
-    with Session(cid) as session, gantry(cid, rig) as process:
-        drive(session, lambda: any(rig.velocity), vx=0.2)
+def test_an_outage_of_the_line_ends_the_test(rig: FakeRig) -> None:
+    with ready(rig) as model:
+        drive_here(model, lambda: any(rig.velocity), vx=0.2)
         rig.unplug()
-        time.sleep(0.3)
+        with pytest.raises(RigError, match=f"the line to the rig at {rig.path} is lost: "):
+            turn(model)
         rig.plug()
-        assert process.wait(PATIENCE) == 1
-        assert process.stderr is not None
-        assert f"the line to the rig at {rig.path} is lost: " in process.stderr.read()
 
 
-def test_a_rig_that_falls_silent_ends_the_test_and_is_told_to_stop(cid: int, rig: FakeRig) -> None:
-    with gantry(cid, rig) as process:
+def test_a_rig_that_falls_silent_ends_the_test_and_is_stopped(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link, "SILENCE", 0.2)
+    with ready(rig) as model:
         rig.silent = True
-        assert process.wait(PATIENCE) == 1
-        assert process.stderr is not None
-        assert "is lost: it does not answer" in process.stderr.read()
-        assert rig.last() == "STOP"
+        with pytest.raises(RigError, match="is lost: it does not answer"):
+            turn(model)
+    assert rig.last() == "STOP"
 
 
-def test_a_rig_that_never_answers(cid: int, rig: FakeRig) -> None:
+def test_a_rig_that_never_answers(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link, "PATIENCE", 1.5)
     rig.silent = True
-    assert f"the rig at {rig.path} gave no answer for 5 s: it does not answer" in refused(cid, rig)
+    assert refused(rig) == f"the rig at {rig.path} gave no answer for 1.5 s: it does not answer"
 
 
 def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: FakeRig) -> None:
     flags = parse(MANIFEST, ["--cid=1", f"--serial={rig.path}", "--freq=10"])
-    link, now = Link(str(rig.path), lambda: SerialPort(str(rig.path))), [100.0]
-    with contextlib.closing(link):
-        start.settle(link, start.find(link))
-        model = Gantry(Context("gantry", flags, MessageSet.standard()), link, wall=lambda: now[0])
+    line, now = Link(str(rig.path), lambda: SerialPort(str(rig.path))), [100.0]
+    with contextlib.closing(line):
+        start.settle(line, start.find(line))
+        model = Gantry(Context("gantry", flags, MessageSet.standard()), line, wall=lambda: now[0])
         state = MessageSet.standard().type(STATE)(vx=0.2)
         for name, patience, words in (
             (STATE, 1.0, "no KinematicState"),
@@ -216,6 +230,7 @@ def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: Fa
             model.end_of_input(0)  # nothing more is expected to come
 
 
+@pytest.mark.slow
 def test_the_log_tells_jitter_and_latency(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         for _ in range(20):
@@ -227,23 +242,34 @@ def test_the_log_tells_jitter_and_latency(cid: int, rig: FakeRig) -> None:
     )
 
 
-def refused(cid: int, rig: FakeRig, *flags: str) -> str:
-    process = launch("gantry", rig.path.parent, f"--cid={cid}", *(flags or (f"--serial={rig.path}",)))
-    out, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode in (1, 2) and out == "" and "Traceback" not in err
-    return err
+@contextlib.contextmanager
+def ready(rig: FakeRig, *flags: str) -> Iterator[Gantry]:
+    """The service in this process, at its start, after some turns."""
+    with built("gantry", f"--serial={rig.path}", "--freq=50", *flags) as model:
+        turn(model, 3)
+        yield model
 
 
-def test_it_calibrates_only_when_told(cid: int, rig: FakeRig) -> None:
+def turn(model: Gantry, count: int = 200) -> None:
+    for _ in range(count):
+        list(model.update(next(INSTANTS)))
+
+
+def refused(rig: FakeRig, *flags: str) -> str:
+    return refusal("gantry", *(flags or (f"--serial={rig.path}",)))
+
+
+def test_it_calibrates_only_on_request(rig: FakeRig) -> None:
     rig.calibrated = False
-    error = refused(cid, rig)
-    assert "is not calibrated and does not know its position (status 6); --calibrate lets it find its home" in error
+    error = refused(rig)
+    assert "is not calibrated and does not know its position (status 6); --calibrate makes it find its home" in error
     assert not rig.commands("CALIBRATE") and not rig.commands("GOTO")
-    with gantry(cid, rig, "--calibrate"):
+    with ready(rig, "--calibrate"):
         assert rig.commands("CALIBRATE") == [()]
         assert rig.at == pytest.approx([0, 0, 0], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_signal_on_the_way_to_the_start_stops_the_rig(cid: int, rig: FakeRig) -> None:
     rig.status = 1  # never idle
     process = launch("gantry", rig.path.parent, f"--cid={cid}", f"--serial={rig.path}")
@@ -254,9 +280,9 @@ def test_a_signal_on_the_way_to_the_start_stops_the_rig(cid: int, rig: FakeRig) 
     assert rig.last() == "STOP"
 
 
-def test_a_start_that_is_not_reached(cid: int, rig: FakeRig) -> None:
+def test_a_start_that_is_not_reached(rig: FakeRig) -> None:
     rig.status = 2
-    error = refused(cid, rig, f"--serial={rig.path}", "--patience=1", "--x=0.2")
+    error = refused(rig, f"--serial={rig.path}", "--patience=1", "--x=0.2")
     assert "has not reached x = 0.2 m, y = 0 m, yaw = 0 degrees after 1 s" in error
     assert rig.last() == "STOP"
 
@@ -267,25 +293,25 @@ def test_a_start_that_is_not_reached(cid: int, rig: FakeRig) -> None:
         (["--serial=spy:///dev/ttyACM0?file=/tmp/x"], "is not a port of the rig"),
         (["--serial=socket://10.0.0.1:80"], "is not a port of the rig"),
         (["--serial=loop://"], "is not a port of the rig"),
-        (["--serial=/etc/passwd"], "is no device"),
-        (["--serial=ttyACM0"], "is no device"),
-        (["--serial=/dev/ttyNONE7"], "there is not a serial port /dev/ttyNONE7; is the rig plugged in?"),
+        (["--serial=/etc/passwd"], "is not a device"),
+        (["--serial=ttyACM0"], "is not a device"),
+        (["--serial=/dev/ttyNONE7"], "there is no serial port /dev/ttyNONE7; is the rig plugged in?"),
         (["--serial=emulated"], "the emulated rig is not built: `make firmware` builds it"),
         (["--serial=/dev/null", "--range-x=0.5"], "the start is out of the rig's ranges: at x = 0.000 m"),
     ],
 )
-def test_what_is_no_rig(
-    cid: int, rig: FakeRig, flags: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_what_is_not_a_rig(
+    rig: FakeRig, flags: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DODO_FIRMWARE", str(tmp_path))
-    assert words in refused(cid, rig, *flags)
+    assert words in refused(rig, *flags)
 
 
 def test_the_rigs_frame_in_the_world(rig: FakeRig) -> None:
     flags = parse(MANIFEST, ["--cid=1", f"--serial={rig.path}", "--origin-x=5", "--origin-y=1", "--origin-yaw=90"])
-    link = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
-    with contextlib.closing(link):
-        model = Gantry(Context("gantry", flags, MessageSet.standard()), link)
+    line = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
+    with contextlib.closing(line):
+        model = Gantry(Context("gantry", flags, MessageSet.standard()), line)
         outputs = [output for now in range(20) for output in model.update(now)]
     frame = outputs[-1].message
     assert [frame.x, frame.y] == pytest.approx([5 + 0.1, 1 + 0.1], abs=1e-3)

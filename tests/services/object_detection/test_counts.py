@@ -68,7 +68,7 @@ def test_of_one_detection_the_first_word_counts() -> None:
     detections = Detections()
     for value in (A, B, B, "yellow", "blue", TypeNumber(1), TypeNumber(2)):
         detections.add(0, value)
-    assert (detections.boxes(), detections.repeated) == ([LabelledBox("yellow", A)], 2)
+    assert (detections.labelled(), detections.repeated) == ([LabelledBox("yellow", A)], 2)
 
 
 def test_no_property_is_no_class() -> None:

@@ -11,11 +11,14 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags
 from services.base.flags import parse
 from services.base.manifest import load_manifest
+from services.base.usage import help_text
 from services.object_detection.service import ANNOUNCEMENT, LOGIC, ObjectDetection
+from tests.services.built import hand, refusal
 from tests.services.object_detection.test_truth import single, write
-from tests.services.process import PATIENCE, ROOT, launch, running, send
+from tests.services.process import PATIENCE, ROOT, running, send
 
 YELLOW, BLUE = ("color:yellow", (0.1, 0.1, 0.05, 0.05)), ("blue", (-0.015, 0.0, 0.031, 0.042))
+START = 1_700_000_000_000_000
 LIMITS = ("--min-recall=0.9", "--min-precision=0.9", "--min-frames=2")
 
 
@@ -101,37 +104,41 @@ def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
     assert verdict["checks"][1] == {"name": "recall", "value": 1.0, "limit": {"min": 0.9}, "unit": "", "ok": True}
 
 
-def test_a_live_truth_on_the_bus(cid: int, tmp_path: Path) -> None:
-    now = time.time_ns() // 1000
-    words = (f"--cid={cid}", "--truth-sender=9", "--frame-sender=9", *LIMITS)
-    with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
-        send(session, "dodo.TestBegin", sample_time=now)
-        for frame in range(3):
-            send_detections(session, now + frame, YELLOW, BLUE, sender=9)
-            send_detections(session, now + frame, BLUE)
-        send(session, ANNOUNCEMENT, sender_stamp=9, sample_time=now + 7)
-        send_detections(session, now + 7, YELLOW)
-        send(session, "dodo.EndOfInput", source="camera")
-        code, output, _ = finished(process)
-    checks = {check["name"]: check["value"] for check in json.loads(output)["checks"]}
-    assert code == 0 and json.loads(output)["outcome"] == "failed"
+def take(judge: ObjectDetection, sample_time: int, *boxes: Any, sender: int = 0) -> None:
+    """As `send_detections`, without a bus."""
+    for detection, (label, (x, y, width, height)) in enumerate(boxes):
+        key = {"detectionId": detection}
+        hand(judge, LOGIC + "Property", sample_time, sender, property=label, **key)
+        hand(judge, LOGIC + "BoundingBox", sample_time, sender, x=x, y=y, width=width, height=height, **key)
+
+
+def test_a_live_truth() -> None:
+    judge = service("--truth-sender=9", "--frame-sender=9", *LIMITS)
+    judge.begin(START)
+    for frame in range(3):
+        take(judge, frame, YELLOW, BLUE, sender=9)
+        take(judge, frame, BLUE)
+    hand(judge, ANNOUNCEMENT, 7, 9)
+    take(judge, 7, YELLOW)
+    judge.end_of_input(START + 1_000_000)
+    assert judge.verdict is None, "answers may follow for a second"
+    judge.update(START + 2_000_000)
+    assert judge.verdict is not None and judge.verdict.outcome == "failed"
+    checks = {check.name: check.value for check in judge.verdict.checks}
     assert [checks[name] for name in ("true-positives", "false-positives", "false-negatives", "frames")] == [3, 1, 3, 4]
 
 
-def test_a_silent_application_fails_when_the_time_is_over(truth: Path, cid: int, tmp_path: Path) -> None:
-    words = (f"--cid={cid}", f"--truth={truth}", "--max-delay=0.01", "--max-time=0.05", *LIMITS)
-    with running("object_detection", tmp_path, *words) as process:
-        code, output, _ = finished(process)
-    assert (code, json.loads(output)["reason"]) == (0, "no detection came within 0.05 s")
+def test_a_silent_application_fails_when_the_time_is_over(truth: Path) -> None:
+    judge = service(f"--truth={truth}", "--max-delay=0.01", "--max-time=0.05", *LIMITS)
+    judge.begin(START)
+    judge.update(START + 60_000)
+    assert judge.verdict is not None and judge.verdict.reason == "no detection came within 0.05 s"
 
 
-def test_a_truth_that_cannot_be_used_ends_it_before_it_is_ready(tmp_path: Path, cid: int) -> None:
+def test_a_truth_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, "{}")
-    code, output, errors = finished(launch("object_detection", tmp_path, f"--cid={cid}", f"--truth={path}", *LIMITS))
-    assert (code, output) == (2, "")
-    assert errors.endswith(f"{path}: expected an object with a list 'images'\n")
+    assert refusal("object_detection", f"--truth={path}", *LIMITS) == f"{path}: expected an object with a list 'images'"
 
 
-def test_help_says_what_it_does(tmp_path: Path, cid: int) -> None:
-    code, output, errors = finished(launch("object_detection", tmp_path, "--help"))
-    assert (code, errors) == (0, "") and "(equation 4.3)" in output
+def test_help_names_the_equations() -> None:
+    assert "(equation 4.3)" in help_text(load_manifest(ROOT / "services" / "object_detection"))

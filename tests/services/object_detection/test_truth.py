@@ -66,9 +66,9 @@ def change(path: tuple[Any, ...], value: Any) -> Callable[[dict[str, Any]], None
     ("path", "value", "said"),
     [
         (("images",), None, ": expected an object with a list 'images'"),
-        (("annotations",), [], ": has no boxes (annotations)"),
+        (("annotations",), [], ": annotations: no boxes, expected at least one"),
         (("annotations", 0), 3, ": annotations[0]: expected an object"),
-        (("annotations", 0, "image_id"), 6, ": annotations[0].image_id: there is none with the id 6"),
+        (("annotations", 0, "image_id"), 6, ": annotations[0].image_id: no entry has the id 6"),
         (("annotations", 1, "category_id"), "2", ": annotations[1].category_id: expected a whole number, 0 or more"),
         (
             ("annotations", 1, "bbox"),

@@ -2,18 +2,22 @@
 
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory import pixels
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
-from tests.services.process import PATIENCE, running, send
+from tests.services.built import MESSAGES, built
+from tests.services.process import running, send
 from tests.services.rec_replay.viewer import Viewer
 
 WIDTH, HEIGHT, COUNT = 160, 120, 8
@@ -48,32 +52,60 @@ def recorded(path: Path) -> list[int]:
     return [(e.sample_time - T0) // PERIOD for e in read_envelopes(path) if e.data_type == IMAGE]
 
 
-def wait_for(path: Path, numbers: list[int]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while recorded(path) != numbers:
-        assert time.monotonic() < deadline, f"{recorded(path)} were recorded"
-        time.sleep(0.002)
+class Stage:
+    """The recorder in this process, beside a camera."""
+
+    def __init__(self, recorder: Any, camera: CameraMemory) -> None:
+        self.recorder, self.camera = recorder, camera
+        self.update()
+
+    def update(self) -> None:
+        self.recorder.update(time.time_ns() // 1000)
+
+    def show(self, number: int) -> None:
+        self.camera.show(number)
+        self.update()
+
+    def hear(self, name: str, sample_time: int = 0, **fields: Any) -> None:
+        message = MESSAGES.type(name)(**fields)
+        envelope = Envelope(MESSAGES.id(name), MESSAGES.encode(message), 1, 1, sample_time, 0)
+        self.recorder.observe(envelope)
+        for (wanted, _), handler in self.recorder.inputs.items():
+            if wanted == name:
+                handler(message, sample_time)
 
 
-def record(cid: int, folder: Path, kind: str, *flags: str) -> Path:
-    path, camera = folder / "drive.rec", CameraMemory(kind)
+@contextmanager
+def staged(path: Path, kind: str, *flags: str) -> Iterator[Stage]:
+    camera = CameraMemory(kind)
     memories = f"--memories={camera.name}:{WIDTH}x{HEIGHT}"
-    with (
-        camera.memory,
-        Session(cid) as session,
-        running("rec_recorder", folder, f"--cid={cid}", f"--rec={path}", "--frames=20", memories, *flags),
-    ):
-        time.sleep(0.3)  # until the recorder has found the memory
+    with camera.memory, built("rec_recorder", f"--rec={path}", "--frames=20", memories, *flags) as recorder:
+        yield Stage(recorder, camera)
+
+
+def record(folder: Path, kind: str, *flags: str) -> Path:
+    path = folder / "drive.rec"
+    with staged(path, kind, *flags) as stage:
         for number in range(COUNT):
-            send(session, "opendlv.proxy.PedalPositionRequest", sample_time=T0 + number * PERIOD + 1, position=number)
-            camera.show(number)
-            wait_for(path, list(range(number + 1)))
+            stage.hear("opendlv.proxy.PedalPositionRequest", T0 + number * PERIOD + 1, position=number)
+            stage.show(number)
+    assert recorded(path) == list(range(COUNT))
     return path
 
 
+@pytest.mark.parametrize("kind", ["i420", "argb", "bgr"])
+def test_lossless_pictures_are_decoded_bit_for_bit(tmp_path: Path, kind: str) -> None:
+    decoder = VideoDecoder("h264")
+    envelopes = [e for e in read_envelopes(record(tmp_path, kind, "--lossless")) if e.data_type == IMAGE]
+    for number, envelope in enumerate(envelopes):
+        frame = decoder.decode(MESSAGES.decode(IMAGE, envelope.payload).data)
+        assert frame is not None and np.array_equal(frame.pixels(kind), scene(number, kind))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["i420", "argb"])
 def test_lossless_pictures_come_back_bit_for_bit(cid: int, tmp_path: Path, kind: str) -> None:
-    path = record(cid, tmp_path, kind, "--lossless")
+    path = record(tmp_path, kind, "--lossless")
     assert sum(e.data_type == 1086 for e in read_envelopes(path)) == COUNT
     name = f"played-{os.getpid()}"
     names = [f"--name.{each}={name}.{each}" for each in ("argb", "i420")]
@@ -88,9 +120,9 @@ def test_lossless_pictures_come_back_bit_for_bit(cid: int, tmp_path: Path, kind:
     assert viewer.seen == [(scene(n, kind).tobytes(), T0 + n * PERIOD) for n in range(COUNT)]
 
 
-def test_messages_are_as_opendlv_has_them(cid: int, tmp_path: Path) -> None:
-    path = record(cid, tmp_path, "i420", "--key-interval=3", "--quality=20", "--id=5")
-    decoder, messages = VideoDecoder("h264"), MessageSet.standard()
+def test_messages_are_as_opendlv_has_them(tmp_path: Path) -> None:
+    path = record(tmp_path, "i420", "--key-interval=3", "--quality=20", "--id=5")
+    decoder, messages = VideoDecoder("h264"), MESSAGES
     envelopes = [e for e in read_envelopes(path) if e.data_type == IMAGE]
     for number, envelope in enumerate(envelopes):
         image = messages.decode(IMAGE, envelope.payload)
@@ -105,24 +137,21 @@ def test_messages_are_as_opendlv_has_them(cid: int, tmp_path: Path) -> None:
     assert len(envelopes) == COUNT
 
 
-def test_commands_pause_pictures_and_messages(cid: int, tmp_path: Path) -> None:
-    path, camera = tmp_path / "drive.rec", CameraMemory("i420")
-    flags = (f"--cid={cid}", f"--rec={path}", "--frames=20", f"--memories={camera.name}:{WIDTH}x{HEIGHT}", "--paused")
-    with camera.memory, Session(cid) as session, running("rec_recorder", tmp_path, *flags):
-        send(session, "opendlv.proxy.PedalPositionRequest")
-        send(session, "cluon.data.RecorderCommand", command=1)
-        time.sleep(0.3)
-        camera.show(0)
-        wait_for(path, [0])
-        send(session, "cluon.data.RecorderCommand", command=2)
-        time.sleep(0.1)
-        camera.show(1)
-        time.sleep(0.1)
-        send(session, "cluon.data.RecorderCommand", command=1)
-        time.sleep(0.1)
-        camera.show(2)
-        wait_for(path, [0, 2])
+def test_commands_pause_pictures_and_messages(tmp_path: Path) -> None:
+    path, command = tmp_path / "drive.rec", "cluon.data.RecorderCommand"
+    with staged(path, "i420", "--paused") as stage:
+        stage.hear("opendlv.proxy.PedalPositionRequest")
+        stage.show(7)
+        stage.hear(command, command=1)
+        stage.update()
+        stage.show(0)
+        stage.hear(command, command=2)
+        stage.update()
+        stage.show(1)
+        stage.hear(command, command=1)
+        stage.update()
+        stage.show(2)
     envelopes = list(read_envelopes(path))
     assert [e.data_type for e in envelopes] == [IMAGE, 11, IMAGE]
-    image = MessageSet.standard().decode(IMAGE, envelopes[2].payload)
+    image = MESSAGES.decode(IMAGE, envelopes[2].payload)
     assert b"\0\0\0\1\x67" in image.data  # it can be decoded without the picture that is missing

@@ -7,7 +7,8 @@ from pathlib import Path
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from tests.services.process import PATIENCE, ROOT, launch, running, send
+from tests.services.built import refusal
+from tests.services.process import PATIENCE, ROOT, running, send
 
 
 def until_recorded(path: Path, count: int) -> list[Envelope]:
@@ -34,13 +35,10 @@ def test_every_message_is_there_even_after_a_kill(cid: int, tmp_path: Path) -> N
     assert list(read_envelopes(path)) == recorded
 
 
-def test_a_file_that_is_there_ends_it_before_it_is_ready(cid: int, tmp_path: Path) -> None:
+def test_a_file_that_is_there_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "drive.rec"
     path.write_bytes(b"dear")
-    recorder = launch("rec_recorder", tmp_path, f"--cid={cid}", f"--rec={path}")
-    output, errors = recorder.communicate(timeout=PATIENCE)
-    assert (recorder.returncode, output) == (2, "")
-    assert errors == f"rec-recorder: CRITICAL: {path} exists and is not overwritten\n"
+    assert refusal("rec_recorder", f"--rec={path}") == f"{path} exists and is not overwritten"
     assert path.read_bytes() == b"dear"
 
 

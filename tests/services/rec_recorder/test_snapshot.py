@@ -1,4 +1,3 @@
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -6,12 +5,11 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory import pixels
 from services.rec_recorder.snapshot import Snapshot
 from services.rec_recorder.source import MemorySpec, Source
-from tests.services.process import launch, running, send
-from tests.services.rec_recorder.test_pictures import HEIGHT, PATIENCE, WIDTH, CameraMemory, scene
+from tests.services.built import built, refusal
+from tests.services.rec_recorder.test_pictures import HEIGHT, WIDTH, CameraMemory, scene
 
 
 @pytest.fixture
@@ -62,30 +60,20 @@ def test_what_cannot_be_written_is_told(
     assert record.getMessage().startswith("no snapshot was taken: ") and words in record.getMessage()
 
 
-def test_the_recorder_takes_one_without_recording_frames(cid: int, camera: CameraMemory, tmp_path: Path) -> None:
+def test_the_recorder_takes_one_without_recording_frames(camera: CameraMemory, tmp_path: Path) -> None:
     path = tmp_path / "snapshot.png"
     memories = f"--memories={camera.name}:{WIDTH}x{HEIGHT}"
-    flags = (f"--cid={cid}", f"--rec={tmp_path / 'drive.rec'}", f"--snapshot={path}", memories)
-    with Session(cid) as session, running("rec_recorder", tmp_path, *flags) as recorder:
-        send(session, "dodo.TestBegin")
-        for number in range(1, 9):
-            if taken(path):
-                break
+    with built("rec_recorder", f"--rec={tmp_path / 'drive.rec'}", f"--snapshot={path}", memories) as recorder:
+        for number in (0, 1, 2):
+            recorder.update(number)
+            if number == 2:
+                recorder.begin(number)
             camera.show(number)
-            recorder_had_time(path)
-        recorder.terminate()
-        assert recorder.wait(PATIENCE) == 0
-    assert len(taken(path)) == 1
+        recorder.update(3)
+    assert taken(path) == [2]
+    assert (tmp_path / "drive.rec").stat().st_size == 0
 
 
-def recorder_had_time(path: Path) -> None:
-    deadline = time.monotonic() + 0.5
-    while not path.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-
-
-def test_a_snapshot_needs_a_memory(cid: int, tmp_path: Path) -> None:
-    flags = (f"--cid={cid}", f"--rec={tmp_path / 'drive.rec'}", "--snapshot=x.png")
-    recorder = launch("rec_recorder", tmp_path, *flags)
-    assert "--snapshot needs --memories" in recorder.communicate(timeout=PATIENCE)[1]
-    assert recorder.returncode == 2
+def test_a_snapshot_needs_a_memory(tmp_path: Path) -> None:
+    flags = (f"--rec={tmp_path / 'drive.rec'}", "--snapshot=x.png")
+    assert refusal("rec_recorder", *flags).startswith("--snapshot needs --memories")

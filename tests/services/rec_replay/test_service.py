@@ -2,20 +2,26 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from itertools import pairwise
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
-from tests.services.process import PATIENCE, launch, receive, running, send
+from services.base import Output
+from services.rec_replay.service import Replay
+from tests.services.built import built, hand, refusal
+from tests.services.process import PATIENCE, running, send
 from tests.services.rec_replay.recordings import T0, S, images, message, picture, write
 from tests.services.rec_replay.viewer import Viewer
 
 STATUS, END = 10, 2901
+BEGIN = 1_700_000_000 * S
 PEDAL = "opendlv.proxy.PedalPositionRequest"
 
 
@@ -38,32 +44,111 @@ def key(envelope: Envelope) -> tuple[int, bytes, int, int, int]:
     return envelope.data_type, envelope.payload, envelope.sent, envelope.sample_time, envelope.sender_stamp
 
 
-def test_messages_come_when_the_test_begins_and_then_the_input_ends(cid: int, tmp_path: Path) -> None:
+class Stage:
+    """A player in this process, in test time: `heard` are the envelopes with the time (us) at which they were sent."""
+
+    def __init__(self, service: Replay) -> None:
+        self.service, self.now = service, BEGIN
+        self.heard: list[tuple[int, Envelope]] = []
+        self.status: list[Any] = []
+
+    def run(self, seconds: float) -> None:
+        """Updates at the player's rate, until its input ends at most."""
+        end = self.now + round(seconds * S)
+        while self.now < end and not self.service.finished:
+            for each in self.service.update(self.now):
+                if isinstance(each, Output):
+                    self.status.append(each.message)
+                else:
+                    self.heard.append((self.now - BEGIN, each))
+            self.now += 1000
+
+    @property
+    def positions(self) -> list[float]:
+        decode = MessageSet.standard().decode
+        return [decode(each.data_type, each.payload).position for _, each in self.heard]
+
+
+@contextmanager
+def staged(rec: Path, *flags: str) -> Iterator[Stage]:
+    with built("rec_replay", f"--rec={rec}", *flags) as service:
+        yield Stage(service)
+
+
+def test_messages_come_when_the_test_begins_and_then_the_input_ends(tmp_path: Path) -> None:
     played = pedals([0, 0.1, 0.3])
-    rec = write(tmp_path / "drive.rec", played)
-    flags = (f"--cid={cid}", f"--rec={rec}", "--settle=0.1")
-    with Session(cid) as session, running("rec_replay", tmp_path, *flags) as process:
-        early = session.receive(0.2)
-        assert early is None or early.data_type == STATUS
-        send(session, "dodo.TestBegin")
-        heard = until_end(session)
-        assert process.wait(PATIENCE) == 0
-    assert [key(e) for e in heard] == [key(e) for e in played]
-    assert heard[-1].received - heard[0].received > 0.25 * S
+    with staged(write(tmp_path / "drive.rec", played), "--settle=0.1") as stage:
+        stage.run(0.2)
+        assert stage.heard == [] and stage.status
+        stage.service.begin(stage.now)
+        stage.run(9)
+    assert [key(e) for _, e in stage.heard] == [key(e) for e in played]
+    assert [time for time, _ in stage.heard] == pytest.approx([200_000, 300_000, 500_000], abs=1000)
+    assert stage.service.finished and stage.now - BEGIN == pytest.approx(600_000, abs=3000)
 
 
-def test_sample_times_of_the_test(cid: int, tmp_path: Path) -> None:
-    rec = write(tmp_path / "drive.rec", pedals([0, 0.1, 0.3]))
-    flags = (f"--cid={cid}", f"--rec={rec}", "--settle=0", "--sample-times=test")
-    with Session(cid) as session, running("rec_replay", tmp_path, *flags):
-        before = time.time_ns() // 1000
-        send(session, "dodo.TestBegin")
-        heard = until_end(session)
-    times = [e.sample_time for e in heard]
-    assert [t - times[0] for t in times] == [0, S // 10, 3 * S // 10]
-    assert before - S // 10 <= times[0] <= heard[0].received
+def test_sample_times_of_the_test(tmp_path: Path) -> None:
+    with staged(write(tmp_path / "drive.rec", pedals([0, 0.1, 0.3])), "--settle=0", "--sample-times=test") as stage:
+        stage.service.begin(stage.now)
+        stage.run(9)
+    assert [e.sample_time - BEGIN for _, e in stage.heard] == [0, S // 10, 3 * S // 10]
+    assert all(e.sent == e.sample_time for _, e in stage.heard)
 
 
+def test_commands(tmp_path: Path) -> None:
+    command = "cluon.data.PlayerCommand"
+    with staged(write(tmp_path / "drive.rec", pedals([n * 0.5 for n in range(8)])), "--timemod=5") as stage:
+        for _ in range(2):
+            hand(stage.service, command, command=4)
+        stage.run(0.5)
+        assert stage.positions == [0, 1]
+        hand(stage.service, command, command=3, seekTo=0.75)
+        hand(stage.service, command, command=4)
+        stage.run(1)
+        assert stage.positions == [0, 1, 6]
+        status = stage.status[-1]
+        assert (status.state, status.numberOfEntries, status.currentEntryForPlayback) == (2, 8, 7)
+        hand(stage.service, command, command=3, seekTo=0.5)
+        hand(stage.service, command, command=1)
+        stage.run(2)
+    assert stage.positions[3:] == [4, 5, 6, 7] and stage.service.finished
+
+
+def test_it_repeats(tmp_path: Path) -> None:
+    rec = write(tmp_path / "drive.rec", pedals([0, 0.01, 0.02]))
+    with staged(rec, "--autorewind", "--await-begin=false") as stage:
+        stage.run(0.2)
+    assert stage.positions[:12] == [0, 1, 2] * 4 and not stage.service.finished
+
+
+def test_recordings_that_cannot_be_played(tmp_path: Path) -> None:
+    empty, garbage = tmp_path / "empty.rec", tmp_path / "garbage.rec"
+    empty.touch()
+    garbage.write_bytes(b"no recording at all")
+    others = write(tmp_path / "others.rec", [*pedals([0]), *images([0], sender_stamp=3)])
+    undecodable = write(tmp_path / "undecodable.rec", images([0, 0.1])[1:])
+    problems = {
+        empty: f"{empty} is empty: there is nothing to play",
+        garbage: f"{garbage} is no recording: there is no message in its 19 bytes",
+        others: f"{others} has no pictures of sender 0, but of 3: set --video-sender",
+        undecodable: f"none of the 1 pictures in {undecodable} can be decoded",
+        tmp_path / "none.rec": f"[Errno 2] No such file or directory: '{tmp_path / 'none.rec'}'",
+    }
+    for path, problem in problems.items():
+        assert refusal("rec_replay", f"--rec={path}") == problem
+
+
+def test_damage_and_missing_pictures_are_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    rec = write(tmp_path / "drive.rec", pedals([0, 0.1]))
+    rec.write_bytes(rec.read_bytes() + b"\x0d\xa4cut")
+    with staged(rec, "--await-begin=false", "--settle=0") as stage:
+        stage.run(9)
+    assert len(stage.heard) == 2
+    assert f"{rec}: skipped 5 bytes at byte" in caplog.text
+    assert "has no pictures in the selected part: no shared memory is created" in caplog.text
+
+
+@pytest.mark.slow
 def test_pictures_with_their_sample_times(cid: int, tmp_path: Path) -> None:
     times = [n / 20 for n in range(12)]
     rec = write(tmp_path / "drive.rec", [*images(times), *images([0, 0.1], sender_stamp=3)])
@@ -82,66 +167,6 @@ def test_pictures_with_their_sample_times(cid: int, tmp_path: Path) -> None:
     assert i420.seen == [(picture(n).tobytes(), T0 + round(t * S)) for n, t in enumerate(times)]
     assert [sampled for _, sampled in argb.seen] == [sampled for _, sampled in i420.seen]
     assert all(data[3::4] == b"\xff" * (len(data) // 4) for data, _ in argb.seen)
-
-
-def test_commands(cid: int, tmp_path: Path) -> None:
-    rec = write(tmp_path / "drive.rec", pedals([n * 0.5 for n in range(8)]))
-    command = "cluon.data.PlayerCommand"
-
-    def position(session: Session) -> float:
-        return float(receive(session, PEDAL)[1].position)
-
-    with Session(cid) as session, running("rec_replay", tmp_path, f"--cid={cid}", f"--rec={rec}", "--timemod=5"):
-        for _ in range(2):
-            send(session, command, command=4)
-        assert [position(session), position(session)] == [0, 1]
-        send(session, command, command=3, seekTo=0.75)
-        send(session, command, command=4)
-        assert position(session) == 6
-        _, status = receive(session, "cluon.data.PlayerStatus")
-        assert (status.state, status.numberOfEntries, status.currentEntryForPlayback) == (2, 8, 7)
-        send(session, command, command=3, seekTo=0.5)
-        send(session, command, command=1)
-        assert [position(session) for _ in range(4)] == [4, 5, 6, 7]
-
-
-def test_it_begins_anew(cid: int, tmp_path: Path) -> None:
-    rec = write(tmp_path / "drive.rec", pedals([0, 0.01, 0.02]))
-    flags = (f"--cid={cid}", f"--rec={rec}", "--autorewind", "--await-begin=false")
-    with Session(cid) as session, running("rec_replay", tmp_path, *flags):
-        positions = [receive(session, PEDAL)[1].position for _ in range(12)]
-    assert [b - a for a, b in pairwise(positions)].count(-2) >= 3
-
-
-def test_recordings_that_cannot_be_played(cid: int, tmp_path: Path) -> None:
-    empty, garbage = tmp_path / "empty.rec", tmp_path / "garbage.rec"
-    empty.touch()
-    garbage.write_bytes(b"no recording at all")
-    others = write(tmp_path / "others.rec", [*pedals([0]), *images([0], sender_stamp=3)])
-    undecodable = write(tmp_path / "undecodable.rec", images([0, 0.1])[1:])
-    problems = {
-        empty: f"{empty} is empty: there is nothing to play",
-        garbage: f"{garbage} is not a recording: its 19 bytes hold no message",
-        others: f"{others} has no pictures of sender 0, but of 3: set --video-sender",
-        undecodable: f"none of the 1 pictures in {undecodable} can be decoded",
-        tmp_path / "none.rec": f"[Errno 2] No such file or directory: '{tmp_path / 'none.rec'}'",
-    }
-    for path, problem in problems.items():
-        process = launch("rec_replay", tmp_path, f"--cid={cid}", f"--rec={path}")
-        output, errors = process.communicate(timeout=PATIENCE)
-        assert (process.returncode, output) == (2, "")
-        assert errors.splitlines()[-1] == f"rec-replay: CRITICAL: {problem}"
-
-
-def test_damage_and_missing_pictures_are_told(cid: int, tmp_path: Path) -> None:
-    rec = write(tmp_path / "drive.rec", pedals([0, 0.1]))
-    rec.write_bytes(rec.read_bytes() + b"\x0d\xa4cut")
-    flags = (f"--cid={cid}", f"--rec={rec}", "--await-begin=false", "--settle=0")
-    with Session(cid) as session, running("rec_replay", tmp_path, *flags) as process:
-        assert len(until_end(session)) == 2
-        errors = process.communicate(timeout=PATIENCE)[1]
-    assert f"{rec}: skipped 5 bytes at byte" in errors
-    assert "has no pictures in the selected part: no shared memory is created" in errors
 
 
 def replayed_by_libcluon(cid: int, rec: Path) -> list[Envelope]:
@@ -170,6 +195,7 @@ def shortened(rec: Path, count: int, target: Path) -> Path:
     return write(target, rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "count"), [("sim-2023-04-27.rec", 500), ("cones-2020-05-15.rec", 30)])
 def test_the_bus_has_what_cluon_replay_sends(
     cid: int, tmp_path: Path, shared_data: Callable[[str], Path], name: str, count: int
@@ -180,6 +206,7 @@ def test_the_bus_has_what_cluon_replay_sends(
     assert len(ours) == count
 
 
+@pytest.mark.slow
 def test_every_message_of_real_recordings(cid: int, tmp_path: Path, shared_data: Callable[[str], Path]) -> None:
     rec = shared_data("sim-2023-04-27.rec")
     flags = (f"--cid={cid}", f"--rec={rec}", "--timemod=50", "--settle=0", "--await-begin=false")
@@ -189,6 +216,7 @@ def test_every_message_of_real_recordings(cid: int, tmp_path: Path, shared_data:
         assert [key(e) for e in heard] == [key(e) for e in recording.envelopes(recording.by_time())]
 
 
+@pytest.mark.slow
 def test_every_picture_of_the_track(cid: int, tmp_path: Path, shared_data: Callable[[str], Path]) -> None:
     rec = shared_data("track-1-2025-05-08.rec")
     names = [f"--name.{kind}=track-{os.getpid()}.{kind}" for kind in ("argb", "i420")]

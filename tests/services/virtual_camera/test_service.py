@@ -232,6 +232,7 @@ def test_what_cannot_be_is_told(camera, flag, message):
         camera("--truth-sender=9", flag)
 
 
+@pytest.mark.slow
 def test_boxes_on_the_bus_bear_the_time_of_the_picture_in_memory(tmp_path, cid):
     names = [f"--name.{kind}=dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420")]
     flags = [f"--cid={cid}", f"--map-path={STRAIGHT}", *PLACE, *names, "--start-y=0", "--truth-sender=9", "--freq=20"]

@@ -1,0 +1,38 @@
+"""Services in this process, as their command line builds them: no bus, and time as the test says."""
+
+import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.base import Context
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from tests.services.process import ROOT
+
+MESSAGES = MessageSet.standard()
+
+
+@contextmanager
+def built(module: str, *flags: str) -> Iterator[Any]:
+    """The service of `services.<module>`; what it holds is let go at the end. Raises what its `build` raises."""
+    manifest = load_manifest(ROOT / "services" / module)
+    context = Context(manifest["name"], parse(manifest, ["--cid=128", *flags]), MESSAGES)
+    with context.resources:
+        yield importlib.import_module(f"services.{module}.service").build(context)
+
+
+def refusal(module: str, *flags: str) -> str:
+    """Why a service cannot be built: the sentence with which its process ends."""
+    try:
+        with built(module, *flags):
+            pass
+    except (ValueError, OSError, RuntimeError) as error:
+        return " ".join(str(error).split())
+    raise AssertionError(f"{module} was built")
+
+
+def hand(service: Any, name: str, time: int = 0, sender_stamp: int | None = None, **fields: Any) -> None:
+    """Give a service a message, as its loop does."""
+    service.inputs[name, sender_stamp](MESSAGES.type(name)(**fields), time)

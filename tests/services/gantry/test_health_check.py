@@ -1,0 +1,56 @@
+import math
+from pathlib import Path
+
+import pytest
+
+from services.gantry import health_check
+from services.gantry.health_check import home, read_state, run_checks
+from services.gantry.link import Link
+from services.gantry.motion import Limits
+from services.gantry.port import SerialPort
+from services.gantry.protocol import Status
+from tests.services.gantry.fake_rig import FakeRig
+
+
+@pytest.fixture
+def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[FakeRig, Link]":
+    """A rig whose home is found at once, wherever it is."""
+    monkeypatch.setattr(health_check, "ROUNDS", 3)
+    monkeypatch.setattr(health_check, "TRIES", 1)
+    with FakeRig(tmp_path / "rig") as rig:
+        link = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
+        yield rig, link
+        link.close()
+
+
+def test_the_home_is_inside_the_limits_by_less_than_a_millimetre() -> None:
+    limits = Limits()
+    at = home(limits)
+    assert limits.holds(at) and at.yaw - limits.low.yaw == pytest.approx(1e-4)
+    assert math.dist((at.x, at.y), (limits.low.x, limits.low.y)) == 0
+
+
+def test_a_rig_that_is_not_calibrated_has_a_status_and_no_position(line: "tuple[FakeRig, Link]") -> None:
+    rig, link = line
+    rig.calibrated = False
+    assert read_state(link) == (None, Status.NOT_CALIBRATED)
+    rig.calibrated = True
+    at, status = read_state(link)
+    assert at is not None and (at.x, status) == (0.1, Status.IDLE)
+
+
+def test_a_home_that_is_not_where_it_was_fails_with_its_axis(line: "tuple[FakeRig, Link]") -> None:
+    """Homing takes the same time from everywhere, as if the switch moved with the rig."""
+    result = run_checks(line[1], Limits(), 5.0)
+    assert not result["ok"]
+    assert result["reason"].startswith("homing x is ") and result["reason"].endswith("mm, expected at most 5")
+    named = {check["name"]: check["ok"] for check in result["checks"]}
+    assert named == {"answers": True, "latency": True, "homing x": False, "homing y": False, "homing yaw": False}
+
+
+def test_an_old_fault_fails_and_is_not_erased(line: "tuple[FakeRig, Link]") -> None:
+    rig, link = line
+    rig.status = int(Status.STALL)
+    result = run_checks(link, Limits(), 5.0)
+    assert (result["ok"], result["checks"]) == (False, [])
+    assert "a motor stalled" in result["reason"] and rig.status == Status.STALL
