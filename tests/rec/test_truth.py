@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.rec.truth import Mark, TruthError, check, drawn, mark, read, text
@@ -43,6 +43,7 @@ def test_what_is_written_is_read_here_and_by_the_evaluator(path: Path, written: 
         assert np.multiply(thing.box, (WIDTH, HEIGHT, WIDTH, HEIGHT)) == pytest.approx(each[1:])
 
 
+@settings(max_examples=50)
 @given(st.fixed_dictionaries({}, optional={"images": entries, "categories": entries, "annotations": entries}) | values)
 def test_whatever_a_file_holds_is_refused_in_a_sentence(path: Path, document: object) -> None:
     path.write_text(json.dumps(document))
