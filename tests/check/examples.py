@@ -44,10 +44,10 @@ def files(example: str) -> dict[str, str]:
     """An example's files by path; the test and the deployment have the keys that the example leaves out."""
     first, *rest = _HEADER.split(example + "\n")
     written = {EXAMPLE: first, **dict(zip(rest[::3], rest[2::3], strict=True))}
-    return {**FILES, **{path: _merged(path, text) if path in MERGED else text for path, text in written.items()}}
+    return {**FILES, **{path: with_keys_of(path, text) if path in MERGED else text for path, text in written.items()}}
 
 
-def _merged(path: str, text: str) -> str:
+def with_keys_of(path: str, text: str) -> str:
     """The file with the example's top-level keys in place of its own."""
     if text.startswith("dodo: 1"):
         return text

@@ -1,0 +1,107 @@
+"""The deployment file."""
+
+import ipaddress
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl import package_data
+from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+
+
+def loaded(folder: Path, text: str) -> tuple[Deployment, list[tuple[str, str]]]:
+    (folder / "dodo.yml").write_text(f"dodo: 1\n{text}")
+    deployment, problems = load_deployment(folder / "dodo.yml")
+    return deployment, [(problem.rule, problem.message) for problem in problems]
+
+
+def test_without_a_file(tmp_path: Path) -> None:
+    assert find_deployment(tmp_path) is None
+    deployment, problems = load_deployment(None)
+    assert (deployment.file, deployment.registry, problems) == (None, (package_data.registry(),), [])
+
+
+def test_the_nearest_file(tmp_path: Path) -> None:
+    (tmp_path / "a/b").mkdir(parents=True)
+    (tmp_path / "dodo.yml").touch()
+    assert find_deployment(tmp_path / "a/b") == tmp_path / "dodo.yml"
+    (tmp_path / "a/dodo.yml").touch()
+    assert find_deployment(tmp_path / "a/b") == tmp_path / "a/dodo.yml"
+
+
+def test_defaults(tmp_path: Path) -> None:
+    deployment, problems = loaded(tmp_path, "")
+    assert problems == []
+    assert (deployment.root, deployment.registry) == (tmp_path, (package_data.registry(),))
+    assert not {111, 112} & set(deployment.cids)
+    assert deployment.gates
+
+
+def test_everything(tmp_path: Path) -> None:
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "compose.yml").touch()
+    (tmp_path / "my.odvd").write_text("message my.Own [id = 3000] { float x [id = 1]; }")
+    deployment, problems = loaded(
+        tmp_path,
+        "registry: [tests, 'dodo:']\nservices: [tests]\nmessages: [my.odvd]\napplication: [compose.yml]\n"
+        "images: {prefix: own, tag: '7'}\ncids: 110-130\nsubnets: 10.1.0.0/24\ngates: false\n"
+        "rigs: {kiwi: {kind: static, cid: 120}}\n",
+    )
+    assert problems == []
+    assert deployment.registry == (tmp_path / "tests", package_data.registry())
+    assert (deployment.services, deployment.messages) == ((tmp_path / "tests",), (tmp_path / "my.odvd",))
+    assert deployment.application == (tmp_path / "compose.yml",)
+    assert (deployment.image_prefix, deployment.image_tag, deployment.gates) == ("own", "7", False)
+    assert set(deployment.cids) == set(range(110, 131)) - {111, 112, 120}
+    assert deployment.subnets == ipaddress.IPv4Network("10.1.0.0/24")
+    assert deployment.rig("kiwi") is deployment.rigs["kiwi"]
+    emulated = deployment.rig("emulated")
+    assert emulated is not None
+    assert emulated.is_emulated
+    assert deployment.rig("other") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("registry: [none]", ("missing-file", "there is no folder 'none'")),
+        ("application: none", ("missing-file", "there is no file 'none'")),
+        (
+            "cids: 254-1",
+            (
+                "out-of-range",
+                "'254-1' is not a range of CIDs, expected numbers from 1 to 254, the lower one first",
+            ),
+        ),
+        ("subnets: 10.0.0.1/16", ("wrong-value", "not an IPv4 network: 10.0.0.1/16 has host bits set")),
+        ("subnets: 10.0.0.0/30", ("out-of-range", "'10.0.0.0/30' is too small, every test needs a /28")),
+        (
+            "rigs: {emulated: {kind: static, cid: 120}}",
+            ("rig-name", "the name 'emulated' is reserved for the built-in rig"),
+        ),
+        (
+            "rigs: {a: {kind: static, cid: 120}, b: {kind: static, cid: 120}}",
+            ("rig-cid", "CID 120 is taken by rig 'a', expected one that only this rig has"),
+        ),
+        (
+            "rigs: {a: {kind: static, cid: 112}}",
+            ("rig-cid", "CID 112 is taken by real cars, expected one that only this rig has"),
+        ),
+    ],
+)
+def test_what_is_refused(text: str, problem: tuple[str, str], tmp_path: Path) -> None:
+    assert loaded(tmp_path, f"{text}\n")[1] == [problem]
+
+
+def test_messages_that_cannot_be_read(tmp_path: Path) -> None:
+    (tmp_path / "my.odvd").write_text("message my.Own [id = 3000] {\n float x }")
+    _, ((rule, message),) = loaded(tmp_path, "messages: [my.odvd]\n")
+    assert rule == "wrong-messages"
+    assert message
+
+
+def test_an_empty_file(tmp_path: Path) -> None:
+    (tmp_path / "dodo.yml").touch()
+    deployment, (problem,) = load_deployment(tmp_path / "dodo.yml")
+    assert problem.message == "the file is empty, expected at least 'dodo: 1'"
+    assert deployment.registry == (package_data.registry(),)

@@ -1,0 +1,98 @@
+"""Specs over the specs that they extend."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.source import Mapping, plain, read
+from dodo_dsl.spec.extends import MAX_CHAIN, is_text, resolve
+from tests.source.nodes import mapping
+
+BASE = "name: base\nlevel: sil\nmatrix: {a: [1, 2]}\naction: {car: {uses: model, with: {x: 1 m, y: 2 m}}}\n"
+
+
+def resolved(folder: Path, text: str, **others: str) -> tuple[Any, list[tuple[str, str]]]:
+    """A spec in a registry, beside others by the names of their files."""
+    for name, content in {"own": text, "base": BASE, **others}.items():
+        (folder / f"{name}.dodo.yml").write_text(content)
+    node, _ = read(folder / "own.dodo.yml")
+    assert node is not None
+    found, problems = resolve(node, folder / "own.dodo.yml", folder)
+    return plain(found), [(problem.rule, problem.message) for problem in problems]
+
+
+def test_mappings_merge_and_values_replace(tmp_path: Path) -> None:
+    own = "extends: base.dodo.yml\nname: own\nmatrix: {a: [3]}\naction: {car: {with: {x: 5 m}}}\n"
+    expected = {
+        "level": "sil",
+        "matrix": {"a": [3]},
+        "action": {"car": {"uses": "model", "with": {"x": "5 m", "y": "2 m"}}},
+        "name": "own",
+    }
+    assert resolved(tmp_path, own) == (expected, [])
+
+
+def test_a_name_is_never_inherited(tmp_path: Path) -> None:
+    assert "name" not in resolved(tmp_path, "extends: base.dodo.yml\n")[0]
+
+
+def test_null_removes(tmp_path: Path) -> None:
+    own, problems = resolved(tmp_path, "extends: base.dodo.yml\nmatrix:\naction: {car: {with: {y: }}}\n")
+    assert own == {"level": "sil", "action": {"car": {"uses": "model", "with": {"x": "1 m"}}}}
+    assert problems == []
+
+
+def test_another_service_starts_without_the_parameters(tmp_path: Path) -> None:
+    own, _ = resolved(tmp_path, "extends: base.dodo.yml\naction: {car: {uses: other, with: {z: 1}}}\n")
+    assert own["action"] == {"car": {"uses": "other", "with": {"z": 1}}}
+    own, _ = resolved(tmp_path, "extends: base.dodo.yml\naction: {car: {uses: model}}\n")
+    assert own["action"]["car"]["with"] == {"x": "1 m", "y": "2 m"}
+
+
+def test_spans_keep_their_files(tmp_path: Path) -> None:
+    resolved(tmp_path, "extends: base.dodo.yml\nlevel: hil\n")
+    node, _ = read(tmp_path / "own.dodo.yml")
+    assert node is not None
+    found, _ = resolve(node, tmp_path / "own.dodo.yml", tmp_path)
+    assert isinstance(found, Mapping)
+    assert {key: Path(entry.value.span.file).name for key, entry in found.entries.items()} == {
+        "level": "own.dodo.yml",
+        "matrix": "base.dodo.yml",
+        "action": "base.dodo.yml",
+    }
+
+
+@pytest.mark.parametrize(
+    ("path", "problem"),
+    [
+        ("none.dodo.yml", ("extends-file", "there is no file 'none.dodo.yml' to extend")),
+        ("folder", ("extends-file", "'folder' is a folder, expected a test's file")),
+        ("list.dodo.yml", ("extends-file", "'list.dodo.yml' does not contain a test")),
+        ("empty.dodo.yml", ("extends-file", "'empty.dodo.yml' does not contain a test")),
+        ("../up.dodo.yml", ("path-escape", "'../up.dodo.yml' leaves the registry")),
+        ("own.dodo.yml", ("extends-cycle", "the test extends itself: own.dodo.yml extends own.dodo.yml")),
+        ('"a\\0b"', ("extends-file", "'a\0b' is not a path")),
+    ],
+)
+def test_what_cannot_be_extended(path: str, problem: tuple[str, str], tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    _, problems = resolved(tmp_path, f"extends: {path}\n", list="[a]\n", empty="")
+    assert problems == [problem]
+
+
+def test_a_long_chain(tmp_path: Path) -> None:
+    chain = {f"t{n}": f"extends: t{n + 1}.dodo.yml\n" for n in range(MAX_CHAIN + 1)}
+    _, problems = resolved(tmp_path, "extends: t0.dodo.yml\n", **chain)
+    assert problems == [("extends-cycle", f"the chain of extended tests is longer than {MAX_CHAIN}")]
+
+
+def test_a_key_that_cannot_be_removed(tmp_path: Path) -> None:
+    _, ((rule, message),) = resolved(tmp_path, "extends: base.dodo.yml\nmatrx:\n")
+    assert rule == "extends-nothing"
+    assert message.startswith("'matrx' is empty, which would remove it, but ")
+
+
+@pytest.mark.parametrize(("text", "expected"), [("a: 1", True), ("extends: x", True), ("extends: [x]", False)])
+def test_what_can_be_read_as_a_path(text: str, expected: bool) -> None:
+    assert is_text(mapping(text)) is expected

@@ -1,0 +1,73 @@
+"""Specs as they are written, instance by instance."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.spec.model import Spec, load_spec
+from dodo_dsl.spec.registry import Location
+from tests.check import examples
+
+
+def loaded(folder: Path, text: str) -> tuple[list[Spec], list[str]]:
+    path = folder / "example" / "example.dodo.yml"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text)
+    specs, problems = load_spec(Location(path, folder))
+    return specs, [problem.rule for problem in problems]
+
+
+def test_a_spec(tmp_path: Path) -> None:
+    more = "seed: 7\nisolation: host\nrecord: {frames: 2 Hz}\n"
+    (spec,), problems = loaded(tmp_path, examples.SPEC.replace("60 s", "1.5 min") + more)
+    assert problems == []
+    assert (spec.name, spec.level, spec.kind, spec.clock) == ("example", "sil", "closed-loop", "realtime")
+    assert (spec.timeout_s, spec.seed, spec.isolation, spec.frames_hz, spec.rig) == (90.0, 7, "host", 2.0, None)
+    assert [(use.layer, use.name, use.uses.text) for use in spec.uses] == [
+        ("environment", "camera", "virtual-camera"),
+        ("action", "vehicle", "dynamic-model"),
+        ("action", "pose", "integrator"),
+        ("evaluation", "track", "collision"),
+    ]
+    assert (spec.title, spec.slug, spec.is_whole) == ("example", "example", True)
+    assert spec.span("timeout").line == 6
+    assert spec.span("rig").line == 1
+
+
+def test_instances(tmp_path: Path) -> None:
+    specs, problems = loaded(tmp_path, examples.SPEC.replace("finish line.", "${matrix.a}") + "matrix: {a: [x, y]}\n")
+    assert problems == []
+    assert [(spec.title, spec.slug) for spec in specs] == [
+        ("example[a=x]", "example--a-x"),
+        ("example[a=y]", "example--a-y"),
+    ]
+    assert [spec.description for spec in specs] == ["Drive to the x", "Drive to the y"]
+
+
+def test_a_problem_in_a_parameter_is_left_to_the_rules(tmp_path: Path) -> None:
+    text = examples.SPEC.replace("{goal: finish}", '{goal: "${matrix.a}"}') + "matrix: {a: [1, 2]}\nlevel: 3\n"
+    assert loaded(tmp_path, text)[1].count("duplicate-key") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rules", "whole"),
+    [
+        ("timeout: 60 s", "timeout: 0 s", ["out-of-range"], True),
+        ("action:", "actoin:", ["unknown-key"], False),
+        ("{uses: integrator}", "3", ["wrong-type"], False),
+        ("{uses: integrator}", "{}", ["missing-key"], False),
+        ("level: sil", "extends: none.dodo.yml", ["extends-file"], False),
+        ("level: sil", "extends: [a]", ["wrong-type"], False),
+        ("level: sil", "note: x", ["unknown-key", "missing-key"], True),
+    ],
+)
+def test_specs_with_problems(old: str, new: str, rules: list[str], whole: bool, tmp_path: Path) -> None:
+    (spec,), problems = loaded(tmp_path, examples.SPEC.replace(old, new, 1))
+    assert sorted(problems) == sorted(rules)
+    assert spec.is_whole is whole
+
+
+@pytest.mark.parametrize(("text", "rule"), [("", "missing-key"), ("- a\n", "wrong-type"), ("a: [", "yaml-syntax")])
+def test_what_is_no_spec(text: str, rule: str, tmp_path: Path) -> None:
+    (spec,), problems = loaded(tmp_path, text)
+    assert (spec.title, problems) == ("example", [rule])
