@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.gl_peer import GlPeer, ssim
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
@@ -31,13 +31,13 @@ from services.virtual_camera.draw.scene import SceneOptions, load_scene
 from services.virtual_camera.image.lens import Distortion
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.sensor import Sensor
-from services.virtual_camera.motion import Motion, still
-from services.virtual_camera.truth import Limits, Truth, classes_of
+from services.virtual_camera.motion import CameraMotion, still
+from services.virtual_camera.truth import SceneTruth, TruthLimits, classes_of
 
 SIZE, FOVY = (1280, 720), math.radians(48.8)
 CONES = 90
 ROUNDS, FRAMES = 7, 40
-BODY = Pose.at(0, 0, 0)
+BODY = CameraPose.at(0, 0, 0)
 ONE_THREAD = dict.fromkeys(("LP_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 
@@ -64,13 +64,13 @@ def make_map(folder: Path) -> Path:
     return folder
 
 
-def drive() -> list[Pose]:
+def drive() -> list[CameraPose]:
     """Along the oval's middle, counter-clockwise."""
     turns = [2 * math.pi * k / FRAMES for k in range(FRAMES)]
-    return [Pose.at(2 * math.cos(t), 2 * math.sin(t), 0.095, yaw=t + math.pi / 2) for t in turns]
+    return [CameraPose.at(2 * math.cos(t), 2 * math.sin(t), 0.095, yaw=t + math.pi / 2) for t in turns]
 
 
-def rate(draw: Callable[[Pose], object]) -> float:
+def rate(draw: Callable[[CameraPose], object]) -> float:
     """Pictures a second over the whole drive."""
     start = time.perf_counter()
     for pose in drive():
@@ -91,10 +91,10 @@ def beside(folder: Path, keep: Path | None) -> None:
     camera, gl = Renderer(load_scene(folder), *SIZE, FOVY), peer(folder)
     image = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
 
-    def ours(pose: Pose) -> Image:
+    def ours(pose: CameraPose) -> Image:
         return camera.render(pose, image)
 
-    def theirs(pose: Pose) -> Image:
+    def theirs(pose: CameraPose) -> Image:
         assert gl is not None
         view = camera.camera.view(pose)
         return gl.render(view.position, view.axes)
@@ -126,16 +126,16 @@ CONDITIONS: dict[str, tuple[SceneOptions, dict[str, object]]] = {
 }
 
 
-def condition(folder: Path, name: str) -> Callable[[Pose], object]:
+def condition(folder: Path, name: str) -> Callable[[CameraPose], object]:
     options, parts = CONDITIONS[name]
     optics = Optics(Pinhole(*SIZE, FOVY), **parts)  # type: ignore[arg-type]
     renderer = Renderer(load_scene(folder, options), optics.wide.width, optics.wide.height, optics.wide.fovy)
-    truth = Truth(renderer, classes_of([], renderer.bodies.names), Limits()) if name == "boxes" else None
+    truth = SceneTruth(renderer, classes_of([], renderer.bodies.names), TruthLimits()) if name == "boxes" else None
     out = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
 
-    def draw(pose: Pose) -> None:
+    def draw(pose: CameraPose) -> None:
         forward = pose.rotation[:, 0] * 0.5
-        motion = Motion(pose, forward, np.array([0, 0, 0.3])) if "shutter" in parts else still(pose)
+        motion = CameraMotion(pose, forward, np.array([0, 0, 0.3])) if "shutter" in parts else still(pose)
         optics.expose(renderer, motion, BODY, int(pose.position[0] * 1e6) % 10**9, out)
         if truth is not None:
             truth.boxes(pose)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
@@ -17,14 +17,14 @@ from services.virtual_camera.draw.scene import SceneOptions, load_scene
 from services.virtual_camera.image.lens import Distortion
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.sensor import Sensor
-from services.virtual_camera.motion import Motion
-from services.virtual_camera.truth import Limits, Truth, classes_of
+from services.virtual_camera.motion import CameraMotion
+from services.virtual_camera.truth import SceneTruth, TruthLimits, classes_of
 
 MAP = package_data.registry() / "maps" / "left-curve"
 SIZE, FOVY, COLUMNS = (288, 216), math.radians(48.8), 4
 LABEL = 24
-PLACE = Pose.at(0.0, 0.2, 0.095, yaw=math.pi / 2)
-MOTION = Motion(PLACE, np.array([0.0, 0.6, 0.0]), np.array([0.0, 0.0, 0.5]))
+PLACE = CameraPose.at(0.0, 0.2, 0.095, yaw=math.pi / 2)
+MOTION = CameraMotion(PLACE, np.array([0.0, 0.6, 0.0]), np.array([0.0, 0.0, 0.5]))
 SHEET: dict[str, tuple[SceneOptions, dict[str, object]]] = {
     "normal": (SceneOptions(), {}),
     "clutter=60": (SceneOptions(clutter=60, seed=1), {}),
@@ -38,7 +38,7 @@ SHEET: dict[str, tuple[SceneOptions, dict[str, object]]] = {
 
 
 def draw_boxes(picture: Image, renderer: Renderer) -> None:
-    truth = Truth(renderer, classes_of([], renderer.bodies.names), Limits())
+    truth = SceneTruth(renderer, classes_of([], renderer.bodies.names), TruthLimits())
     for box in truth.boxes(PLACE):
         corner, end = (box.left, box.top), (box.left + box.width, box.top + box.height)
         cv2.rectangle(picture, [round(v) - 1 for v in corner], [round(v) for v in end], (40, 40, 255, 255))
@@ -49,7 +49,7 @@ def tiles() -> Iterator[Image]:
         optics = Optics(Pinhole(*SIZE, FOVY), **parts)  # type: ignore[arg-type]
         renderer = Renderer(load_scene(MAP, options), optics.wide.width, optics.wide.height, optics.wide.fovy)
         picture = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
-        optics.expose(renderer, MOTION, Pose.at(0, 0, 0), 1_000_000, picture)
+        optics.expose(renderer, MOTION, CameraPose.at(0, 0, 0), 1_000_000, picture)
         if "boxes" in name:
             draw_boxes(picture, renderer)
         picture[:LABEL] = 255

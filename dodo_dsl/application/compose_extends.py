@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import compose_merge, compose_paths
-from dodo_dsl.application.compose_files import Files
+from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.source import Entry, Node, Scalar
 
@@ -14,7 +14,7 @@ MAX_DEPTH = 8
 
 
 @dataclass(frozen=True)
-class Service:
+class ExtendedService:
     """A service in a file; the file's paths are relative to ``folder``."""
 
     file: Path
@@ -22,7 +22,9 @@ class Service:
     name: str
 
 
-def extended(files: Files, service: Service, node: Node, chain: tuple[Service, ...] = ()) -> Node:
+def extended(
+    files: ComposeFiles, service: ExtendedService, node: Node, chain: tuple[ExtendedService, ...] = ()
+) -> Node:
     """The service merged over what it extends."""
     if not isinstance(node, source.Mapping) or "extends" not in node.entries or files.full:
         return node
@@ -33,7 +35,7 @@ def extended(files: Files, service: Service, node: Node, chain: tuple[Service, .
     return result
 
 
-def _base(files: Files, entry: Entry, chain: tuple[Service, ...]) -> Node | None:
+def _base(files: ComposeFiles, entry: Entry, chain: tuple[ExtendedService, ...]) -> Node | None:
     words = entry.value.entries if isinstance(entry.value, source.Mapping) else {"service": entry}
     word, where = (words[key].value if key in words else None for key in ("service", "file"))
     if not isinstance(word, Scalar) or not (where is None or isinstance(where, Scalar)):
@@ -45,12 +47,16 @@ def _base(files: Files, entry: Entry, chain: tuple[Service, ...]) -> Node | None
     document = files.document(file) if file else None
     if file is None or document is None:
         return None
-    base = Service(file, file.parent if where else chain[-1].folder, word.text)
+    base = ExtendedService(file, file.parent if where else chain[-1].folder, word.text)
     return _found(files, document, base, word, chain)
 
 
 def _found(
-    files: Files, document: source.Mapping, base: Service, word: Scalar, chain: tuple[Service, ...]
+    files: ComposeFiles,
+    document: source.Mapping,
+    base: ExtendedService,
+    word: Scalar,
+    chain: tuple[ExtendedService, ...],
 ) -> Node | None:
     services = document.get("services")
     entries = services.entries if isinstance(services, source.Mapping) else {}

@@ -15,7 +15,7 @@ MAX_TEXT = 8_192
 _MAX_ENV = 1 << 20
 
 
-class Files:
+class ComposeFiles:
     """Documents by path, ``variables`` of their ``.env`` files and ``problems``."""
 
     def __init__(self) -> None:

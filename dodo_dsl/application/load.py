@@ -6,8 +6,8 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import compose_merge, compose_paths
-from dodo_dsl.application.compose_extends import Service, extended, moved
-from dodo_dsl.application.compose_files import Files
+from dodo_dsl.application.compose_extends import ExtendedService, extended, moved
+from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.model import scalars
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Entry, Node, Scalar
@@ -15,14 +15,14 @@ from dodo_dsl.source import Entry, Node, Scalar
 _NAMED = ("volumes", "secrets", "configs", "networks")
 
 
-def load(files: Files, names: Sequence[Path]) -> source.Mapping | None:
+def load(files: ComposeFiles, names: Sequence[Path]) -> source.Mapping | None:
     """The files merged in order, with paths relative to the first one's folder; None when one cannot be read."""
     folder = names[0].parent
     files.gather(folder / ".env", Span(str(names[0])))
     return _all(files, names, folder, ())
 
 
-def _all(files: Files, names: Sequence[Path], folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
+def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
     documents = [_whole(files, name, folder, chain) for name in names]
     result: Node | None = None
     for document in documents:
@@ -33,7 +33,7 @@ def _all(files: Files, names: Sequence[Path], folder: Path, chain: tuple[Path, .
     return settled if isinstance(settled, source.Mapping) else None
 
 
-def _whole(files: Files, file: Path, folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
+def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
     """A file with what it extends and includes."""
     document = files.document(file)
     if document is None:
@@ -42,7 +42,7 @@ def _whole(files: Files, file: Path, folder: Path, chain: tuple[Path, ...]) -> s
     services = document.get("services")
     if isinstance(services, source.Mapping):
         entries = {
-            name: Entry(entry.key, extended(files, Service(file, folder, name), entry.value))
+            name: Entry(entry.key, extended(files, ExtendedService(file, folder, name), entry.value))
             for name, entry in services.entries.items()
         }
         rest = _with(rest, "services", source.Mapping(services.span, entries, services.tag))
@@ -53,7 +53,7 @@ def _whole(files: Files, file: Path, folder: Path, chain: tuple[Path, ...]) -> s
 
 
 def _included(
-    files: Files, document: source.Mapping, item: Node, folder: Path, chain: tuple[Path, ...]
+    files: ComposeFiles, document: source.Mapping, item: Node, folder: Path, chain: tuple[Path, ...]
 ) -> source.Mapping:
     """The document with what an item of ``include`` brings; paths relative to ``folder``."""
     words: Mapping[str, Node] = {"path": item}
@@ -79,7 +79,7 @@ def _included(
 
 
 def _joined(
-    files: Files, document: source.Mapping, part: source.Mapping, project: Path, folder: Path
+    files: ComposeFiles, document: source.Mapping, part: source.Mapping, project: Path, folder: Path
 ) -> source.Mapping:
     base = Path(os.path.relpath(project, folder)).as_posix()
     named = {key: entry.value for key, entry in part.entries.items() if key in _NAMED}

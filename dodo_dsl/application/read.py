@@ -8,7 +8,7 @@ from typing import Any
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.application_problems import application_problems
-from dodo_dsl.application.compose_files import Files
+from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.interpolation import names
 from dodo_dsl.application.load import load
 from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
@@ -25,7 +25,7 @@ _OURS = ("services", "version", "name", "networks", "include")
 def read_application(path: Path | Sequence[Path]) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems."""
     paths = [path] if isinstance(path, Path) else list(path)
-    files = Files()
+    files = ComposeFiles()
     document = load(files, paths)
     found = files.problems
     services = document.get("services") if document else None

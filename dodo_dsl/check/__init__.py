@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check.context import Context, Rule
+from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.rules import (
     clocks,
@@ -52,7 +52,7 @@ def check(
     named = {name: list(specs.values()) for name, specs in by_name.items()}
     instances: dict[Path, list[tuple[Spec, list[Diagnostic]]]] = {}
     for test in everything:
-        context = Context(test, manifests, named, deployment, application)
+        context = RuleContext(test, manifests, named, deployment, application)
         found = [diagnostic for rule in RULES for diagnostic in rule(context)]
         instances.setdefault(test.spec.path, []).append((test.spec, found))
     return {path: list(_with_instances(group)) for path, group in instances.items()}

@@ -19,7 +19,7 @@ from dodo_dsl.spec.rig import Rig
 
 
 @dataclass(frozen=True)
-class Context:
+class RuleContext:
     """One instance with its deployment and application; ``by_name`` has one instance of each file by its name."""
 
     test: ResolvedTest
@@ -65,4 +65,4 @@ def known_messages(own: tuple[Path, ...]) -> frozenset[str]:
 
 
 class Rule(Protocol):
-    def __call__(self, context: Context) -> Iterator[Diagnostic]: ...
+    def __call__(self, context: RuleContext) -> Iterator[Diagnostic]: ...

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, Service
+from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, PlannedService
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
@@ -56,13 +56,13 @@ def _word(flag: Flag) -> str:
     return f"--{flag.name}={folder}{flag.value}".replace("$", "$$")
 
 
-def _environment(plan: Plan, service: Service) -> tuple[tuple[str, str], ...]:
+def _environment(plan: Plan, service: PlannedService) -> tuple[tuple[str, str], ...]:
     messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
     own = {"DODO_SERVICE": service.name, "DODO_ODVD": messages, **plan.variables}
     return tuple((name, value) for name, value in own.items() if value)
 
 
-def _volumes(plan: Plan, service: Service) -> tuple[str, ...]:
+def _volumes(plan: Plan, service: PlannedService) -> tuple[str, ...]:
     kinds = {flag.kind for flag in service.flags}
     volumes = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
     if "path" in kinds or plan.messages:

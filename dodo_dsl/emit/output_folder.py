@@ -10,7 +10,7 @@ from pathlib import Path
 from dodo_dsl import atomic
 from dodo_dsl.emit.render import File, render_plan
 from dodo_dsl.plan.build import Compiled
-from dodo_dsl.plan.test_files import Copy
+from dodo_dsl.plan.test_files import FileCopy
 
 PLAN_FILE = "test.json"
 FILES = "files"
@@ -42,7 +42,7 @@ def _update(out: Path, files: Iterable[File]) -> None:
             atomic.write_text(path, file.text)
 
 
-def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[Copy]) -> None:
+def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[FileCopy]) -> None:
     """A new test: its folder appears as a whole."""
     with atomic.new_folder(folder) as stage:
         for name, text in files:
@@ -53,7 +53,7 @@ def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[
             shutil.copyfile(copy.source, stage / FILES / copy.target)
 
 
-def _write_copies(folder: Path, wanted: Sequence[Copy]) -> None:
+def _write_copies(folder: Path, wanted: Sequence[FileCopy]) -> None:
     for copy in wanted:
         target = folder / copy.target
         if not target.is_file() or not filecmp.cmp(copy.source, target, shallow=False):
@@ -63,7 +63,7 @@ def _write_copies(folder: Path, wanted: Sequence[Copy]) -> None:
         path.unlink()
 
 
-def _surplus(folder: Path, wanted: Sequence[Copy]) -> Iterator[Path]:
+def _surplus(folder: Path, wanted: Sequence[FileCopy]) -> Iterator[Path]:
     names = {copy.target for copy in wanted}
     for path in sorted(folder.rglob("*")):
         if path.is_file() and path.relative_to(folder).as_posix() not in names:
@@ -103,7 +103,7 @@ def _text_difference(file: File, out: Path) -> str:
     return "".join(difflib.unified_diff(before.splitlines(True), file.text.splitlines(True), *names))
 
 
-def _copy_differences(folder: Path, wanted: Sequence[Copy], out: Path) -> Iterator[str]:
+def _copy_differences(folder: Path, wanted: Sequence[FileCopy], out: Path) -> Iterator[str]:
     for copy in wanted:
         target = folder / copy.target
         if not target.is_file() or not filecmp.cmp(copy.source, target, shallow=False):

@@ -23,7 +23,7 @@ _SPARE_MINUTES = 10
 
 
 @dataclass(frozen=True)
-class Job:
+class PipelineJob:
     """A job of the child pipeline; ``rig`` is the resource that it locks, or empty."""
 
     name: str
@@ -43,7 +43,7 @@ class Pipeline:
     stages: tuple[str, ...]
     gate: bool
     images: bool
-    jobs: tuple[Job, ...]
+    jobs: tuple[PipelineJob, ...]
 
 
 def pipeline(suite: Suite, folder: str) -> Pipeline:
@@ -66,10 +66,10 @@ def _needs_images(plan: Plan) -> bool:
     return any(service.process is None for service in plan.application.services)
 
 
-def _job(plan: Plan, gate: bool, folder: str) -> Job:
+def _job(plan: Plan, gate: bool, folder: str) -> PipelineJob:
     rig = plan.rig
     real = plan.level == "hil" and rig != EMULATED
-    return Job(
+    return PipelineJob(
         name=plan.slug,
         stage=plan.level,
         tag=plan.tag,

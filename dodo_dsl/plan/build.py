@@ -12,9 +12,9 @@ from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses, clock_service, recorder_service
 from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
-from dodo_dsl.plan.model import Application, Flag, Place, Plan, Service, Suite, is_device
+from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.plan.test_files import Copy, FilesError, copies
+from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
@@ -29,7 +29,7 @@ class Compiled:
     """A suite with the files that each test needs, by slug."""
 
     suite: Suite
-    copies: Mapping[str, tuple[Copy, ...]]
+    copies: Mapping[str, tuple[FileCopy, ...]]
 
 
 def build(
@@ -90,7 +90,7 @@ class _Builder:
         settings: Settings,
         cid: int,
         index: int,
-        tree: Callable[[Path, Path], list[Copy]],
+        tree: Callable[[Path, Path], list[FileCopy]],
         rewritten: Callable[[int, str, tuple[str, ...], bool, bool], Application],
     ) -> None:
         self.test = test
@@ -104,7 +104,7 @@ class _Builder:
         self.index = index
         self.tree = tree
         self.rewritten = rewritten
-        self.files: set[Copy] = set()
+        self.files: set[FileCopy] = set()
         self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
@@ -148,7 +148,9 @@ class _Builder:
     def _messages(self) -> tuple[str, ...]:
         """The deployment's messages, copied beside the test for its services to read."""
         targets = [f"messages/{number}-{path.name}" for number, path in enumerate(self.deployment.messages)]
-        self.files.update(Copy(t, path.resolve()) for t, path in zip(targets, self.deployment.messages, strict=True))
+        self.files.update(
+            FileCopy(t, path.resolve()) for t, path in zip(targets, self.deployment.messages, strict=True)
+        )
         return tuple(targets)
 
     def _place(self, key: str, span: Span) -> None:
@@ -168,7 +170,7 @@ class _Builder:
         bare = "/" not in image and ":" not in image
         return f"{self.deployment.image_prefix}/{image}:{self.deployment.image_tag}" if bare else image
 
-    def _automatic(self) -> Iterator[Service]:
+    def _automatic(self) -> Iterator[PlannedService]:
         """The services that DoDo adds: the recorder, and in lockstep the clock."""
         own = self.manifests[recorder_service.MANIFEST]
         yield recorder_service.recorder(self.test, own, self._image(own.image), self.cid)
@@ -177,14 +179,14 @@ class _Builder:
             watch = (recorder_service.RECORDER,)
             yield clock_service.clock(self.test, own, self._image(own.image), watch, self.cid)
 
-    def _distinct_names(self, services: Sequence[Service]) -> None:
+    def _distinct_names(self, services: Sequence[PlannedService]) -> None:
         for service in services:
             if service.name in self.application.services:
                 use = next(u for u in self.spec.uses if u.name == service.name)
                 message = f"the application also has a service '{service.name}'"
                 self.problems.append(Diagnostic(use.span, "service-taken", message, "rename the one in the test"))
 
-    def _service(self, service: ResolvedService) -> Service:
+    def _service(self, service: ResolvedService) -> PlannedService:
         use, manifest = service.use, service.manifest
         key = f"{use.layer}.{use.name}"
         self._place(key, use.span)
@@ -194,7 +196,7 @@ class _Builder:
             if (flag := self._flag(argument, f"{key}.{argument.parameter.name}")) is not None
         ]
         flags.append(Flag("cid", str(self.cid)))
-        planned = Service(
+        planned = PlannedService(
             use.layer,
             use.name,
             manifest.name,

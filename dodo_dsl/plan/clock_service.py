@@ -6,7 +6,7 @@ from dodo_dsl.application.model import Declared
 from dodo_dsl.check.lockstep import answers, cameras_of, other_inputs, rates, step_hz
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, Wiring
-from dodo_dsl.plan.model import Flag, Lockstep, Service
+from dodo_dsl.plan.model import Flag, Lockstep, PlannedService
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
 
@@ -27,7 +27,7 @@ def lockstep(
     return Lockstep(readers or 1, wall)
 
 
-def clock(test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[str], cid: int) -> Service:
+def clock(test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[str], cid: int) -> PlannedService:
     """The service that steps a test; ``watch`` are services that only observe."""
     spec, wiring = test.spec, test.wiring
     layers = {layer: [u.name for u in spec.uses if u.layer == layer] for layer in ("environment", "action")}
@@ -47,7 +47,7 @@ def clock(test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[st
         "cid": str(cid),
     }
     flags = tuple(Flag(name, value) for name, value in values.items() if value)
-    return Service("environment", CLOCK, manifest.name, image, manifest.process, flags)
+    return PlannedService("environment", CLOCK, manifest.name, image, manifest.process, flags)
 
 
 def _ordered(names: Sequence[str], wiring: Wiring) -> list[str]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.spec.manifest import Manifest
 
 CAMERA, DRAWN = "camera", "virtual-camera"
@@ -18,7 +18,7 @@ _OTHER = {"exposure": "shutter", "scene.light": "exposure", "scene.clutter": "cl
 _STILL = (Flag("start-x", "0"), Flag("start-y", "0"), Flag("start-yaw", "0"))
 
 
-def hardware(service: Service, manifests: Mapping[str, Manifest], image: str) -> Service:
+def hardware(service: PlannedService, manifests: Mapping[str, Manifest], image: str) -> PlannedService:
     """The virtual camera for an emulated rig's camera; any other service unchanged.
 
     For the application it is the same camera, with the same memories, size, rate and pose. The exposure time becomes

@@ -24,7 +24,7 @@ class Flag:
 
 
 @dataclass(frozen=True)
-class Service:
+class PlannedService:
     """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts.
 
     ``devices`` are the device files that it needs, ``setup_s`` the seconds that it may take to get ready beyond
@@ -108,7 +108,7 @@ class Plan:
     subnet: str
     tag: str
     sandbox_image: str
-    services: tuple[Service, ...]
+    services: tuple[PlannedService, ...]
     application: Application
     lockstep: Lockstep | None = None
     rig: str = ""
@@ -121,7 +121,7 @@ class Plan:
         stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
         return {**stepped, **({"DODO_RIG": self.rig} if self.rig else {})}
 
-    def layer(self, name: str) -> tuple[Service, ...]:
+    def layer(self, name: str) -> tuple[PlannedService, ...]:
         return tuple(s for s in self.services if s.layer == name)
 
 

@@ -16,7 +16,7 @@ from dodo_dsl.plan.model import (
     Lockstep,
     Place,
     Plan,
-    Service,
+    PlannedService,
     is_device,
 )
 from dodo_dsl.spec.matrix import SLUG
@@ -67,7 +67,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
 def _problem(plan: Plan) -> str:
     """The first value that is wrong, or an empty string; JSON itself checks no types."""
     texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.rig, plan.application.folder)
-    services: list[Service | ApplicationService] = [*plan.services, *plan.application.services]
+    services: list[PlannedService | ApplicationService] = [*plan.services, *plan.application.services]
     rules = {
         "slug": isinstance(plan.slug, str) and bool(SLUG.fullmatch(plan.slug)),
         "string": all(isinstance(text, str) and "\0" not in text for text in texts),
@@ -108,9 +108,9 @@ def _is_inside(path: object) -> bool:
     return isinstance(path, str) and ".." not in path.split("/") and not path.startswith("/")
 
 
-def _service(raw: dict[str, Any]) -> Service:
+def _service(raw: dict[str, Any]) -> PlannedService:
     words = {key: tuple(raw[key]) for key in ("process", "devices")}
-    return Service(**{**raw, **words, "flags": tuple(Flag(**f) for f in raw["flags"])})
+    return PlannedService(**{**raw, **words, "flags": tuple(Flag(**f) for f in raw["flags"])})
 
 
 def _application_service(raw: dict[str, Any]) -> ApplicationService:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
 
@@ -15,7 +15,7 @@ RECORDING, SNAPSHOT = "test.rec", "snapshot.png"
 _PARAMETER = re.compile(r"\{([a-z0-9.-]+)\}")
 
 
-def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> Service:
+def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> PlannedService:
     """The recorder's service; ``record: {frames: ...}`` adds the frames of each camera.
 
     A test on a rig always has a snapshot of its first camera.
@@ -27,7 +27,7 @@ def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> Se
     memories = ",".join(_memories(test.services)) if wanted else ""
     if memories:
         flags += [*wanted, Flag("memories", memories, "memories")]
-    return Service("environment", RECORDER, MANIFEST, image, manifest.process, (*flags, Flag("cid", str(cid))))
+    return PlannedService("environment", RECORDER, MANIFEST, image, manifest.process, (*flags, Flag("cid", str(cid))))
 
 
 def _memories(services: Iterable[ResolvedService]) -> Iterator[str]:

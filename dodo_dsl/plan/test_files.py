@@ -13,24 +13,24 @@ class FilesError(ValueError):
 
 
 @dataclass(frozen=True, order=True)
-class Copy:
+class FileCopy:
     """A file of the registry, and where it goes below ``files/``."""
 
     target: str
     source: Path
 
 
-def copies(path: Path, root: Path) -> list[Copy]:
+def copies(path: Path, root: Path) -> list[FileCopy]:
     """The file, or all files of the folder, below ``root``; raises FilesError for links out of it or too many."""
     root = root.resolve()
-    found: list[Copy] = []
+    found: list[FileCopy] = []
     size = 0
     for file in _files(path):
         resolved = file.resolve()
         if not resolved.is_relative_to(root):
             raise FilesError(f"'{file.relative_to(root)}' is a symbolic link that leaves the registry")
         size += resolved.stat().st_size
-        found.append(Copy(file.relative_to(root).as_posix(), resolved))
+        found.append(FileCopy(file.relative_to(root).as_posix(), resolved))
         if len(found) > MAX_FILES or size > MAX_BYTES:
             raise FilesError(f"'{path.relative_to(root)}' holds more than {MAX_FILES} files or {MAX_BYTES >> 30} GiB")
     return found

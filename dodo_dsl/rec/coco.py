@@ -19,7 +19,7 @@ from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import Frame
+from dodo_dsl.opendlv.video.decoder import DecodedFrame
 from dodo_dsl.rec.frames import IMAGE, Packet, decoded
 
 ANNOTATIONS = "annotations.json"
@@ -163,7 +163,7 @@ def _take(detection: Detection, kind: str, message: Any) -> None:
         detection.type = message.type
 
 
-def _add(result: DataSet, packet: Packet, frame: Frame, name: str, wanted: Iterable[Detection]) -> None:
+def _add(result: DataSet, packet: Packet, frame: DecodedFrame, name: str, wanted: Iterable[Detection]) -> None:
     number = len(result.images) + 1
     size = {"width": frame.width, "height": frame.height}
     result.images.append({"id": number, "file_name": name, **size, "sample_time": packet.sample_time})
@@ -173,7 +173,7 @@ def _add(result: DataSet, packet: Packet, frame: Frame, name: str, wanted: Itera
         result.boxes.append((number, detection.category, [round(value, 3) for value in box]))
 
 
-def _write_picture(path: Path, frame: Frame) -> None:
+def _write_picture(path: Path, frame: DecodedFrame) -> None:
     import cv2
 
     options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if path.suffix == ".jpg" else []

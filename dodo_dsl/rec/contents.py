@@ -15,7 +15,7 @@ _DAY = 86_400_000_000
 
 
 @dataclass(frozen=True)
-class Stream:
+class MessageStream:
     """The messages of one id and sender; rate in Hz and largest gap in s are None for a single message."""
 
     id: int
@@ -51,7 +51,7 @@ class Contents:
     apart: int
     untimed: int
     message_set: str
-    streams: list[Stream]
+    streams: list[MessageStream]
     frames: Frames
 
     def as_json(self, recording: Recording) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def _together(times: Numbers) -> Numbers:
     return times[(times >= largest[0]) & (times <= largest[-1])] if len(largest) else times
 
 
-def _streams(recording: Recording, messages: MessageSet) -> list[Stream]:
+def _streams(recording: Recording, messages: MessageSet) -> list[MessageStream]:
     index, known = recording.index, messages.ids()
     keys = index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]
     order = np.argsort(keys, kind="stable")
@@ -108,7 +108,7 @@ def _streams(recording: Recording, messages: MessageSet) -> list[Stream]:
         id_, stamp = int(index["data_type"][rows[0]]), int(index["sender_stamp"][rows[0]])
         size = int(index["size"][rows].sum(dtype=np.int64))
         name = messages.name(id_) if id_ in known else None
-        found.append(Stream(id_, name, stamp, len(rows), size, *_rate(index["time"][rows])))
+        found.append(MessageStream(id_, name, stamp, len(rows), size, *_rate(index["time"][rows])))
     return found
 
 

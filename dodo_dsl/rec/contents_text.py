@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.rec.contents import Contents, Stream
+from dodo_dsl.rec.contents import Contents, MessageStream
 
 _SHOWN = 10
 _HEAD = ("id", "message", "sender", "count", "rate", "largest gap")
@@ -29,7 +29,7 @@ def contents_text(found: Contents, recording: Recording) -> str:
     return "\n".join([*lines, "", *_table([_HEAD, *map(_row, found.streams)])]) + "\n"
 
 
-def _row(stream: Stream) -> tuple[str, ...]:
+def _row(stream: MessageStream) -> tuple[str, ...]:
     rate = "" if stream.rate is None else f"{stream.rate:.2f} Hz"
     gap = "" if stream.largest_gap is None else f"{stream.largest_gap:.3f} s"
     return str(stream.id), stream.name or "(unknown)", str(stream.sender_stamp), str(stream.count), rate, gap

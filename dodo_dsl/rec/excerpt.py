@@ -17,7 +17,7 @@ class NothingSelected(Exception):
 
 
 @dataclass(frozen=True)
-class Selection:
+class Excerpt:
     """``messages`` are names or ids, each with ``/senderStamp`` for a single sender; none means all.
 
     ``start`` and ``end`` are seconds since the recording's start, or since 1970.

@@ -7,7 +7,7 @@ from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import Frame, VideoDecoder, VideoError
+from dodo_dsl.opendlv.video.decoder import DecodedFrame, VideoDecoder, VideoError
 
 IMAGE = 1055
 
@@ -35,7 +35,7 @@ def packets(recording: Recording, rows: Numbers) -> Iterator[Packet]:
 
 def decoded(
     recording: Recording, rows: Numbers, problem: Callable[[str], None]
-) -> Iterator[tuple[Packet, Frame | None]]:
+) -> Iterator[tuple[Packet, DecodedFrame | None]]:
     """Each packet with its frame, or None if it gave none; ``problem`` gets a sentence per undecodable format."""
     decoders: dict[tuple[int, str], VideoDecoder | None] = {}
     for packet in packets(recording, rows):

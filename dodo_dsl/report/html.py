@@ -11,7 +11,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.junit import check_line
 
 
-class Picture(NamedTuple):
+class ReportPicture(NamedTuple):
     """A picture of a test: its path relative to the page, and what it shows."""
 
     path: str
@@ -19,10 +19,10 @@ class Picture(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Files:
+class ReportFiles:
     """The files beside the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty."""
 
-    pictures: Mapping[str, Sequence[Picture]]
+    pictures: Mapping[str, Sequence[ReportPicture]]
     logs: Mapping[str, Sequence[str]]
     recordings: Mapping[str, str]
     specs: Mapping[str, str]
@@ -39,7 +39,7 @@ MEANINGS = {
 """Explanations of checks whose names do not explain them, as in the READMEs of the evaluators."""
 
 
-def render(outcomes: Sequence[Outcome], files: Files) -> str:
+def render(outcomes: Sequence[Outcome], files: ReportFiles) -> str:
     """The page."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(package_data.templates()), undefined=jinja2.StrictUndefined, autoescape=True

@@ -98,20 +98,20 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
     with atomic.replacing(folder / "junit.xml") as part:
         junit.write(part, outcomes, attachments)
     atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
-    files = html.Files(
+    files = html.ReportFiles(
         pictures, _logs(folder, outcomes), _recordings(folder, outcomes), _specs(folder, outcomes), times
     )
     atomic.write_text(folder / "index.html", html.render(outcomes, files))
 
 
-def _pictures(folder: Path, outcome: Outcome) -> list[html.Picture]:
+def _pictures(folder: Path, outcome: Outcome) -> list[html.ReportPicture]:
     """The pictures of a test, the most informative first: GitLab shows one beside a test case."""
     known = (
         (TRAJECTORY, f"The drive of {outcome.name} from above"),
         (SNAPSHOT, f"What the camera of {outcome.name} saw"),
     )
     place = outcome.slug
-    return [html.Picture(f"{place}/{name}", text) for name, text in known if (folder / place / name).is_file()]
+    return [html.ReportPicture(f"{place}/{name}", text) for name, text in known if (folder / place / name).is_file()]
 
 
 def _shown(folder: Path) -> str:

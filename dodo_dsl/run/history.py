@@ -20,7 +20,7 @@ PATH_VARIABLE = "DODO_HISTORY"
 
 
 @dataclass(frozen=True)
-class Run:
+class PastRun:
     """A test that ran to its end; ``when`` in s since the epoch, times in s."""
 
     when: int
@@ -71,7 +71,7 @@ class History:
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
         """Adds pairs of a test's name and its outcome; errors are left out, as they say nothing about its time."""
         self.runs += [
-            Run(int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s)
+            PastRun(int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s)
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
         ]
@@ -92,7 +92,7 @@ class History:
         atomic.write_text(self.path, "".join(lines[len(lines) // 2 :]))
 
 
-def _read(path: Path) -> Iterator[Run]:
+def _read(path: Path) -> Iterator[PastRun]:
     """The valid lines; one that a killed run left unfinished is skipped."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
@@ -100,7 +100,7 @@ def _read(path: Path) -> Iterator[Run]:
         return
     for line in text.splitlines():
         with contextlib.suppress(ValueError, TypeError, RecursionError):
-            run = Run(**json.loads(line))
+            run = PastRun(**json.loads(line))
             texts = (run.spec, run.test, run.level, run.backend, run.clock, run.outcome)
             times = (run.setup_s, run.execution_s)
             if all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):

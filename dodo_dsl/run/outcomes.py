@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl.outcome import Outcome, Result
-from dodo_dsl.plan.model import Plan, Service
-from dodo_dsl.run.protocol import BackendError, Verdict
+from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.run.protocol import BackendError, VerdictEvent
 
 LOG = "logs/runner.log"
 """The traceback of an internal error, in the test's report."""
@@ -31,7 +31,7 @@ class Facts:
 
     evaluators: tuple[str, ...]
     findings: list[Finding] = field(default_factory=list)
-    verdicts: dict[str, list[Verdict]] = field(default_factory=dict)
+    verdicts: dict[str, list[VerdictEvent]] = field(default_factory=dict)
 
 
 def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
@@ -72,7 +72,7 @@ def decide(facts: Facts) -> Finding:
     return deciding[0]
 
 
-def _judged(evaluator: str, verdicts: Sequence[Verdict]) -> list[Finding]:
+def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
     if len(verdicts) > 1:
         return [Finding("error", f"evaluator '{evaluator}' gave {len(verdicts)} verdicts, expected one", evaluator)]
     return [Finding("passed" if v.passed else "failed", v.reason, evaluator) for v in verdicts]
@@ -113,7 +113,7 @@ def system_error(error: OSError) -> str:
     return f"{place}{error.strerror or error}"
 
 
-def lost_messages(service: Service, messages: int) -> str:
+def lost_messages(service: PlannedService, messages: int) -> str:
     """A sentence on a service whose receive buffer was full, and on what that means."""
     meaning = "it worked without them"
     if any(flag.kind == "report" for flag in service.flags):

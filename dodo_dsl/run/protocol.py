@@ -10,7 +10,7 @@ class Ready:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class VerdictEvent:
     """A well-formed verdict line of an evaluator."""
 
     service: str
@@ -80,7 +80,7 @@ class Stopped:
     reason: str
 
 
-Event = Ready | Verdict | Malformed | Overrun | Noted | Exited | Unstartable | Lost | Time | Stopped
+Event = Ready | VerdictEvent | Malformed | Overrun | Noted | Exited | Unstartable | Lost | Time | Stopped
 
 
 class Backend(Protocol):

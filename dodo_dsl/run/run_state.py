@@ -20,7 +20,7 @@ from dodo_dsl.run.protocol import (
     Stopped,
     Time,
     Unstartable,
-    Verdict,
+    VerdictEvent,
 )
 
 
@@ -73,9 +73,9 @@ class RunState:
         match event:
             case Ready(service):
                 self.ready.add(service)
-            case Verdict(service) if self.began is None:
+            case VerdictEvent(service) if self.began is None:
                 self.end("error", f"evaluator '{service}' gave a verdict before the test began", service)
-            case Verdict(service):
+            case VerdictEvent(service):
                 self.facts.verdicts.setdefault(service, []).append(event)
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)

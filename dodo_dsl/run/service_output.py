@@ -12,7 +12,7 @@ _TAIL_LINES = 8
 _TAIL_WIDTH = 300
 
 
-class Output:
+class ServiceOutput:
     """The reading end of a pipe. ``writer`` is handed to the service; ``done`` is set at the end of its output.
 
     ``on_line`` is called with every line, and returns whether it belongs to the protocol and not to the log.

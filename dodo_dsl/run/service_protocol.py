@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.run.protocol import Event, Malformed, Overrun, Ready, Stopped, Time, Verdict
+from dodo_dsl.run.protocol import Event, Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
 
 _OUTCOMES = ("passed", "failed")
 _STOPS = ("unanswered", "stuck", "timedout")
@@ -32,7 +32,7 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
     if kind == "verdict" and is_evaluator:
         if problem := _problem(message):
             return Malformed(service, problem)
-        return Verdict(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
+        return VerdictEvent(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
     return _clock_event(kind, message) if service == CLOCK else None
 
 

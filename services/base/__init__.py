@@ -1,7 +1,7 @@
 """Shared by all services: flags from the manifest, the loop with its injected clock, readiness, verdicts."""
 
 from services.base.clock import Clock, Inbox, RealTimeClock
-from services.base.evaluator import Evaluator, Span, UnjudgeableError
+from services.base.evaluator import Evaluator, JudgedTime, UnjudgeableError
 from services.base.flags import Flags, FlagsError
 from services.base.process import run
 from services.base.service import Context, Handler, Output, Service, period_of
@@ -16,10 +16,10 @@ __all__ = [
     "FlagsError",
     "Handler",
     "Inbox",
+    "JudgedTime",
     "Output",
     "RealTimeClock",
     "Service",
-    "Span",
     "UnjudgeableError",
     "Verdict",
     "period_of",

@@ -15,7 +15,7 @@ class UnjudgeableError(Exception):
     """There is nothing to judge the application by: the test itself is at fault."""
 
 
-class Span(NamedTuple):
+class JudgedTime(NamedTuple):
     """The time that was observed, as it reads in a reason."""
 
     within: str
@@ -77,7 +77,7 @@ class Evaluator(Service):
         """Whether a time is past ``max_time``."""
         return self.elapsed(time) > self._max_time
 
-    def conclude(self, span: Span) -> None:
+    def conclude(self, span: JudgedTime) -> None:
         """Give the verdict, unless there is one."""
         if self.verdict is None:
             self.verdict = self.decide(span)
@@ -85,7 +85,7 @@ class Evaluator(Service):
     def time_is_over(self) -> None:
         """``max_time`` has passed: give the verdict."""
         seconds = f"{self._max_time:.2f} s"
-        self.conclude(Span(f"within {seconds}", f"for {seconds}"))
+        self.conclude(JudgedTime(f"within {seconds}", f"for {seconds}"))
 
     def forget(self, now: int) -> None:
         """The test begins: what was measured before it does not count."""
@@ -93,7 +93,7 @@ class Evaluator(Service):
     def advance(self, now: int) -> None:
         """An update before the verdict."""
 
-    def decide(self, span: Span) -> Verdict:
+    def decide(self, span: JudgedTime) -> Verdict:
         """The verdict on what was observed in a span."""
         raise NotImplementedError
 
@@ -103,4 +103,4 @@ class Evaluator(Service):
                 self.time_is_over()
         elif now - self._ended >= self._max_delay * MICROSECONDS:
             over = f"the input ended after {self.elapsed(self._ended):.2f} s"
-            self.conclude(Span(f"before {over}", f"until {over}", is_complete=True))
+            self.conclude(JudgedTime(f"before {over}", f"until {over}", is_complete=True))

@@ -8,7 +8,7 @@ from google.protobuf.message import Message
 
 from services.base import Context, Flags, Output, Service, period_of
 from services.beacon.table import read_points, read_table
-from services.beacon.trajectory import Pose, Trajectory, TrajectoryError, straight
+from services.beacon.trajectory import Trajectory, TrajectoryError, TrajectoryPose, straight
 
 MICROSECONDS = 1_000_000
 
@@ -45,7 +45,7 @@ class Beacon(Service):
         if self._state_id is not None:
             yield Output(self._motion(pose, moving), self._state_id)
 
-    def _motion(self, pose: Pose, moving: bool) -> Message:
+    def _motion(self, pose: TrajectoryPose, moving: bool) -> Message:
         vx, vy, vz = pose.body_velocity
         state: Message = self._state(vx=vx, vy=vy, vz=vz, yawRate=pose.yaw_rate) if moving else self._state()
         return state

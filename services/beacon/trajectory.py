@@ -28,7 +28,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Pose:
+class TrajectoryPose:
     """Where the vehicle is: m and rad in the world, and its velocity there in m/s and rad/s."""
 
     x: float
@@ -73,7 +73,7 @@ class Trajectory:
         self._times = timed
         self.duration = math.inf if endless else timed[-1]
 
-    def at(self, time: float) -> Pose:
+    def at(self, time: float) -> TrajectoryPose:
         """The pose ``time`` seconds after the start; the velocity at a way point is the one from there on."""
         index = min(bisect.bisect_right(self._times, time), len(self._knots) - 1)
         a, b = self._knots[max(index - 1, 0)], self._knots[max(index, 1)]
@@ -128,16 +128,16 @@ def _at_speed(points: Sequence[Point], speed: float) -> list[float]:
     return times
 
 
-def _between(a: _Knot, b: _Knot, time: float) -> Pose:
+def _between(a: _Knot, b: _Knot, time: float) -> TrajectoryPose:
     took, turn = b.time - a.time, wrapped(b.yaw - a.yaw)
     share = (time - a.time) / took
     x, y, z = (p + share * (q - p) for p, q in ((a.x, b.x), (a.y, b.y), (a.z, b.z)))
     velocity = ((b.x - a.x) / took, (b.y - a.y) / took, (b.z - a.z) / took)
-    return Pose(x, y, z, wrapped(a.yaw + share * turn), velocity, turn / took)
+    return TrajectoryPose(x, y, z, wrapped(a.yaw + share * turn), velocity, turn / took)
 
 
-def _standing(knot: _Knot) -> Pose:
-    return Pose(knot.x, knot.y, knot.z, wrapped(knot.yaw))
+def _standing(knot: _Knot) -> TrajectoryPose:
+    return TrajectoryPose(knot.x, knot.y, knot.z, wrapped(knot.yaw))
 
 
 def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Trajectory:

@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from services.camera.picture import Image, Picture, from_bgr
+from services.camera.picture import Image, SharedPicture, from_bgr
 
 RECORDING = ".rec"
 IMAGE_READING = 1055
@@ -29,7 +29,7 @@ class FileCamera:
             raise ValueError(f"{path} has no pictures, expected an image, a video or a recording")
         self._left = chain([first], self._skipped()) if self._still is None else iter(())
 
-    def read(self) -> Picture:
+    def read(self) -> SharedPicture:
         """The next picture, without a time."""
         if self._still is not None:
             return from_bgr(np.asarray(self._still, np.uint8), *self._size)

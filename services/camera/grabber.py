@@ -4,7 +4,7 @@ import threading
 import time
 from typing import Protocol
 
-from services.camera.picture import CameraError, Picture
+from services.camera.picture import CameraError, SharedPicture
 
 SILENCE = 5.0
 """s without a picture after which a camera counts as lost."""
@@ -14,7 +14,7 @@ JOIN_PATIENCE = 2.0
 class Camera(Protocol):
     """Where pictures come from."""
 
-    def read(self) -> Picture:
+    def read(self) -> SharedPicture:
         """The next picture; raises CameraError when there are no more."""
         ...
 
@@ -29,7 +29,7 @@ class Grabber:
     def __init__(self, camera: Camera, name: str, silence: float = SILENCE) -> None:
         self._camera, self._name, self._silence = camera, name, silence
         self._changed = threading.Condition()
-        self._newest: Picture | None = None
+        self._newest: SharedPicture | None = None
         self._error: Exception | None = None
         self._closed = False
         self._last = time.monotonic()
@@ -41,7 +41,7 @@ class Grabber:
         with self._changed:
             return self._changed.wait_for(lambda: self._newest is not None or self._error is not None, timeout)
 
-    def take(self) -> Picture | None:
+    def take(self) -> SharedPicture | None:
         """The newest picture, once; raises CameraError when the camera is lost or silent."""
         with self._changed:
             picture, self._newest = self._newest, None

@@ -19,7 +19,7 @@ from services.base.manifest import load_manifest
 from services.base.signals import interruptible
 from services.camera.files import FileCamera
 from services.camera.grabber import SILENCE, Grabber
-from services.camera.picture import CameraError, Picture
+from services.camera.picture import CameraError, SharedPicture
 from services.camera.service import open_camera
 
 BRIGHTNESS = 0.04, 0.97
@@ -46,7 +46,7 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
     return 0 if result["ok"] else 1
 
 
-def check(picture: Picture) -> dict[str, Any]:
+def check(picture: SharedPicture) -> dict[str, Any]:
     """``ok``, ``reason``, and brightness and contrast as shares of white."""
     luma = (picture.i420[: picture.i420.shape[0] * 2 // 3] - BLACK) / (WHITE - BLACK)
     brightness, contrast = round(float(luma.mean()), 4), round(float(luma.std()), 4)
@@ -61,7 +61,7 @@ def check(picture: Picture) -> dict[str, Any]:
     return {"ok": not reason, "reason": reason, "brightness": brightness, "contrast": contrast}
 
 
-def take_picture(flags: Flags) -> Picture:
+def take_picture(flags: Flags) -> SharedPicture:
     """A picture of the camera that the flags name; raises ValueError and OSError, and CameraError when it is not alive.
 
     A live camera has settled by then, and has shown another picture before.
@@ -81,7 +81,7 @@ def take_picture(flags: Flags) -> Picture:
         return other
 
 
-def _next(grabber: Grabber, name: str) -> Picture:
+def _next(grabber: Grabber, name: str) -> SharedPicture:
     if not grabber.wait(SILENCE) or (picture := grabber.take()) is None:
         raise CameraError(f"the camera {name} gave no picture for {SILENCE:g} s")
     return picture

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from services.camera.picture import CameraError, Picture, from_i420
+from services.camera.picture import CameraError, SharedPicture, from_i420
 
 PROGRAM = "rpicam-vid"
 ALIGNED = 64
@@ -46,7 +46,7 @@ class RpiCamera:
         self._stderr = threading.Thread(target=self._read_stderr, daemon=True)
         self._stderr.start()
 
-    def read(self) -> Picture:
+    def read(self) -> SharedPicture:
         """The next picture, with the time at which it was complete; raises CameraError when there are no more."""
         data = bytearray()
         while len(data) < self._size:

@@ -8,7 +8,7 @@ from services.base import Context, Flags, Output, Service, period_of
 from services.base.signals import interruptible
 from services.camera.files import FileCamera
 from services.camera.grabber import SILENCE, Camera, Grabber
-from services.camera.picture import CameraError, Image, Picture
+from services.camera.picture import CameraError, Image, SharedPicture
 from services.camera.rpicam import RpiCamera
 from services.camera.telemetry import CameraTelemetry
 from services.camera.v4l2 import V4l2Camera
@@ -16,7 +16,7 @@ from services.camera.v4l2 import V4l2Camera
 EMULATED = "--source=emulated is the camera of 'rig: emulated', which virtual-camera replaces"
 
 
-class CameraService(Service):
+class RigCameraService(Service):
     """Shares the newest picture at each instant of its rate, and none twice; ``telemetry`` reports its state."""
 
     def __init__(
@@ -33,7 +33,9 @@ class CameraService(Service):
         """How many pictures were shared."""
 
     def update(self, now: int) -> Iterable[Output]:
-        picture: Picture | None = self._camera.take() if isinstance(self._camera, Grabber) else self._camera.read()
+        picture: SharedPicture | None = (
+            self._camera.take() if isinstance(self._camera, Grabber) else self._camera.read()
+        )
         if picture is not None:
             time = now if picture.time is None else picture.time
             share(self._argb, picture.argb, time)
@@ -88,11 +90,11 @@ def build(context: Context) -> Service:
         context.log.warning("%s", note)
     if isinstance(camera, FileCamera):
         context.resources.callback(camera.close)
-        return CameraService(camera, argb, i420, freq, telemetry)
+        return RigCameraService(camera, argb, i420, freq, telemetry)
     silence = max(SILENCE, 2 * flags["exposure"])
     grabber = Grabber(camera, flags["source"], silence)
     context.resources.callback(grabber.close)
     with interruptible():
         if not grabber.wait(silence):
             raise CameraError(f"the camera {flags['source']} gave no picture for {silence:g} s")
-    return CameraService(grabber, argb, i420, freq, telemetry)
+    return RigCameraService(grabber, argb, i420, freq, telemetry)

@@ -8,7 +8,7 @@ from typing import Any
 
 import cv2
 
-from services.camera.picture import CameraError, Picture, from_bgr
+from services.camera.picture import CameraError, SharedPicture, from_bgr
 
 MANUAL = 1
 EXPOSURE_UNIT = 1e-4
@@ -43,7 +43,7 @@ class V4l2Camera:
             self._capture.set(key, value)
         self.notes = self._differences(freq, exposure)
 
-    def read(self) -> Picture:
+    def read(self) -> SharedPicture:
         """The next picture, with the time at which it was complete; raises CameraError when the device is lost."""
         with self._busy:
             good, image = self._capture.read()

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Sequence
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from services.base.lockstep.datagrams import EncodedEnvelope
 from services.clock.answers import Answers
-from services.clock.exchange import Command, StepResult
+from services.clock.exchange import StepCommand, StepResult
 from services.clock.participants import SLICE_S, ApplicationSilent, IsStopped, Patience, ServiceLink
 
 _AGAIN_S = 0.5
 
 
-class Application:
+class SteppedApplication:
     """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
     def __init__(self, answers: Answers, patience: Patience, link: ServiceLink, stopped: IsStopped) -> None:
@@ -45,7 +45,7 @@ class Application:
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
         for camera in shown:
-            self._link.send([Command(camera.service, now, (), show=True)])
+            self._link.send([StepCommand(camera.service, now, (), show=True)])
             while self._link.result(camera.service) is None:
                 if self._stopped():
                     return
@@ -57,7 +57,7 @@ class Application:
             self.answers.seen()
         if not self.answers.is_expected:
             self._reading = {camera.service for camera in shown}
-            self._link.send([Command(camera.service, now, (), show=True) for camera in shown])
+            self._link.send([StepCommand(camera.service, now, (), show=True) for camera in shown])
 
     def await_answer(self) -> None:
         """Wait for the answer to what was shown; raises ApplicationSilent."""

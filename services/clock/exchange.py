@@ -18,7 +18,7 @@ _SLICE = 0.05
 _BURST = 2
 
 
-class Command(NamedTuple):
+class StepCommand(NamedTuple):
     """What a service has to do: go on to ``time`` (us) with these messages, or show its new pictures."""
 
     service: str
@@ -68,7 +68,7 @@ class Exchange:
             poll.register(channel, select.POLLIN)
         self._poll.register(session, select.POLLIN)
 
-    def send(self, commands: Iterable[Command]) -> None:
+    def send(self, commands: Iterable[StepCommand]) -> None:
         """Send commands; ``pump`` repeats them."""
         for command in commands:
             self._number += 1
@@ -126,7 +126,7 @@ class Exchange:
                     self._channel.send(message, self._addresses.get(name))
                 pending.messages = [*pending.messages[_BURST:], *pending.messages[:_BURST]]
 
-    def _messages(self, command: Command) -> list[Any]:
+    def _messages(self, command: StepCommand) -> list[Any]:
         parts = split(encoded.frame for encoded in command.messages)
         facts = {"number": self._number, "service": command.service, "time": command.time, "show": command.show}
         return [self._step(part=part, parts=len(parts), frames=data, **facts) for part, data in enumerate(parts)]

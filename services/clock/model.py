@@ -9,8 +9,8 @@ from fractions import Fraction
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from services.base.lockstep.datagrams import EncodedEnvelope, encode
 from services.base.lockstep.lockstep_clock import EPOCH
-from services.clock.application import Application
-from services.clock.exchange import Command, StepResult
+from services.clock.application import SteppedApplication
+from services.clock.exchange import StepCommand, StepResult
 from services.clock.participants import (
     SLICE_S,
     ApplicationSilent,
@@ -32,7 +32,7 @@ class Stepper:
     roles: Roles
     period: Fraction | int
     timeout: int
-    application: Application
+    application: SteppedApplication
     link: ServiceLink
     stopped: IsStopped
     now: int = EPOCH
@@ -119,7 +119,7 @@ class Stepper:
         return self._await(running)
 
     def _send(self, names: Sequence[str], until: int) -> None:
-        self.link.send([Command(name, until, self._undelivered(name)) for name in names])
+        self.link.send([StepCommand(name, until, self._undelivered(name)) for name in names])
 
     def _await(self, names: Sequence[str]) -> list[StepResult]:
         results: list[StepResult] = []

@@ -5,31 +5,31 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from services.base.lockstep.datagrams import EncodedEnvelope
-from services.clock.exchange import Command, StepResult
+from services.clock.exchange import StepCommand, StepResult
 
 SLICE_S = 0.05
 """How often the clock checks whether it has to stop."""
 
 
-class Ended(Exception):
+class TestEnded(Exception):
     """The test cannot go on; one sentence. ``kind`` names the reason in the protocol."""
 
     kind = ""
 
 
-class ApplicationSilent(Ended):
+class ApplicationSilent(TestEnded):
     """The application did not answer in time."""
 
     kind = "unanswered"
 
 
-class ServiceSilent(Ended):
+class ServiceSilent(TestEnded):
     """A service of the test does not answer the clock."""
 
     kind = "stuck"
 
 
-class TimeOver(Ended):
+class TimeOver(TestEnded):
     """The test time is over."""
 
     kind = "timedout"
@@ -38,7 +38,7 @@ class TimeOver(Ended):
 class ServiceLink(Protocol):
     """Commands to the services and their results, as Exchange implements it."""
 
-    def send(self, commands: Iterable[Command]) -> None: ...
+    def send(self, commands: Iterable[StepCommand]) -> None: ...
     def result(self, service: str) -> StepResult | None: ...
     def clear(self) -> None: ...
     def pump(self, timeout: float, bus: bool = True) -> None: ...

@@ -12,10 +12,10 @@ from services.base.lockstep.channel import Channel
 from services.base.lockstep.lockstep_clock import EPOCH
 from services.base.service import Service
 from services.clock.answers import Answers
-from services.clock.application import Application
+from services.clock.application import SteppedApplication
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
-from services.clock.participants import Ended, Patience, Roles
+from services.clock.participants import Patience, Roles, TestEnded
 
 _REPORT_S = 1.0
 _SLICE = 0.05
@@ -41,7 +41,7 @@ class ClockService(Service):
         self._session = session
         self._begin_id = session.messages.id("dodo.TestBegin")
         exchange = Exchange(session, channel, answers.take)
-        self._application = Application(answers, patience, exchange, self._over)
+        self._application = SteppedApplication(answers, patience, exchange, self._over)
         self._stepper = Stepper(roles, period, timeout, self._application, exchange, self._over)
         self._reported = 0.0
         self._stopped: Callable[[], bool] = lambda: False
@@ -57,7 +57,7 @@ class ClockService(Service):
         try:
             self._stepper.connect()
             self._stepper.run(begin._replace(sample_time=EPOCH, received=0))
-        except Ended as problem:
+        except TestEnded as problem:
             kind, reason = problem.kind, str(problem)
         spent = sorted(self._stepper.spent.items(), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import shapely
 
-from services.collision.geometry import Pose
+from services.collision.geometry import VehiclePose
 
 Gate = tuple[str, shapely.MultiLineString]
 
@@ -27,7 +27,7 @@ class Gates:
         """The next gate; None when all were crossed."""
         return self._gates[self.crossed] if self.crossed < len(self) else None
 
-    def move(self, start: Pose, end: Pose) -> float | None:
+    def move(self, start: VehiclePose, end: VehiclePose) -> float | None:
         """The centre moved straight from one pose to the next.
 
         Returns the share of this path after which all gates were crossed, None while some are left.
@@ -42,7 +42,7 @@ class Gates:
         return reached
 
 
-def crossings(lines: shapely.MultiLineString, start: Pose, end: Pose) -> Iterator[float]:
+def crossings(lines: shapely.MultiLineString, start: VehiclePose, end: VehiclePose) -> Iterator[float]:
     """The shares of the path from one pose to the next at which it crosses lines.
 
     Every point is on one side of a line: one that lies on it counts as left of it. So a path of several
@@ -59,5 +59,5 @@ def _segments(line: shapely.LineString) -> Iterator[tuple[tuple[float, float], t
     return zip(line.coords[:-1], line.coords[1:], strict=True)
 
 
-def _is_left(start: Pose, end: Pose, x: float, y: float) -> bool:
+def _is_left(start: VehiclePose, end: VehiclePose, x: float, y: float) -> bool:
     return (end.x - start.x) * (y - start.y) - (end.y - start.y) * (x - start.x) >= 0

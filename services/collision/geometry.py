@@ -10,7 +10,7 @@ TURN = math.radians(5)  # within a turn of this size a hull is as good as the ar
 
 
 @dataclass(frozen=True)
-class Pose:
+class VehiclePose:
     """Where the centre of the vehicle is, and its heading counter-clockwise from the x axis."""
 
     x: float
@@ -19,7 +19,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Box:
+class VehicleBox:
     """Outline of the vehicle: `length` along its heading, `width` across, both about the centre."""
 
     length: float
@@ -34,12 +34,12 @@ def heading_of(qx: float, qy: float, qz: float, qw: float) -> float | None:
     return math.atan2(2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
 
 
-def outline(pose: Pose, box: Box) -> shapely.Polygon:
+def outline(pose: VehiclePose, box: VehicleBox) -> shapely.Polygon:
     """The rectangle that the vehicle covers at a pose."""
     return shapely.Polygon(corners(pose, box))
 
 
-def corners(pose: Pose, box: Box) -> list[tuple[float, float]]:
+def corners(pose: VehiclePose, box: VehicleBox) -> list[tuple[float, float]]:
     """The four corners, counter-clockwise from the front left."""
     cos, sin = math.cos(pose.heading), math.sin(pose.heading)
     along, across = box.length / 2, box.width / 2
@@ -49,7 +49,7 @@ def corners(pose: Pose, box: Box) -> list[tuple[float, float]]:
     ]
 
 
-def swept(start: Pose, end: Pose, box: Box) -> shapely.Geometry:
+def swept(start: VehiclePose, end: VehiclePose, box: VehicleBox) -> shapely.Geometry:
     """The area that the vehicle covers from one pose to the next.
 
     It moves straight and turns evenly the shorter way round, in parts of at most five degrees; each part is
@@ -63,8 +63,8 @@ def swept(start: Pose, end: Pose, box: Box) -> shapely.Geometry:
     return hulls[0] if parts == 1 else shapely.union_all(hulls)
 
 
-def between(start: Pose, end: Pose, share: float) -> Pose:
+def between(start: VehiclePose, end: VehiclePose, share: float) -> VehiclePose:
     """The pose after a share of the path from one pose to the next, turned the shorter way round."""
     change = math.remainder(end.heading - start.heading, math.tau)
     x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
-    return Pose(x, y, start.heading + share * change)
+    return VehiclePose(x, y, start.heading + share * change)

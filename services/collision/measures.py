@@ -4,13 +4,13 @@ import math
 from dataclasses import dataclass
 
 from services.base import Check
-from services.collision.geometry import Pose
+from services.collision.geometry import VehiclePose
 
 MICROSECONDS = 1_000_000
 
 
 @dataclass
-class Measures:
+class DriveMeasures:
     """Distance driven (m), highest speed (m/s), smallest distance to a wall (m), time to the goal (s)."""
 
     distance: float = 0.0
@@ -18,7 +18,7 @@ class Measures:
     wall_margin: float | None = None
     time_to_goal: float | None = None
 
-    def move(self, start: tuple[int, Pose], end: tuple[int, Pose]) -> None:
+    def move(self, start: tuple[int, VehiclePose], end: tuple[int, VehiclePose]) -> None:
         """The vehicle went from one pose to the next, each with its time in microseconds."""
         length = math.hypot(end[1].x - start[1].x, end[1].y - start[1].y)
         self.distance += length

@@ -5,10 +5,10 @@ from typing import Literal
 
 import shapely
 
-from services.base import Evaluator, Span, UnjudgeableError, Verdict
+from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.collision.gates import Gates
-from services.collision.geometry import Box, Pose, between, outline, swept
-from services.collision.measures import Measures
+from services.collision.geometry import VehicleBox, VehiclePose, between, outline, swept
+from services.collision.measures import DriveMeasures
 from services.collision.track import Track, fault_of_start, nearest, place, touched
 
 PERIOD = 10_000  # us
@@ -24,18 +24,18 @@ class TrackEvaluator(Evaluator):
 
     period = PERIOD
 
-    def __init__(self, track: Track, box: Box) -> None:
+    def __init__(self, track: Track, box: VehicleBox) -> None:
         super().__init__(track.max_time)
         self.track = track
         self.box = box
-        self._measures = Measures()
+        self._measures = DriveMeasures()
         self._gates = Gates(track.gates)
         self._early = False
         self._requests: set[str] = set()
-        self._last: tuple[int, Pose] | None = None
+        self._last: tuple[int, VehiclePose] | None = None
 
     def forget(self, now: int) -> None:
-        self._measures = Measures()
+        self._measures = DriveMeasures()
 
     def request(self, name: str) -> None:
         """The application sent one of REQUESTS; it counts from the last update, not by its own clock."""
@@ -47,7 +47,7 @@ class TrackEvaluator(Evaluator):
         if self._requests:
             self.begin(now)
 
-    def look(self, pose: Pose, time: int) -> None:
+    def look(self, pose: VehiclePose, time: int) -> None:
         """Judge the path from the last pose to this one; a pose that is not newer than the last is ignored.
 
         Raises UnjudgeableError when the vehicle touches a wall or the goal where it is first seen.
@@ -64,7 +64,7 @@ class TrackEvaluator(Evaluator):
         elif self.elapsed(time) >= 0:
             self._judge(start, time, pose)
 
-    def _judge(self, start: tuple[int, Pose], time: int, pose: Pose) -> None:
+    def _judge(self, start: tuple[int, VehiclePose], time: int, pose: VehiclePose) -> None:
         area, when = swept(start[1], pose, self.box), f"after {self.elapsed(time):.2f} s"
         self._measures.move(start, (time, pose))
         wall, (margin, near) = touched(self.track.walls, area), self._approach(area)
@@ -84,7 +84,7 @@ class TrackEvaluator(Evaluator):
             self._measures.approach(near[0])
         return near or (math.inf, "")
 
-    def _reached(self, start: Pose, end: Pose, area: shapely.Geometry) -> str | None:
+    def _reached(self, start: VehiclePose, end: VehiclePose, area: shapely.Geometry) -> str | None:
         """That the goal was reached after all gates, or the last gate where there is no goal; None when it was not."""
         share = self._gates.move(start, end)
         if share is None:
@@ -96,7 +96,7 @@ class TrackEvaluator(Evaluator):
         name = touched(self.track.goal, rest)
         return name and f"reached {name}"
 
-    def decide(self, span: Span) -> Verdict:
+    def decide(self, span: JudgedTime) -> Verdict:
         if self._last is None:
             raise UnjudgeableError(f"no opendlv.sim.Frame of the vehicle came {span.within}")
         silent = [name for name in REQUESTS if name not in self._requests]
@@ -108,7 +108,7 @@ class TrackEvaluator(Evaluator):
             return self._verdict("failed", f"{self._missed(self._last[1], span.within)}{aside}")
         return self._verdict("passed", f"stayed clear of {' and '.join(self.track.walls)} {span.throughout}{aside}")
 
-    def _missed(self, pose: Pose, within: str) -> str:
+    def _missed(self, pose: VehiclePose, within: str) -> str:
         name, lines = self._gates.next or next(iter(self.track.goal.items()))
         away = f"the vehicle is {place(pose)}, {shapely.distance(lines, outline(pose, self.box)):.2f} m from"
         if self._gates.next is None:

@@ -12,7 +12,7 @@ import shapely
 NUMBERS = 4
 
 
-class MapError(ValueError):
+class ObstaclesError(ValueError):
     """A map that cannot be read, or that lacks an obstacle; the message names file and place."""
 
 
@@ -26,10 +26,10 @@ def load(path: Path) -> dict[str, shapely.MultiLineString]:
         document = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise MapError(f"{file}: cannot be read as a map: {reason}") from None
+        raise ObstaclesError(f"{file}: cannot be read as a map: {reason}") from None
     entries = document.get("obstacles", []) if isinstance(document, dict) else None
     if not isinstance(entries, list):
-        raise MapError(f"{file}: expected an object with a list of obstacles")
+        raise ObstaclesError(f"{file}: expected an object with a list of obstacles")
     lines: dict[str, list[list[tuple[float, float]]]] = {}
     for index, entry in enumerate(entries):
         name, segments = _obstacle(entry, f"{file}: obstacles[{index}]")
@@ -44,7 +44,7 @@ def pick(
     chosen = {}
     for name in names:
         if name not in obstacles:
-            raise MapError(f"--{parameter}: {_unknown(name, list(obstacles), path)}")
+            raise ObstaclesError(f"--{parameter}: {_unknown(name, list(obstacles), path)}")
         shapely.prepare(obstacles[name])
         chosen[name] = obstacles[name]
     return chosen
@@ -58,10 +58,10 @@ def _unknown(name: str, known: list[str], path: Path) -> str:
 
 def _obstacle(entry: Any, place: str) -> tuple[str, list[list[tuple[float, float]]]]:
     if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
-        raise MapError(f"{place}: expected an object with a name")
+        raise ObstaclesError(f"{place}: expected an object with a name")
     lines = entry.get("lines")
     if not isinstance(lines, list) or not lines:
-        raise MapError(f"{place}.lines: expected a list of lines [x1, y1, x2, y2]")
+        raise ObstaclesError(f"{place}.lines: expected a list of lines [x1, y1, x2, y2]")
     if not isinstance(lines[0], list):
         return entry["name"], [_segment(lines, f"{place}.lines")]
     return entry["name"], [_segment(line, f"{place}.lines[{index}]") for index, line in enumerate(lines)]
@@ -70,7 +70,7 @@ def _obstacle(entry: Any, place: str) -> tuple[str, list[list[tuple[float, float
 def _segment(line: Any, place: str) -> list[tuple[float, float]]:
     numbers = line if isinstance(line, list) else []
     if len(numbers) != NUMBERS or not all(_is_number(value) for value in numbers):
-        raise MapError(f"{place}: expected four numbers [x1, y1, x2, y2] in metres")
+        raise ObstaclesError(f"{place}: expected four numbers [x1, y1, x2, y2] in metres")
     x1, y1, x2, y2 = (float(value) for value in numbers)
     return [(x1, y1), (x2, y2)]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from services.base import Context, Flags, Handler, UnjudgeableError
-from services.collision.geometry import Box, Pose, heading_of
+from services.collision.geometry import VehicleBox, VehiclePose, heading_of
 from services.collision.model import REQUESTS, TrackEvaluator
 from services.collision.obstacles import load, pick
 from services.collision.track import Track
@@ -22,7 +22,7 @@ class Collision(TrackEvaluator):
     def __init__(self, context: Context, wall: Callable[[], float] = time.monotonic) -> None:
         """``wall`` in s: on a rig it is an error when the vehicle vanishes."""
         flags = context.flags
-        super().__init__(track(flags), Box(flags["length"], flags["width"]))
+        super().__init__(track(flags), VehicleBox(flags["length"], flags["width"]))
         self._log = context.log
         self._on_rig, self._wall = context.on_rig, wall
         self._seen: float | None = None
@@ -56,7 +56,7 @@ class Collision(TrackEvaluator):
             if self.rejected == 1:
                 self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
             return
-        self.look(Pose(frame.x, frame.y, heading), sample_time)
+        self.look(VehiclePose(frame.x, frame.y, heading), sample_time)
 
 
 def track(flags: Flags) -> Track:

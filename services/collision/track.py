@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import shapely
 
 from services.collision.gates import Gate
-from services.collision.geometry import Pose
+from services.collision.geometry import VehiclePose
 
 Obstacles = Mapping[str, shapely.MultiLineString]
 
@@ -50,6 +50,6 @@ def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
     return None
 
 
-def place(pose: Pose) -> str:
+def place(pose: VehiclePose) -> str:
     """The vehicle's position for sentences."""
     return f"at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"

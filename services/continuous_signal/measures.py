@@ -10,7 +10,7 @@ from services.continuous_signal.target import MICROSECONDS, Target, Times, Value
 
 
 @dataclass(frozen=True)
-class Limits:
+class SignalLimits:
     """Limits of a signal, in its own unit; None for no limit.
 
     `start` and `until` are the window of time that is judged, in microseconds, both included; at least `samples`
@@ -28,7 +28,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Worst:
+class WorstSample:
     """The sample farthest from its target: its time in seconds, its value and the target's."""
 
     time: float
@@ -37,7 +37,7 @@ class Worst:
 
 
 @dataclass(frozen=True)
-class Measures:
+class SignalMeasures:
     """The distances d of `samples` samples; `received` counts all in the window, `outside` those without a target.
 
     `broken` holds the times (s) of those in the window that are not finite. Without a sample all else is None.
@@ -51,9 +51,9 @@ class Measures:
     std: float | None = None
     distance: float | None = None
     share: float | None = None
-    worst: Worst | None = None
+    worst: WorstSample | None = None
 
-    def checks(self, limits: Limits) -> tuple[Check, ...]:
+    def checks(self, limits: SignalLimits) -> tuple[Check, ...]:
         """Each measure with its limit; one that has no value does not keep a limit."""
         share = () if limits.band is None else (_check("share", self.share, "min", limits.share),)
         return (
@@ -67,7 +67,7 @@ class Measures:
         )
 
 
-def measure(target: Target, times: Times, values: Values, limits: Limits) -> Measures:
+def measure(target: Target, times: Times, values: Values, limits: SignalLimits) -> SignalMeasures:
     """The measures of samples in any order, their times in microseconds on the target's own scale."""
     inside = times >= limits.start
     if limits.until is not None:
@@ -79,11 +79,11 @@ def measure(target: Target, times: Times, values: Values, limits: Limits) -> Mea
     known = finite & ~np.isnan(expected)
     samples, outside = int(known.sum()), int((finite & ~known).sum())
     if not samples:
-        return Measures(len(times), 0, outside, broken)
+        return SignalMeasures(len(times), 0, outside, broken)
     times, values, expected = times[known], values[known], expected[known]
     distances: Values = np.abs(values - expected)
     at = int(np.argmax(distances))
-    return Measures(
+    return SignalMeasures(
         received=len(known),
         samples=samples,
         outside=outside,
@@ -92,7 +92,7 @@ def measure(target: Target, times: Times, values: Values, limits: Limits) -> Mea
         std=float(distances.std()),
         distance=float(distances[at]),
         share=None if limits.band is None else float((distances <= limits.band).mean()),
-        worst=Worst(float(times[at]) / MICROSECONDS, float(values[at]), float(expected[at])),
+        worst=WorstSample(float(times[at]) / MICROSECONDS, float(values[at]), float(expected[at])),
     )
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from services.base import Evaluator, Span, UnjudgeableError, Verdict
-from services.continuous_signal.measures import Limits, measure
+from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.continuous_signal.measures import SignalLimits, measure
 from services.continuous_signal.reason import verdict
 from services.continuous_signal.target import Target, Times, Values, in_order
 
@@ -40,7 +40,9 @@ class SignalEvaluator(Evaluator):
     kept until the verdict, which comes at MOST_SAMPLES of them at the latest.
     """
 
-    def __init__(self, signal: str, target: Target | None, limits: Limits, max_time: float, from_begin: bool) -> None:
+    def __init__(
+        self, signal: str, target: Target | None, limits: SignalLimits, max_time: float, from_begin: bool
+    ) -> None:
         """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the begin."""
         super().__init__(max_time)
         self._signal, self._target, self._limits = signal, target, limits
@@ -63,9 +65,9 @@ class SignalEvaluator(Evaluator):
         is_full = max(len(self._samples), len(self._targets)) >= MOST_SAMPLES
         if is_full and not self.is_overdue(now):
             seconds = f"{self.elapsed(now):.2f} s, until memory was full"
-            self.conclude(Span(f"in {seconds}", f"for {seconds}"))
+            self.conclude(JudgedTime(f"in {seconds}", f"for {seconds}"))
 
-    def decide(self, span: Span) -> Verdict:
+    def decide(self, span: JudgedTime) -> Verdict:
         begin = self.zero
         target = self._target or in_order(*self._targets.since(begin))
         if not len(target.times):

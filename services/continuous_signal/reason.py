@@ -1,13 +1,13 @@
 """The verdict on a signal in one sentence."""
 
 from services.base import Check, Verdict
-from services.continuous_signal.measures import Limits, Measures
+from services.continuous_signal.measures import SignalLimits, SignalMeasures
 from services.continuous_signal.target import Target
 
 _NAMES = {"mean": "the mean distance", "std": "the standard deviation", "distance": "the largest distance"}
 
 
-def verdict(signal: str, target: Target, measures: Measures, limits: Limits, during: str) -> Verdict:
+def verdict(signal: str, target: Target, measures: SignalMeasures, limits: SignalLimits, during: str) -> Verdict:
     """Passed when every limit is kept; ``during`` is the observed time in words."""
     checks = measures.checks(limits)
     faults = [] if measures.samples else [_nothing(signal, target, measures, during)]
@@ -23,7 +23,7 @@ def verdict(signal: str, target: Target, measures: Measures, limits: Limits, dur
     return Verdict("passed", f"{samples}: {', '.join(kept)}{_worst(measures)}", checks)
 
 
-def _nothing(signal: str, target: Target, measures: Measures, during: str) -> str:
+def _nothing(signal: str, target: Target, measures: SignalMeasures, during: str) -> str:
     if not measures.received:
         return f"no sample of {signal} came {during}"
     if measures.broken:
@@ -34,7 +34,7 @@ def _nothing(signal: str, target: Target, measures: Measures, during: str) -> st
     return f"none of {measures.received} samples of {signal} is from the target's time, {begin:.2f} s to {end:.2f} s"
 
 
-def _fault(check: Check, measures: Measures, limits: Limits) -> str:
+def _fault(check: Check, measures: SignalMeasures, limits: SignalLimits) -> str:
     value, bound = _value(check), _bound(check)
     if check.name == "samples":
         aside = f", and {measures.outside} outside the target's time" if measures.outside else ""
@@ -52,7 +52,7 @@ def _value(check: Check) -> str:
     return str(check.value) if short in map(_number, check.limit.values()) else short
 
 
-def _worst(measures: Measures) -> str:
+def _worst(measures: SignalMeasures) -> str:
     worst = measures.worst
     if worst is None:
         return ""

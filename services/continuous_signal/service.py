@@ -6,7 +6,7 @@ from typing import Any
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags
 from services.continuous_signal.csv_target import read_table
-from services.continuous_signal.measures import Limits
+from services.continuous_signal.measures import SignalLimits
 from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.recorded_target import read_recording
 from services.continuous_signal.signals import Signal, check
@@ -66,7 +66,7 @@ def _target(flags: Flags, signal: Signal, messages: MessageSet) -> Target | None
     return read_table(path, signal.field, flags["align"] == "sample-time")
 
 
-def _limits(flags: Flags) -> Limits:
+def _limits(flags: Flags) -> SignalLimits:
     if all(flags[name] is None for name in REQUIRED):
         raise ValueError(f"there is no limit: give one or more of --{', --'.join(REQUIRED)}")
     if flags["min-share"] is not None and flags["band"] is None:
@@ -74,7 +74,7 @@ def _limits(flags: Flags) -> Limits:
     until = flags["until"]
     if until is not None and until <= flags["from"]:
         raise ValueError(f"--until={until:g} is not after --from={flags['from']:g}")
-    return Limits(
+    return SignalLimits(
         mean=flags["max-mean"],
         std=flags["max-std"],
         distance=flags["max-distance"],

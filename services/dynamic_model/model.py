@@ -13,7 +13,7 @@ MICROSECONDS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """Velocities of the body: `vx` and `vy` in m/s at the centre of mass, `yaw_rate` in rad/s."""
 
     vx: float = 0.0
@@ -31,19 +31,19 @@ def pedal_position(request: float, car: Car = KIWI) -> float:
     return max(car.pedal_reverse, min(car.pedal_forward, request))
 
 
-def step(motion: Motion, wheel: float, pedal: float, dt: float, car: Car = KIWI) -> Motion:
+def step(motion: BodyMotion, wheel: float, pedal: float, dt: float, car: Car = KIWI) -> BodyMotion:
     """One explicit Euler step of `dt` seconds with the wheel (rad) and the pedal held."""
     vx, vy, r = motion.vx, motion.vy, motion.yaw_rate
     gain = car.gain_forward if pedal > 0 else car.gain_reverse
     next_vx = vx + dt * (gain * pedal - car.resistance * vx) / car.mass
     speed = abs(vx)
     if speed <= car.slip_speed:
-        return Motion(next_vx, 0.0, 0.0)
+        return BodyMotion(next_vx, 0.0, 0.0)
     force_front = car.cornering_front * (wheel - (vy + car.front * r) / speed)
     force_rear = car.cornering_rear * (car.rear * r - vy) / speed
     next_vy = vy + dt * ((force_front + force_rear) / car.mass - vx * r)
     next_r = r + dt * (car.front * force_front - car.rear * force_rear) / car.inertia
-    return Motion(next_vx, next_vy, next_r)
+    return BodyMotion(next_vx, next_vy, next_r)
 
 
 class Vehicle:
@@ -51,7 +51,7 @@ class Vehicle:
 
     def __init__(self, freq: float, car: Car = KIWI, steps: int = 1) -> None:
         """`freq` in Hz: the equations are stepped `steps` times or more in each of its periods."""
-        self.motion = Motion()
+        self.motion = BodyMotion()
         self.rejected = 0
         self.car = car
         self._longest = math.ceil(MICROSECONDS / (freq * steps))
@@ -75,10 +75,10 @@ class Vehicle:
 
     def reset(self) -> None:
         """Stand still, with the wheel straight and the pedal let go."""
-        self.motion = Motion()
+        self.motion = BodyMotion()
         self._wheel = self._pedal = 0.0
 
-    def update(self, now: int) -> Motion:
+    def update(self, now: int) -> BodyMotion:
         """Advance to `now` (microseconds) with the requests held; the first call only takes the time.
 
         Raises ValueError when time runs backwards and ArithmeticError when the steps were too long.

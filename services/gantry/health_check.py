@@ -8,7 +8,7 @@ from typing import Any
 
 from services.gantry import start
 from services.gantry.link import REQUEST_STATE, Link, RigError
-from services.gantry.motion import Limits
+from services.gantry.motion import MotionLimits
 from services.gantry.protocol import Position, Status
 
 ROUNDS = 20
@@ -30,7 +30,7 @@ _POLL = 0.005
 Check = dict[str, Any]
 
 
-def home(limits: Limits) -> Position:
+def home(limits: MotionLimits) -> Position:
     """The place at the switches, as far as the limits reach, that the line's four decimals do not round outside."""
     return replace(limits.low, yaw=limits.low.yaw + DECIMAL)
 
@@ -44,7 +44,7 @@ def read_state(link: Link) -> tuple[Position | None, Status]:
     raise RigError(f"the rig at {link.name} does not report its position")
 
 
-def run_checks(link: Link, limits: Limits, patience: float) -> dict[str, Any]:
+def run_checks(link: Link, limits: MotionLimits, patience: float) -> dict[str, Any]:
     """``ok``, the ``reason`` when it is not, and the ``checks``; the rig moves, and ends at home.
 
     A rig that cannot move, or still reports an old fault, is not fit.
@@ -87,7 +87,7 @@ def _answers(link: Link) -> list[Check]:
     ]
 
 
-def _homing(link: Link, limits: Limits, patience: float) -> list[Check]:
+def _homing(link: Link, limits: MotionLimits, patience: float) -> list[Check]:
     """Homes from two places of each axis: the times differ by the distance between them, unless home has moved.
 
     Positions mean nothing while homing, and agree with themselves afterwards whatever steps were lost.
@@ -103,7 +103,7 @@ def _homing(link: Link, limits: Limits, patience: float) -> list[Check]:
     return checks
 
 
-def _difference(link: Link, limits: Limits, axis: str, patience: float) -> float:
+def _difference(link: Link, limits: MotionLimits, axis: str, patience: float) -> float:
     """By how much an axis' switch seems to have moved the second time (m or rad)."""
     low: float = getattr(limits.low, axis)
     high: float = getattr(limits.high, axis)

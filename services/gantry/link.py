@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from services.gantry.port import Port, PortError
+from services.gantry.port import PortError, SerialLine
 from services.gantry.protocol import LATCHED, LineReader, Position, Refusal, Status, Word, command
 
 SILENCE = 1.0
@@ -24,7 +24,7 @@ class RigError(RuntimeError):
     """The rig cannot go on; one sentence."""
 
 
-class Answers(NamedTuple):
+class LinkAnswers(NamedTuple):
     """A rig's answers; None for one that did not come."""
 
     at: Position | None = None
@@ -38,17 +38,19 @@ class Link:
     It sends nothing on its own, so that a fault can still be read when the line is opened.
     """
 
-    def __init__(self, name: str, open_port: Callable[[], Port], now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, name: str, open_port: Callable[[], SerialLine], now: Callable[[], float] = time.monotonic
+    ) -> None:
         """``now`` in s; the line is opened by the first exchange."""
         self.name = name
         self._open, self._now = open_port, now
-        self._port: Port | None = None
+        self._port: SerialLine | None = None
         self._lines = LineReader()
         self._last_state = self._retry = now()
         self._found = False
         self._status: Status | None = None
 
-    def exchange(self, lines: bytes, patience: float) -> Answers:
+    def exchange(self, lines: bytes, patience: float) -> LinkAnswers:
         """Send commands of which STATUS is the last, and wait up to ``patience`` s for its answer.
 
         A rig that has not answered yet has PATIENCE to do so, without answers meanwhile. From its first answer on:
@@ -57,7 +59,7 @@ class Link:
         """
         try:
             if self._port is None and not self._opened():
-                return Answers()
+                return LinkAnswers()
             assert self._port is not None
             late = self._lines.feed(self._port.read(0.0))
             if lines != REQUEST_STATE:
@@ -67,7 +69,7 @@ class Link:
         except OSError as error:
             self._let_go()
             self._miss(str(error))
-            return Answers()
+            return LinkAnswers()
         if self._now() - self._last_state > SILENCE:
             self._miss("it does not answer")
         return heard._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *heard.refusals))
@@ -91,7 +93,7 @@ class Link:
             reason = str(error)
         _log.warning("the rig at %s did not confirm that it stopped: %s", self.name, reason)
 
-    def _answers(self, port: Port, patience: float) -> Answers:
+    def _answers(self, port: SerialLine, patience: float) -> LinkAnswers:
         at, status, refusals = None, None, []
         end = self._now() + patience
         while status is None and (left := end - self._now()) > 0:
@@ -103,7 +105,7 @@ class Link:
                     status = self._status = answer
                 else:
                     refusals.append(answer)
-        return Answers(at, status, tuple(refusals))
+        return LinkAnswers(at, status, tuple(refusals))
 
     def _opened(self) -> bool:
         now = self._now()

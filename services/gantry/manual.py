@@ -20,7 +20,7 @@ from services.base.signals import interruptible
 from services.gantry import health_check, start
 from services.gantry.emulator import EmulatedRig
 from services.gantry.link import Link, RigError
-from services.gantry.motion import Limits, box
+from services.gantry.motion import MotionLimits, box
 from services.gantry.port import SerialPort, checked
 from services.gantry.protocol import Position, Status
 from services.gantry.service import EMULATED, describe, place
@@ -31,7 +31,7 @@ FLAGS = ("serial", "patience", "range-x", "range-y", "range-yaw")
 DONE, BROKEN, USAGE = 0, 1, 2
 
 
-class UsageError(ValueError):
+class ManualUsageError(ValueError):
     """A wrong command line, or a place out of the rig's ranges; one sentence."""
 
 
@@ -44,7 +44,7 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
         result, code = _done(flags, action, goal, limits)
     except RigError as error:
         result, code = {"error": str(error)}, BROKEN
-    except UsageError as error:
+    except ManualUsageError as error:
         result, code = {"error": str(error)}, USAGE
     except (ValueError, OSError) as error:
         result, code = {"error": " ".join(str(error).split())}, BROKEN
@@ -61,20 +61,20 @@ def _parsed(argv: Sequence[str]) -> tuple[Flags, str, list[float]]:
         flags = parse(manifest, [*(word for word in argv if word.startswith("--")), "--cid=1"])
         action, numbers = words[0] if words else "", [float(word) for word in words[1:]]
     except ValueError as error:
-        raise UsageError(str(error)) from None
+        raise ManualUsageError(str(error)) from None
     if action not in ACTIONS:
-        raise UsageError(f"'{action}' is not an action, expected one of {', '.join(ACTIONS)}")
+        raise ManualUsageError(f"'{action}' is not an action, expected one of {', '.join(ACTIONS)}")
     if len(numbers) != ACTIONS[action] or not all(map(math.isfinite, numbers)):
-        raise UsageError(f"{action} takes {ACTIONS[action] or 'no'} numbers: X and Y in m, YAW in degrees")
+        raise ManualUsageError(f"{action} takes {ACTIONS[action] or 'no'} numbers: X and Y in m, YAW in degrees")
     return flags, action, numbers
 
 
-def _limits(flags: Flags) -> Limits:
+def _limits(flags: Flags) -> MotionLimits:
     low, high = box(flags["range-x"], flags["range-y"], math.radians(flags["range-yaw"]))
-    return Limits(low=low, high=high)
+    return MotionLimits(low=low, high=high)
 
 
-def _goal(action: str, numbers: Sequence[float], limits: Limits) -> Position | None:
+def _goal(action: str, numbers: Sequence[float], limits: MotionLimits) -> Position | None:
     """Where an action leads; raises UsageError for a place out of the rig's ranges, before anything moves."""
     if action == "home":
         return health_check.home(limits)
@@ -85,11 +85,11 @@ def _goal(action: str, numbers: Sequence[float], limits: Limits) -> Position | N
         low, high = limits.low, limits.high
         ranges = f"x {low.x:g} to {high.x:g} m, y {low.y:g} to {high.y:g} m"
         turn = f"yaw {math.degrees(low.yaw):.1f} to {math.degrees(high.yaw):.1f} degrees"
-        raise UsageError(f"the place is out of the rig's ranges ({ranges}, {turn}): {place(goal)}")
+        raise ManualUsageError(f"the place is out of the rig's ranges ({ranges}, {turn}): {place(goal)}")
     return goal
 
 
-def _done(flags: Flags, action: str, goal: Position | None, limits: Limits) -> tuple[dict[str, Any], int]:
+def _done(flags: Flags, action: str, goal: Position | None, limits: MotionLimits) -> tuple[dict[str, Any], int]:
     patience = flags["patience"]
     with ExitStack() as resources, interruptible():
         emulated = resources.enter_context(EmulatedRig()) if flags["serial"] == EMULATED else None

@@ -29,7 +29,7 @@ class Velocity:
 
 
 @dataclass(frozen=True)
-class Limits:
+class MotionLimits:
     """m/s, m/s2, rad/s, rad/s2, and the box of positions (m, rad)."""
 
     speed: float = 1.0
@@ -60,7 +60,7 @@ def turned(velocity: Velocity, yaw: float) -> Velocity:
 class Shaper:
     """Turns the vehicle's velocities into commands for the rig, step by step."""
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: MotionLimits) -> None:
         self.limits = limits
         self.velocity = Velocity()
         self.cut = 0

@@ -25,7 +25,7 @@ class PortError(ValueError):
     """A port that cannot be used; one sentence."""
 
 
-class Port(Protocol):
+class SerialLine(Protocol):
     """A line of bytes; both raise OSError when it is lost."""
 
     def write(self, data: bytes) -> None:

@@ -12,7 +12,7 @@ from services.base.signals import interruptible
 from services.gantry import start
 from services.gantry.emulator import EmulatedRig
 from services.gantry.link import REQUEST_STATE, Link, RigError
-from services.gantry.motion import Limits, Shaper, Velocity, box
+from services.gantry.motion import MotionLimits, Shaper, Velocity, box
 from services.gantry.port import PortError, SerialPort, checked
 from services.gantry.protocol import SENTENCES, Position, Refusal, Status, Word, command
 from services.gantry.telemetry import LinkTelemetry
@@ -166,10 +166,10 @@ def describe(status: Status) -> str:
     return f"the rig {SENTENCES[status]}" if status in SENTENCES else f"the rig is {status.name.lower()}"
 
 
-def limits_of(flags: Flags) -> Limits:
+def limits_of(flags: Flags) -> MotionLimits:
     """The rig's limits, or tighter ones."""
     low, high = box(flags["range-x"], flags["range-y"], math.radians(flags["range-yaw"]))
-    return Limits(
+    return MotionLimits(
         speed=flags["max-speed"],
         acceleration=flags["max-acceleration"],
         yaw_rate=flags["max-yaw-rate"],

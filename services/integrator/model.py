@@ -9,7 +9,7 @@ AHEAD = 1_000_000  # us; a stamp further ahead than this is of another clock
 
 
 @dataclass(frozen=True)
-class Pose:
+class BodyPose:
     """`position` in m in the world (z up) and `attitude`, the rotation from the body to the world."""
 
     position: Vector
@@ -24,11 +24,11 @@ class Twist:
     rates: Vector = (0.0, 0.0, 0.0)
 
 
-def move(pose: Pose, twist: Twist, dt: float) -> Pose:
+def move(pose: BodyPose, twist: Twist, dt: float) -> BodyPose:
     """The pose after `dt` seconds of a constant twist."""
     step = rotate(pose.attitude, displacement(twist.velocity, twist.rates, dt))
     x, y, z = pose.position
-    return Pose((x + step[0], y + step[1], z + step[2]), multiply(pose.attitude, turn(twist.rates, dt)))
+    return BodyPose((x + step[0], y + step[1], z + step[2]), multiply(pose.attitude, turn(twist.rates, dt)))
 
 
 class Integrator:
@@ -39,7 +39,7 @@ class Integrator:
     more than a second ahead of the update cannot be of the test's clock and counts as the last update's.
     """
 
-    def __init__(self, start: Pose) -> None:
+    def __init__(self, start: BodyPose) -> None:
         self.pose = self._start = start
         self._twist = Twist()
         self._coming: list[tuple[int, Twist]] = []
@@ -53,7 +53,7 @@ class Integrator:
         """Stand at the start until the next twist."""
         self.pose, self._twist, self._coming = self._start, Twist(), []
 
-    def update(self, now: int) -> Pose:
+    def update(self, now: int) -> BodyPose:
         """The pose at `now` (microseconds); the first call only takes the time.
 
         Raises ValueError when time runs backwards.

@@ -9,7 +9,7 @@ from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import parser
 from services.base import Context, Flags, Output, Service, period_of
-from services.integrator.model import Integrator, Pose, Twist
+from services.integrator.model import BodyPose, Integrator, Twist
 from services.integrator.rotation import angles, quaternion
 
 FRAME, RESET = "opendlv.sim.Frame", "reset"
@@ -57,15 +57,15 @@ class Integration(Service):
             self._log.warning("ignored a KinematicState of %s, and will ignore all that are not finite", twist)
 
 
-def _old_payload(messages: MessageSet, pose: Pose) -> bytes:
+def _old_payload(messages: MessageSet, pose: BodyPose) -> bytes:
     (x, y, z), (roll, pitch, yaw) = pose.position, angles(pose.attitude)
     return messages.encode(messages.type(FRAME)(x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw))
 
 
-def start(flags: Flags) -> Pose:
+def start(flags: Flags) -> BodyPose:
     """Where the body stands at first: metres and degrees on the flags."""
     angles = (math.radians(flags[name]) for name in ("roll", "pitch", "yaw"))
-    return Pose((float(flags["x"]), float(flags["y"]), float(flags["z"])), quaternion(*angles))
+    return BodyPose((float(flags["x"]), float(flags["y"]), float(flags["z"])), quaternion(*angles))
 
 
 def build(context: Context) -> Service:

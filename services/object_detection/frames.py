@@ -58,7 +58,7 @@ class Detections:
 
 
 @dataclass
-class Frame:
+class DetectedFrame:
     """A frame with at least one message, the first at ``since`` (microseconds of test time).
 
     ``has_truth``: its truth is known to be complete, even if empty; ``answered``: the application sent something.

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Sequence
 
-from services.base import Evaluator, Span, UnjudgeableError, Verdict
+from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
 from services.object_detection.boxes import Box, LabelledBox
 from services.object_detection.counts import compare
-from services.object_detection.frames import Detections, Frame, FrameKey, Value
+from services.object_detection.frames import DetectedFrame, Detections, FrameKey, Value
 from services.object_detection.reason import verdict
-from services.object_detection.score import Limits, Rules, Score
+from services.object_detection.score import DetectionLimits, Rules, Score
 from services.object_detection.truth import Truth
 
 
@@ -19,11 +19,11 @@ class DetectionEvaluator(Evaluator):
     for its sample time.
     """
 
-    def __init__(self, truth: Truth | None, rules: Rules, limits: Limits) -> None:
+    def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits) -> None:
         super().__init__(rules.max_time, rules.max_delay)
         self._truth, self._rules, self._limits = truth, rules, limits
         self._score = Score()
-        self._frames: dict[int, Frame] = {}
+        self._frames: dict[int, DetectedFrame] = {}
         self._judged: set[int] = set()
         self._passed_over: set[int] = set()
         self._pictures = set(truth.pictures) if truth else set[int]()
@@ -58,7 +58,7 @@ class DetectionEvaluator(Evaluator):
     def advance(self, now: int) -> None:
         self._settle(lambda frame: now - frame.since >= self._rules.max_delay * MICROSECONDS)
 
-    def decide(self, span: Span) -> Verdict:
+    def decide(self, span: JudgedTime) -> Verdict:
         """At the end of the input, all frames that are left count.
 
         Pictures of a file that the application never answered count up to the last that it did, or all at the end.
@@ -73,7 +73,7 @@ class DetectionEvaluator(Evaluator):
                 self._score.add(counts, f"of picture {key}", False)
         return verdict(self._score, self._limits, span.within)
 
-    def _take(self, key: FrameKey, number: int, value: Value, side: Callable[[Frame], Detections]) -> None:
+    def _take(self, key: FrameKey, number: int, value: Value, side: Callable[[DetectedFrame], Detections]) -> None:
         frame = self._frame(key)
         if frame is not None:
             detections = side(frame)
@@ -82,7 +82,7 @@ class DetectionEvaluator(Evaluator):
         elif key.time in self._judged and isinstance(value, Box):
             self._score.late += 1
 
-    def _frame(self, key: FrameKey) -> Frame | None:
+    def _frame(self, key: FrameKey) -> DetectedFrame | None:
         """The frame of a message; None for one that is judged already, or does not count."""
         frame = self._frames.get(key.time)
         if frame is not None or key.time in self._judged or key.time in self._passed_over:
@@ -90,20 +90,20 @@ class DetectionEvaluator(Evaluator):
         if self.now is None or self.elapsed(self.now) < self._rules.start:
             self._pass_over(key)
             return None
-        return self._frames.setdefault(key.time, Frame(key, self.now))
+        return self._frames.setdefault(key.time, DetectedFrame(key, self.now))
 
     def _pass_over(self, key: FrameKey) -> None:
         self._passed_over.add(key.time)
         if self._truth is not None and self._truth.frames != "one":
             self._pictures.discard(self._truth.picture_of(key))
 
-    def _settle(self, due: Callable[[Frame], bool]) -> None:
+    def _settle(self, due: Callable[[DetectedFrame], bool]) -> None:
         for frame in [frame for frame in self._frames.values() if due(frame)]:
             del self._frames[frame.key.time]
             self._judged.add(frame.key.time)
             self._judge(frame)
 
-    def _judge(self, frame: Frame) -> None:
+    def _judge(self, frame: DetectedFrame) -> None:
         true = self._true(frame)
         self._score.repeated += frame.found.repeated
         if true is None:
@@ -112,7 +112,7 @@ class DetectionEvaluator(Evaluator):
         counts = compare(frame.found.labelled(), true, self._rules.iou, self._rules.labels)
         self._score.add(counts, f"at {self.elapsed(frame.since):.2f} s", frame.answered)
 
-    def _true(self, frame: Frame) -> Sequence[LabelledBox] | None:
+    def _true(self, frame: DetectedFrame) -> Sequence[LabelledBox] | None:
         """The true boxes of a frame; each picture of a file holds for one frame, unless there is one for all."""
         if self._truth is None:
             return frame.true.labelled() if frame.true or frame.has_truth else None

@@ -1,10 +1,10 @@
 """The verdict on a perception in one sentence."""
 
 from services.base import Check, Verdict
-from services.object_detection.score import MEASURES, Limits, Score
+from services.object_detection.score import MEASURES, DetectionLimits, Score
 
 
-def verdict(score: Score, limits: Limits, during: str) -> Verdict:
+def verdict(score: Score, limits: DetectionLimits, during: str) -> Verdict:
     """Passed when every limit is kept; ``during`` is the observed time in words."""
     checks = score.checks(limits)
     if not score.answered:

@@ -24,7 +24,7 @@ class Rules:
 
 
 @dataclass(frozen=True)
-class Limits:
+class DetectionLimits:
     """The least required values, None for no limit; ``each_class`` applies them to every class, too."""
 
     precision: float | None = None
@@ -40,7 +40,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Worst:
+class WorstFrame:
     """The frame with the most mistakes, where it was, and what was wrong."""
 
     place: str
@@ -66,7 +66,7 @@ class Score:
     without_truth: int = 0
     late: int = 0
     repeated: int = 0
-    worst: Worst | None = None
+    worst: WorstFrame | None = None
 
     def add(self, frame: CountsByClass, place: str, answered: bool) -> None:
         """Add a frame's counts; ``place`` names it in sentences."""
@@ -74,11 +74,11 @@ class Score:
         self.answered += answered
         for label, counts in frame:
             self.counts.add(label, counts)
-        worst = Worst(place, frame.total())
+        worst = WorstFrame(place, frame.total())
         if worst.mistakes > (self.worst.mistakes if self.worst else 0):
             self.worst = worst
 
-    def checks(self, limits: Limits) -> tuple[Check, ...]:
+    def checks(self, limits: DetectionLimits) -> tuple[Check, ...]:
         """Totals, what was counted, and a line of measures for each class; a measure without a value keeps no limit."""
         total = self.counts.total()
         counts = {
@@ -97,7 +97,7 @@ class Score:
             *self._classes(limits),
         )
 
-    def _classes(self, limits: Limits) -> Iterator[Check]:
+    def _classes(self, limits: DetectionLimits) -> Iterator[Check]:
         for label, counts in self.counts:
             for name in MEASURES:
                 limit = limits.of(name) if limits.each_class else None

@@ -9,8 +9,8 @@ from services.base import Context, Flags, Handler
 from services.object_detection.boxes import Box
 from services.object_detection.frames import FrameKey, TypeNumber, Value
 from services.object_detection.model import DetectionEvaluator
-from services.object_detection.score import MEASURES, Limits, Rules
-from services.object_detection.truth import Truth, TruthError, load
+from services.object_detection.score import MEASURES, DetectionLimits, Rules
+from services.object_detection.truth import Truth, TruthFileError, load
 
 LOGIC = "opendlv.logic.perception.Detection"
 ANNOUNCEMENT = "opendlv.proxy.ImageReadingShm"
@@ -71,7 +71,7 @@ def _truth(flags: Flags) -> Truth | None:
         if name not in truth.labels():
             close = difflib.get_close_matches(name, truth.labels(), n=1)
             hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(truth.labels())}"
-            raise TruthError(f"--classes: {path} has no box of class '{name}'; {hint}")
+            raise TruthFileError(f"--classes: {path} has no box of class '{name}'; {hint}")
     return truth
 
 
@@ -81,8 +81,8 @@ def _rules(flags: Flags) -> Rules:
     return Rules(flags["iou"], flags["classes"], flags["max-delay"], flags["max-time"], flags["from"])
 
 
-def _limits(flags: Flags) -> Limits:
+def _limits(flags: Flags) -> DetectionLimits:
     precision, recall, f1 = (flags[f"min-{name}"] for name in MEASURES)
     if precision is recall is f1 is None:
         raise ValueError("there is no limit: give one or more of --min-precision, --min-recall, --min-f1")
-    return Limits(precision, recall, f1, flags["min-frames"], flags["each-class"])
+    return DetectionLimits(precision, recall, f1, flags["min-frames"], flags["each-class"])

@@ -13,11 +13,11 @@ RECORD, STOP = 1, 2
 _log = logging.getLogger(__name__)
 
 
-class RecordingError(ValueError):
+class RecordingFileError(ValueError):
     """A file that cannot become a recording, or a disk that is full."""
 
 
-class Recording:
+class RecordingFile:
     """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and logs that.
 
     Nothing is buffered in the process: whatever ends it, the file holds all frames written so far.
@@ -31,9 +31,9 @@ class Recording:
         try:
             self._writer = RecordingWriter(path)
         except FileExistsError:
-            raise RecordingError(f"{path} exists and is not overwritten") from None
+            raise RecordingFileError(f"{path} exists and is not overwritten") from None
         except OSError as error:
-            raise RecordingError(f"{path} cannot be written: {error.strerror}") from None
+            raise RecordingFileError(f"{path} cannot be written: {error.strerror}") from None
 
     @property
     def frames(self) -> int:
@@ -64,7 +64,7 @@ class Recording:
             self._writer.write_frames((frame,))
         except OSError as error:
             place = f"{self._writer.path} ends after {self.frames} messages"
-            raise RecordingError(f"{place}: {error.strerror}") from None
+            raise RecordingFileError(f"{place}: {error.strerror}") from None
 
     def close(self) -> None:
         """End the recording."""

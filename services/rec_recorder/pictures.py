@@ -23,7 +23,7 @@ class Quality:
     lossless: bool
 
 
-class Camera:
+class RecordedCamera:
     """One memory's pictures, encoded; `sender_stamp` tells the memories of a recording apart."""
 
     def __init__(self, source: Source, quality: Quality, messages: MessageSet, sender_stamp: int) -> None:
@@ -68,7 +68,9 @@ class Camera:
 class Cameras:
     """All memories that are recorded: each picture goes to `write` while `is_on`."""
 
-    def __init__(self, cameras: Sequence[Camera], write: Callable[[Envelope], None], is_on: Callable[[], bool]) -> None:
+    def __init__(
+        self, cameras: Sequence[RecordedCamera], write: Callable[[Envelope], None], is_on: Callable[[], bool]
+    ) -> None:
         self._cameras, self._write, self._is_on = cameras, write, is_on
         self._was_on = True
 

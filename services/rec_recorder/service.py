@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 from services.base import Context, Service
 from services.base.service import period_of
-from services.rec_recorder.model import Recording
+from services.rec_recorder.model import RecordingFile
 from services.rec_recorder.source import MemorySpec, Source, parse
 
 if TYPE_CHECKING:
     from services.rec_recorder.pictures import Cameras
-    from services.rec_recorder.snapshot import Snapshot
+    from services.rec_recorder.snapshot import SnapshotWriter
 
 LOOKS_HZ, SNAPSHOT_LOOKS_HZ = 200.0, 20.0
 COMMAND = "cluon.data.RecorderCommand"
@@ -23,7 +23,7 @@ class Recorder(Service):
     period = None
 
     def __init__(
-        self, recording: Recording, cameras: "Cameras | None", snapshot: "Snapshot | None", commands: bool
+        self, recording: RecordingFile, cameras: "Cameras | None", snapshot: "SnapshotWriter | None", commands: bool
     ) -> None:
         self.observe = recording.write
         self._recording, self._cameras, self._snapshot = recording, cameras, snapshot
@@ -57,7 +57,7 @@ def build(context: Context) -> Service:
         if flags[name] and not memories:
             raise ValueError(f"--{name} needs --memories: the names of the shared memories to record")
     max_size = flags["max-size"] and round(flags["max-size"] * MEGABYTE)
-    recording = context.resources.enter_context(Recording(Path(flags["rec"]), max_size))
+    recording = context.resources.enter_context(RecordingFile(Path(flags["rec"]), max_size))
     if flags["paused"]:
         recording.is_on = False
     sources = [Source(spec, round(period_of(flags["frames"]))) for spec in memories if flags["frames"]]
@@ -66,21 +66,24 @@ def build(context: Context) -> Service:
     return Recorder(recording, cameras, snapshot, flags["commands"])
 
 
-def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "Snapshot":
-    from services.rec_recorder.snapshot import Snapshot
+def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "SnapshotWriter":
+    from services.rec_recorder.snapshot import SnapshotWriter
 
-    snapshot = Snapshot(Source(memory, 1), path)
+    snapshot = SnapshotWriter(Source(memory, 1), path)
     context.resources.callback(snapshot.close)
     return snapshot
 
 
-def _cameras(context: Context, sources: list[Source], recording: Recording) -> "Cameras":
-    from services.rec_recorder.pictures import Camera, Cameras, Quality
+def _cameras(context: Context, sources: list[Source], recording: RecordingFile) -> "Cameras":
+    from services.rec_recorder.pictures import Cameras, Quality, RecordedCamera
 
     flags = context.flags
     quality = Quality(flags["key-interval"], flags["quality"], flags["lossless"])
     cameras = Cameras(
-        [Camera(source, quality, context.messages, flags["id"] + number) for number, source in enumerate(sources)],
+        [
+            RecordedCamera(source, quality, context.messages, flags["id"] + number)
+            for number, source in enumerate(sources)
+        ],
         recording.write,
         lambda: recording.is_on,
     )

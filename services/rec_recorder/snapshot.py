@@ -11,7 +11,7 @@ from services.rec_recorder.source import Source
 _log = logging.getLogger(__name__)
 
 
-class Snapshot:
+class SnapshotWriter:
     """The first picture of ``source``, and then the first from a test's begin on, in the file ``path``.
 
     A picture that cannot be written is logged; the recording goes on.

@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import Frame, VideoDecoder, VideoError, has_key_frame
+from dodo_dsl.opendlv.video.decoder import DecodedFrame, VideoDecoder, VideoError, has_key_frame
 from services.rec_replay.selection import IMAGE
 
 FARTHEST = 3000
@@ -22,7 +22,7 @@ FARTHEST = 3000
 _log = logging.getLogger(__name__)
 
 
-class Picture(NamedTuple):
+class RecordedPicture(NamedTuple):
     """A picture as B, G, R, A (height, width, 4) and as I420 (height * 3 / 2, width; None for odd sizes)."""
 
     argb: NDArray[np.uint8]
@@ -42,7 +42,7 @@ class Decoder:
         """The next picture does not follow the last one."""
         self._codec = None
 
-    def frame(self, envelope: Envelope) -> Frame | None:
+    def frame(self, envelope: Envelope) -> DecodedFrame | None:
         """The picture of a message; raises VideoError for a format that is not known."""
         image = self._image(envelope)
         frame = None
@@ -66,13 +66,13 @@ class Decoder:
             return None
 
 
-def pixels(frame: Frame) -> Picture:
+def pixels(frame: DecodedFrame) -> RecordedPicture:
     """The picture in both formats of a camera."""
     even = frame.width % 2 == 0 and frame.height % 2 == 0
-    return Picture(frame.pixels("argb"), frame.pixels("i420") if even else None)
+    return RecordedPicture(frame.pixels("argb"), frame.pixels("i420") if even else None)
 
 
-def first_frame(recording: Recording, rows: Numbers) -> Frame:
+def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
     """The first picture of the rows that can be decoded; raises VideoError where none can."""
     decoder = Decoder()
     for envelope in recording.envelopes(rows):
@@ -102,7 +102,7 @@ class PictureMemories:
         self.shown = self.misfits = 0
         self._argb, self._i420 = argb, i420
 
-    def show(self, picture: Picture, sample_time: int) -> None:
+    def show(self, picture: RecordedPicture, sample_time: int) -> None:
         """Publish a picture; raises SharedMemoryError when a reader keeps the lock."""
         if picture.argb.nbytes != self._argb.size:
             if not self.misfits:

@@ -17,7 +17,7 @@ from services.base.service import Output, period_of
 from services.rec_replay.pictures import PictureMemories, first_frame
 from services.rec_replay.player import Player
 from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Selection, SelectionError, select
-from services.rec_replay.stream import Stream
+from services.rec_replay.stream import EntryStream
 
 LOOKS_HZ = 1000.0
 LARGEST_PAYLOAD = 65_400
@@ -39,7 +39,7 @@ class Replay(Service):
     def __init__(
         self,
         player: Player,
-        stream: Stream,
+        stream: EntryStream,
         memories: PictureMemories | None,
         status: type[Any],
         shifts: bool,
@@ -130,7 +130,7 @@ def build(context: Context) -> Service:
     if recording.damage:
         _log.warning("%s: %s", recording.path, recording.damage)
     part = _part(context, recording)
-    player, stream = Player(part.due, flags["autorewind"]), Stream(recording, part)
+    player, stream = Player(part.due, flags["autorewind"]), EntryStream(recording, part)
     if not flags["await-begin"]:
         player.play()
     settle = round(flags["settle"] * MICROSECONDS)

@@ -8,21 +8,21 @@ import numpy as np
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.opendlv.video.decoder import VideoError
-from services.rec_replay.pictures import Decoder, Picture, lead_in, pixels
+from services.rec_replay.pictures import Decoder, RecordedPicture, lead_in, pixels
 from services.rec_replay.selection import Part
 
 READ_AHEAD = 256
 
 
-class Entry(NamedTuple):
+class RecordedEntry(NamedTuple):
     """An entry to play: ``picture`` if it is shown and could be decoded, ``is_sent`` if it goes to the bus."""
 
     envelope: Envelope
     is_sent: bool
-    picture: Picture | None
+    picture: RecordedPicture | None
 
 
-class Stream:
+class EntryStream:
     """Entries from a position on. The one after the last that was taken is read, and decoded, by `prepare`."""
 
     def __init__(self, recording: Recording, part: Part) -> None:
@@ -32,7 +32,7 @@ class Stream:
         """Which entries are pictures for the memory."""
         self._images = np.flatnonzero(part.shown)
         self._entries = self._from(0)
-        self._ahead: Entry | None = None
+        self._ahead: RecordedEntry | None = None
 
     def seek(self, position: int) -> None:
         """Go on with another entry; what its picture needs is decoded first."""
@@ -50,22 +50,22 @@ class Stream:
         if self._ahead is None:
             self._ahead = next(self._entries, None)
 
-    def take(self) -> Entry:
+    def take(self) -> RecordedEntry:
         """The next entry; raises StopIteration behind the last."""
         entry = self._ahead or next(self._entries)
         self._ahead = None
         return entry
 
-    def _from(self, position: int) -> Iterator[Entry]:
+    def _from(self, position: int) -> Iterator[RecordedEntry]:
         part = self._part
         for first in range(position, len(part), READ_AHEAD):
             last = first + READ_AHEAD
             marks = zip(part.sent[first:last].tolist(), part.shown[first:last].tolist(), strict=True)
             envelopes = self._recording.envelopes(part.rows[first:last])
             for envelope, (sent, shown) in zip(envelopes, marks, strict=True):
-                yield Entry(envelope, sent, self._decoded(envelope) if shown else None)
+                yield RecordedEntry(envelope, sent, self._decoded(envelope) if shown else None)
 
-    def _decoded(self, envelope: Envelope) -> Picture | None:
+    def _decoded(self, envelope: Envelope) -> RecordedPicture | None:
         try:
             frame = self.decoder.frame(envelope)
         except VideoError:

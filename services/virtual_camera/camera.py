@@ -46,7 +46,7 @@ def quaternion_rotation(x: float, y: float, z: float, w: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class CameraPose:
     """A body in its parent frame: ``position`` (3,) in m, ``rotation`` (3, 3) body to parent."""
 
     position: Array
@@ -57,10 +57,10 @@ class Pose:
         """From a position in m and right-handed angles in rad (a positive pitch looks down)."""
         return cls(np.array([x, y, z], dtype=np.float64), euler_rotation(roll, pitch, yaw))
 
-    def carrying(self, mounted: "Pose") -> "Pose":
+    def carrying(self, mounted: "CameraPose") -> "CameraPose":
         """The pose, in this pose's parent frame, of something mounted on this body."""
         position = self.position + self.rotation @ mounted.position
-        return Pose(position, self.rotation @ mounted.rotation)
+        return CameraPose(position, self.rotation @ mounted.rotation)
 
 
 class Pinhole:
@@ -88,7 +88,7 @@ class Pinhole:
         """Picture coordinates (..., 2) of points (..., 3) in the camera frame, all with z > 0."""
         return np.asarray(points[..., :2] * (self.focal / points[..., 2:]) + self.centre, np.float64)
 
-    def view(self, pose: Pose) -> "View":
+    def view(self, pose: CameraPose) -> "View":
         right, down, forward = -pose.rotation[:, 1], -pose.rotation[:, 2], pose.rotation[:, 0]
         return View(self, pose.position, np.stack([right, down, forward]))
 

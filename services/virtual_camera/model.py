@@ -8,7 +8,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from services.virtual_camera.camera import Pose, quaternion_rotation
+from services.virtual_camera.camera import CameraPose, quaternion_rotation
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.image.optics import Optics
@@ -24,7 +24,7 @@ Both arrays are drawn over by the next picture.
 """
 
 
-class Frame(Protocol):
+class CameraFrame(Protocol):
     """The fields of ``opendlv.sim.Frame``: position in m and attitude of a body in the world."""
 
     x: float
@@ -36,17 +36,17 @@ class Frame(Protocol):
     qw: float
 
 
-def body_pose(frame: Frame) -> Pose:
+def body_pose(frame: CameraFrame) -> CameraPose:
     """The pose in a frame; ValueError when it has none."""
     position = np.array([frame.x, frame.y, frame.z], dtype=np.float64)
     if not (np.abs(position) <= FARTHEST).all():
         raise ValueError(f"position ({frame.x}, {frame.y}, {frame.z}) is not within {FARTHEST:.0f} m")
-    return Pose(position, quaternion_rotation(frame.qx, frame.qy, frame.qz, frame.qw))
+    return CameraPose(position, quaternion_rotation(frame.qx, frame.qy, frame.qz, frame.qw))
 
 
-def mount(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose:
+def mount(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> CameraPose:
     """The camera on the body: offset in m, angles in degrees; a positive pitch looks up, as in OpenDLV."""
-    return Pose.at(x, y, z, math.radians(roll), -math.radians(pitch), math.radians(yaw))
+    return CameraPose.at(x, y, z, math.radians(roll), -math.radians(pitch), math.radians(yaw))
 
 
 def to_i420(argb: Image, out: Image | None = None) -> Image:
@@ -60,10 +60,10 @@ class VirtualCamera:
     def __init__(
         self,
         renderer: Renderer,
-        mounted: Pose,
+        mounted: CameraPose,
         publish: Publish,
         optics: Optics | None = None,
-        start: Pose | None = None,
+        start: CameraPose | None = None,
     ) -> None:
         """``mounted`` is the camera in the body frame, ``start`` the body before any frame.
 
@@ -82,7 +82,7 @@ class VirtualCamera:
         self.refused = 0
         """How many frames had no valid pose; the camera stays where it was."""
 
-    def take_frame(self, frame: Frame, sample_time: int) -> None:
+    def take_frame(self, frame: CameraFrame, sample_time: int) -> None:
         """The vehicle is where the frame says; ``sample_time`` in us of test time."""
         try:
             pose = body_pose(frame)
@@ -97,7 +97,7 @@ class VirtualCamera:
             self._motion = between(self._motion.pose, pose, sample_time - self._framed)
         self._framed = sample_time
 
-    def update(self, now: int) -> Pose | None:
+    def update(self, now: int) -> CameraPose | None:
         """Draws and publishes one picture, sampled at ``now`` (us of test time); the camera's pose in the world."""
         if self._motion is None:
             return None

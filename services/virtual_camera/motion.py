@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from services.virtual_camera.camera import Array, Pinhole, Pose
+from services.virtual_camera.camera import Array, CameraPose, Pinhole
 
 LONGEST_GAP = 1.0
 """Frames farther apart than this, in s, say nothing of the motion."""
@@ -18,19 +18,19 @@ MOST = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class CameraMotion:
     """A pose that moves evenly: ``velocity`` (3,) in m/s, ``spin`` (3,) in rad/s about the world's axes."""
 
-    pose: Pose
+    pose: CameraPose
     velocity: Array
     spin: Array
 
-    def after(self, seconds: float) -> Pose:
+    def after(self, seconds: float) -> CameraPose:
         """Where the body is so much later (or earlier, when negative)."""
         if not (self.velocity.any() or self.spin.any()):
             return self.pose
         turn, _ = cv2.Rodrigues(self.spin * seconds)
-        return Pose(self.pose.position + self.velocity * seconds, turn @ self.pose.rotation)
+        return CameraPose(self.pose.position + self.velocity * seconds, turn @ self.pose.rotation)
 
     def steps(self, camera: Pinhole, shutter: float) -> int:
         """How many pictures the blur of ``shutter`` seconds takes, so that they lie about 2 pixels apart."""
@@ -38,11 +38,11 @@ class Motion:
         return int(min(MOST, max(1, -(-across * camera.focal * shutter // FINEST))))
 
 
-def still(pose: Pose) -> Motion:
-    return Motion(pose, np.zeros(3), np.zeros(3))
+def still(pose: CameraPose) -> CameraMotion:
+    return CameraMotion(pose, np.zeros(3), np.zeros(3))
 
 
-def between(earlier: Pose, later: Pose, microseconds: int) -> Motion:
+def between(earlier: CameraPose, later: CameraPose, microseconds: int) -> CameraMotion:
     """The motion that led from one pose to another, at the other; none where the gap or the speed makes no sense."""
     seconds = microseconds / 1e6
     if not 0.0 < seconds <= LONGEST_GAP:
@@ -51,4 +51,4 @@ def between(earlier: Pose, later: Pose, microseconds: int) -> Motion:
     if float(np.linalg.norm(velocity)) > FASTEST:
         return still(later)
     turn, _ = cv2.Rodrigues(later.rotation @ earlier.rotation.T)
-    return Motion(later, velocity, np.asarray(turn[:, 0] / seconds, np.float64))
+    return CameraMotion(later, velocity, np.asarray(turn[:, 0] / seconds, np.float64))

@@ -11,7 +11,7 @@ from google.protobuf.message import Message
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags, Output, Service, period_of
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
@@ -21,7 +21,7 @@ from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.overlays import load_overlays
 from services.virtual_camera.image.sensor import Sensor
 from services.virtual_camera.model import Publish, VirtualCamera, mount
-from services.virtual_camera.truth import Box, Limits, Truth, classes_of
+from services.virtual_camera.truth import SceneTruth, TrueBox, TruthLimits, classes_of
 
 Memories = list[tuple[SharedMemory, str]]
 """Shared memory and what it holds: argb, i420 or bgr."""
@@ -30,19 +30,21 @@ Memories = list[tuple[SharedMemory, str]]
 class TruthSender:
     """Sends true boxes as OpenDLV's detections, under its own sender stamp."""
 
-    def __init__(self, truth: Truth, classes: Iterable[str], camera: Pinhole, messages: MessageSet, stamp: int) -> None:
+    def __init__(
+        self, truth: SceneTruth, classes: Iterable[str], camera: Pinhole, messages: MessageSet, stamp: int
+    ) -> None:
         self._truth, self._camera, self._stamp = truth, camera, stamp
         self._types = {name: number for number, name in enumerate(dict.fromkeys(classes), start=1)}
         names = ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
         self._kinds = [messages.type(f"opendlv.logic.perception.{name}") for name in names]
 
-    def outputs(self, pose: Pose) -> Iterator[Output]:
+    def outputs(self, pose: CameraPose) -> Iterator[Output]:
         """Three messages a box, the same detectionId for the same model in every picture."""
         for box in self._truth.boxes(pose):
             for message in self._messages(box):
                 yield Output(message, self._stamp)
 
-    def _messages(self, box: Box) -> tuple[Message, ...]:
+    def _messages(self, box: TrueBox) -> tuple[Message, ...]:
         kind, name, place = self._kinds
         wide, high = self._camera.width, self._camera.height
         fractions = {"x": box.left / wide, "y": box.top / high, "width": box.width / wide, "height": box.height / high}
@@ -53,7 +55,7 @@ class TruthSender:
         )
 
 
-class CameraService(Service):
+class VirtualCameraService(Service):
     """Draws at its rate from the frames of one sender."""
 
     def __init__(self, camera: VirtualCamera, freq: float, frame_id: int, truth_sender: TruthSender | None) -> None:
@@ -96,11 +98,11 @@ def mounted_camera(flags: Flags, renderer: Renderer, optics: Optics, publish: Pu
     return VirtualCamera(renderer, mounted, publish, optics, _start(flags))
 
 
-def open_truth(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[Truth, dict[str, str]]:
+def open_truth(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[SceneTruth, dict[str, str]]:
     """What knows the true boxes, and the classes by model; raises ValueError for a model that the map lacks."""
     classes = classes_of(flags["truth-classes"], renderer.bodies.names)
-    limits = Limits(flags["truth-min-visible"], flags["truth-min-height"])
-    return Truth(renderer, classes, limits, optics.lens), classes
+    limits = TruthLimits(flags["truth-min-visible"], flags["truth-min-height"])
+    return SceneTruth(renderer, classes, limits, optics.lens), classes
 
 
 def _scene(flags: Flags) -> Scene:
@@ -119,12 +121,12 @@ def _optics(flags: Flags, scene: Scene) -> Optics:
     return Optics(camera, distortion, sensor, overlays, flags["shutter"])
 
 
-def _start(flags: Flags) -> Pose | None:
+def _start(flags: Flags) -> CameraPose | None:
     written = [flags[f"start-{name}"] for name in ("x", "y", "yaw")]
     if written == [None] * 3:
         return None
     x, y, yaw = (value or 0.0 for value in written)
-    return Pose.at(x, y, 0.0, yaw=math.radians(yaw))
+    return CameraPose.at(x, y, 0.0, yaw=math.radians(yaw))
 
 
 def _truth_sender(context: Context, renderer: Renderer, optics: Optics) -> TruthSender | None:
@@ -147,4 +149,4 @@ def build(context: Context) -> Service:
     renderer, optics = open_scene(flags)
     publish = publisher(_memories(context, flags["width"] * flags["height"]))
     camera = mounted_camera(flags, renderer, optics, publish)
-    return CameraService(camera, flags["freq"], flags["frame-id"], _truth_sender(context, renderer, optics))
+    return VirtualCameraService(camera, flags["freq"], flags["frame-id"], _truth_sender(context, renderer, optics))

@@ -19,7 +19,7 @@ from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.service import mounted_camera, open_scene, open_truth
-from services.virtual_camera.truth import Box
+from services.virtual_camera.truth import TrueBox
 
 OUTPUT = "--output="
 ORIGIN = tuple(f"--start-{name}=0" for name in ("x", "y", "yaw"))
@@ -63,7 +63,7 @@ def _draw(flags: Flags) -> tuple[Image, list[dict[str, Any]]]:
     return pictures[0], [_as_json(box) for box in truth.boxes(pose)]
 
 
-def _as_json(box: Box) -> dict[str, Any]:
+def _as_json(box: TrueBox) -> dict[str, Any]:
     edges = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
     return {"class": box.name, **{name: round(value, 3) for name, value in edges.items()}}
 

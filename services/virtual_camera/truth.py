@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from services.virtual_camera.camera import NEAR, Array, Pinhole, Pose, View, clip
+from services.virtual_camera.camera import NEAR, Array, CameraPose, Pinhole, View, clip
 from services.virtual_camera.draw.raster import Image, fill_fixed
 from services.virtual_camera.draw.render import Labels, Renderer
 from services.virtual_camera.draw.shading import Piece
@@ -17,7 +17,7 @@ _ONE = 256
 
 
 @dataclass(frozen=True)
-class Box:
+class TrueBox:
     """The visible box of one model: ``left``, ``top``, ``width``, ``height`` in pixels from the upper left corner.
 
     ``number`` counts the map's models, all copies of the first before those of the second; ``visible`` is the share of
@@ -34,7 +34,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Limits:
+class TruthLimits:
     """The least for a box: the smallest visible share, and the smallest height in pixels."""
 
     visible: float = 0.25
@@ -54,15 +54,15 @@ def classes_of(written: Iterable[str], models: Iterable[str]) -> dict[str, str]:
     return {name: kind or name for name, _, kind in pairs} or {name: name for name in known}
 
 
-class Truth:
+class SceneTruth:
     """Finds the boxes of named models in pictures of a renderer, as a lens in front of it shows them."""
 
     def __init__(
-        self, renderer: Renderer, classes: Mapping[str, str], limits: Limits, lens: Lens | None = None
+        self, renderer: Renderer, classes: Mapping[str, str], limits: TruthLimits, lens: Lens | None = None
     ) -> None:
         self._renderer, self._classes, self._limits, self._lens = renderer, classes, limits, lens
 
-    def boxes(self, pose: Pose) -> list[Box]:
+    def boxes(self, pose: CameraPose) -> list[TrueBox]:
         """All boxes that keep within the limits, by number; ``pose`` is the camera's in the world."""
         labels, drawn = self._renderer.labels(pose)
         seen = np.bincount(labels[labels >= 0], minlength=len(self._renderer.bodies.names))
@@ -70,7 +70,7 @@ class Truth:
         found = [self._box(view, body, pieces, int(seen[body]), labels) for body, pieces in drawn.items()]
         return sorted((box for box in found if box is not None), key=lambda box: box.number)
 
-    def _box(self, view: View, body: int, pieces: list[Piece], seen: int, labels: Labels) -> Box | None:
+    def _box(self, view: View, body: int, pieces: list[Piece], seen: int, labels: Labels) -> TrueBox | None:
         name = self._classes.get(self._renderer.bodies.names[body])
         if name is None or seen == 0:
             return None
@@ -82,7 +82,7 @@ class Truth:
         (left, top), (wide, high) = corners.min(axis=0).tolist(), np.ptp(corners, axis=0).tolist()
         if visible < self._limits.visible or high < self._limits.height or wide <= 0.0:
             return None
-        return Box(body, name, left, top, wide, high, visible)
+        return TrueBox(body, name, left, top, wide, high, visible)
 
     def _corners(self, view: View, body: int) -> Array:
         """Where (n, 2) the renderer's picture has what of a body lies before the camera, in pixels from its corner."""

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.application.compose_extends import MAX_DEPTH, Service, extended, moved
-from dodo_dsl.application.compose_files import Files
+from dodo_dsl.application.compose_extends import MAX_DEPTH, ExtendedService, extended, moved
+from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.source import Mapping, plain
 from tests.source.nodes import mapping
 
@@ -19,11 +19,11 @@ def resolved(folder: Path, text: str) -> tuple[Any, list[str]]:
     (folder / "sub").mkdir()
     (folder / "sub/common.yml").write_text(COMMON)
     (folder / "compose.yml").write_text(text)
-    files = Files()
+    files = ComposeFiles()
     document = files.document(folder / "compose.yml")
     services = document.get("services") if document else None
     assert isinstance(services, Mapping)
-    service = Service(folder / "compose.yml", folder, "a")
+    service = ExtendedService(folder / "compose.yml", folder, "a")
     node = extended(files, service, services.entries["a"].value)
     return plain(node), [problem.message for problem in files.problems]
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.compose_files import MAX_FILES, MAX_TEXT, Files, variables_of
+from dodo_dsl.application.compose_files import MAX_FILES, MAX_TEXT, ComposeFiles, variables_of
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Mapping, Scalar
 from tests.source.nodes import mapping
 
 
-def messages(files: Files) -> list[str]:
+def messages(files: ComposeFiles) -> list[str]:
     return [problem.message for problem in files.problems]
 
 
@@ -21,7 +21,7 @@ def word(text: str) -> Scalar:
 def test_a_file_is_read_once(tmp_path: Path) -> None:
     file = tmp_path / "a.yml"
     file.write_text("a: 1\n")
-    files = Files()
+    files = ComposeFiles()
     first = files.document(file)
     file.write_text("a: 2\n")
     assert isinstance(first, Mapping)
@@ -38,13 +38,13 @@ def test_a_file_is_read_once(tmp_path: Path) -> None:
 )
 def test_what_is_no_compose_file(content: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "a.yml").write_text(content)
-    files = Files()
+    files = ComposeFiles()
     assert files.document(tmp_path / "a.yml") is None
     assert messages(files) == [message]
 
 
 def test_too_many_values() -> None:
-    files = Files()
+    files = ComposeFiles()
     node = mapping(f"a: [{'x,' * 15_000}]")
     assert [files.grow(node, node.span) for _ in range(4)] == [True, True, True, False]
     assert files.full
@@ -55,7 +55,7 @@ def test_files_of_the_repository(tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "a.yml").write_text("a: 1\n")
     (tmp_path / "link.yml").symlink_to("a.yml")
-    files = Files()
+    files = ComposeFiles()
     assert files.other(word("../a.yml"), tmp_path / "sub") == tmp_path / "a.yml"
     assert files.problems == []
     for text in ("link.yml", "sub", "/a.yml", "~/a.yml", "${HOME}/a.yml", "https://example.org/a.yml", "git@x:a"):
@@ -70,7 +70,7 @@ def test_files_of_the_repository(tmp_path: Path) -> None:
 
 
 def test_too_many_files(tmp_path: Path) -> None:
-    files = Files()
+    files = ComposeFiles()
     for number in range(MAX_FILES):
         (tmp_path / f"{number}.yml").write_text("a: 1\n")
         files.document(tmp_path / f"{number}.yml")
@@ -81,7 +81,7 @@ def test_too_many_files(tmp_path: Path) -> None:
 def test_variables_have_one_value(tmp_path: Path) -> None:
     (tmp_path / "a.env").write_text("A=1\nB=2\n")
     (tmp_path / "b.env").write_text("B=3\nC=4\n")
-    files = Files()
+    files = ComposeFiles()
     for name in ("a.env", "b.env", "none.env"):
         files.gather(tmp_path / name, Span("x.yml"))
     assert files.variables == {"A": "1", "B": "2", "C": "4"}

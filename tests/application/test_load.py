@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl.application.compose_files import Files
+from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.load import load
 from dodo_dsl.application.model import plain
 from dodo_dsl.application.read import read_application
@@ -20,7 +20,7 @@ def loaded(folder: Path, files: dict[str, str]) -> tuple[Any, list[str]]:
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
-    read = Files()
+    read = ComposeFiles()
     document = load(read, [folder / next(iter(files))])
     return document and plain(document)["services"], [problem.message for problem in read.problems]
 

@@ -9,7 +9,7 @@ import pytest
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text
 from dodo_dsl.emit.render import render_plan
-from dodo_dsl.plan.model import Plan, Service
+from dodo_dsl.plan.model import Plan, PlannedService
 from dodo_dsl.plan.plan_json import from_json, to_json
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from tests.emit.readers import compose
@@ -31,7 +31,7 @@ def plan(folder: Path, way: str, out: Path) -> tuple[Plan, str]:
     hil = way == "hil"
     isolation = "network" if way == "network" else "host"
     application = plan_application(source, 140, isolation, out, ("judge-of-test",), hil=hil, privileged_allowed=hil)
-    judge = Service("evaluation", "judge-of-test", "collision", "dodo/collision:1", (), (), True)
+    judge = PlannedService("evaluation", "judge-of-test", "collision", "dodo/collision:1", (), (), True)
     subnet = "10.213.0.0/28" if way == "network" else ""
     common = (
         "",

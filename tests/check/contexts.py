@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from dodo_dsl import compiler
-from dodo_dsl.check.context import Context, Rule
+from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.compiler import Checked
 from tests.check import examples
@@ -21,11 +21,11 @@ def resolved(example: str, folder: Path) -> ResolvedTest:
     return _example(checked(example, folder).tests)
 
 
-def context(example: str, folder: Path) -> Context:
+def context(example: str, folder: Path) -> RuleContext:
     """The input of a rule about that instance."""
     found = checked(example, folder)
     by_name = {test.spec.name or "": [test.spec] for test in found.tests}
-    return Context(_example(found.tests), found.manifests, by_name, found.deployment, found.application)
+    return RuleContext(_example(found.tests), found.manifests, by_name, found.deployment, found.application)
 
 
 def found(rule: Rule, example: str, folder: Path) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.emit.containers import containers
-from dodo_dsl.plan.model import Flag, Plan, Service
+from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from tests.run.helpers import Bench
 
 
@@ -19,9 +19,9 @@ def plan(tmp_path: Path) -> Plan:
         Flag("cid", "130"),
     )
     services = (
-        Service("environment", "camera", "x", "image", (), flags, setup_s=2.5),
-        Service("action", "vehicle", "x", "image", ()),
-        Service("evaluation", "judge", "x", "image", (), judge=True),
+        PlannedService("environment", "camera", "x", "image", (), flags, setup_s=2.5),
+        PlannedService("action", "vehicle", "x", "image", ()),
+        PlannedService("evaluation", "judge", "x", "image", (), judge=True),
     )
     return replace(Bench(tmp_path).plan(), isolation="network", services=services)
 

@@ -11,15 +11,15 @@ from typing import Any
 import pytest
 
 from services.base import Verdict
-from services.collision.geometry import Box, Pose
+from services.collision.geometry import VehicleBox, VehiclePose
 from services.collision.model import TrackEvaluator
 from services.collision.obstacles import load, pick
 from services.collision.track import Track
 from services.dynamic_model.model import Vehicle
 from services.integrator.model import Integrator, Twist
-from services.integrator.model import Pose as Attitude
+from services.integrator.model import VehiclePose as Attitude
 from services.integrator.rotation import quaternion
-from services.virtual_camera.camera import Pose as CameraPose
+from services.virtual_camera.camera import VehiclePose as CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 
@@ -59,7 +59,9 @@ class Loop:
     def run(self) -> Verdict:
         obstacles = load(MAPS / self.map)
         walls = pick(obstacles, ["left", "right"], "walls", MAPS)
-        evaluator = TrackEvaluator(Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), Box(0.36, 0.16))
+        evaluator = TrackEvaluator(
+            Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), VehicleBox(0.36, 0.16)
+        )
         heading = math.radians(90 + self.yaw)
         car, body = Vehicle(100), Integrator(Attitude((self.right, 0.0, 0.0), quaternion(0, 0, heading)))
         driver, answers = steering.Driver(self.reverse), []
@@ -82,7 +84,7 @@ class Loop:
             now += STEP
         return evaluator.verdict
 
-    def answer(self, driver: Any, pose: Pose) -> tuple[float, float]:
+    def answer(self, driver: Any, pose: VehiclePose) -> tuple[float, float]:
         eye = CameraPose.at(pose.x, pose.y, 0.095, 0.0, 0.0, pose.heading)
         places: dict[str, list[Any]] = {"yellow": [], "blue": []}
         for cone in perception.find_cones(renderer(self.map).render(eye)):
@@ -93,9 +95,9 @@ class Loop:
         return result
 
 
-def plane(pose: Attitude) -> Pose:
+def plane(pose: Attitude) -> VehiclePose:
     x, y, _ = pose.position
-    return Pose(x, y, 2 * math.atan2(pose.attitude[2], pose.attitude[3]))
+    return VehiclePose(x, y, 2 * math.atan2(pose.attitude[2], pose.attitude[3]))
 
 
 def margin(verdict: Verdict) -> float:

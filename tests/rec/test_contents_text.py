@@ -5,10 +5,10 @@ from types import SimpleNamespace
 from typing import Any
 
 from dodo_dsl.opendlv.recordings.damage import Damage
-from dodo_dsl.rec.contents import Contents, Frames, Stream
+from dodo_dsl.rec.contents import Contents, Frames, MessageStream
 from dodo_dsl.rec.contents_text import contents_text
 
-STREAMS = [Stream(19, "opendlv.Name", 0, 3, 30, 2.0, 0.75), Stream(8000, None, 12, 1, 10, None, None)]
+STREAMS = [MessageStream(19, "opendlv.Name", 0, 3, 30, 2.0, 0.75), MessageStream(8000, None, 12, 1, 10, None, None)]
 FOUND = Contents(900, 4, 1_700_000_000.5, 1.5, 0, 0, 0, "1.0", STREAMS, Frames(0, None))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.rec.excerpt import NothingSelected, Selection
+from dodo_dsl.rec.excerpt import Excerpt, NothingSelected
 from tests.rec.conftest import BEGIN, MESSAGES, message
 
 DISTANCE, STEERING = "opendlv.proxy.DistanceReading", "opendlv.proxy.GroundSteeringRequest"
@@ -19,7 +19,7 @@ def drive(record: Callable[..., Path]) -> Path:
     return record(message(name, BEGIN + n * 1_000_000, stamp) for n, (name, stamp) in enumerate(kinds))
 
 
-def rows(path: Path, selection: Selection) -> list[int]:
+def rows(path: Path, selection: Excerpt) -> list[int]:
     with Recording(path) as recording:
         return [int(row) for row in selection.rows(recording, MESSAGES)]
 
@@ -27,30 +27,30 @@ def rows(path: Path, selection: Selection) -> list[int]:
 @pytest.mark.parametrize(
     ("selection", "found"),
     [
-        (Selection(), [0, 1, 2]),
-        (Selection([DISTANCE]), [0, 1]),
-        (Selection([f"{DISTANCE}/1"]), [1]),
-        (Selection([str(MESSAGES.id(STEERING)), f"{DISTANCE}/0"]), [0, 2]),
-        (Selection(start=1), [1, 2]),
-        (Selection(end=1), [0]),
-        (Selection(start=0.5, end=1.5), [1]),
-        (Selection(start=BEGIN / 1e6 + 2), [2]),
-        (Selection([DISTANCE], start=1), [1]),
+        (Excerpt(), [0, 1, 2]),
+        (Excerpt([DISTANCE]), [0, 1]),
+        (Excerpt([f"{DISTANCE}/1"]), [1]),
+        (Excerpt([str(MESSAGES.id(STEERING)), f"{DISTANCE}/0"]), [0, 2]),
+        (Excerpt(start=1), [1, 2]),
+        (Excerpt(end=1), [0]),
+        (Excerpt(start=0.5, end=1.5), [1]),
+        (Excerpt(start=BEGIN / 1e6 + 2), [2]),
+        (Excerpt([DISTANCE], start=1), [1]),
     ],
 )
-def test_rows(drive: Path, selection: Selection, found: list[int]) -> None:
+def test_rows(drive: Path, selection: Excerpt, found: list[int]) -> None:
     assert rows(drive, selection) == found
 
 
 @pytest.mark.parametrize(
     ("selection", "problem"),
     [
-        (Selection(start=3), "no message of .* matches --start 3$"),
-        (Selection([STEERING], end=1.5), f"matches --message {STEERING} --end 1.5$"),
-        (Selection([f"{STEERING}/x"]), "is not a message: expected a sender stamp"),
-        (Selection(["Steering"]), "there is no message 'Steering'"),
+        (Excerpt(start=3), "no message of .* matches --start 3$"),
+        (Excerpt([STEERING], end=1.5), f"matches --message {STEERING} --end 1.5$"),
+        (Excerpt([f"{STEERING}/x"]), "is not a message: expected a sender stamp"),
+        (Excerpt(["Steering"]), "there is no message 'Steering'"),
     ],
 )
-def test_nothing_is_selected(drive: Path, selection: Selection, problem: str) -> None:
+def test_nothing_is_selected(drive: Path, selection: Excerpt, problem: str) -> None:
     with pytest.raises(NothingSelected, match=problem):
         rows(drive, selection)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 
@@ -142,7 +142,7 @@ def hues(image: np.ndarray, low: int, high: int) -> tuple[int, float]:
 def test_from_the_start_a_camera_sees_yellow_on_its_left_and_blue_on_its_right(name):
     renderer = Renderer(load_scene(MAPS / name), 640, 480, math.radians(48.8))
     x, y, heading = (0.0, 0.0, 0.0) if name == "static-rig" else start(name)
-    image = renderer.render(Pose.at(x, y, 0.095, yaw=heading))
+    image = renderer.render(CameraPose.at(x, y, 0.095, yaw=heading))
     yellow, blue = hues(image, 20, 35), hues(image, 105, 125)
     assert 300 < yellow[0] < 8000
     assert 300 < blue[0] < 8000
@@ -162,7 +162,7 @@ def test_cones_are_seen_all_along_the_lane(name):
     finish = {"left-curve": 4, "kiwi-track": 1}.get(name, 5)
     for here, there in pairwise(middle[: -finish + 1]):
         yaw = math.atan2(there[1] - here[1], there[0] - here[0])
-        image = renderer.render(Pose.at(here[0], here[1], 0.095, yaw=yaw))
+        image = renderer.render(CameraPose.at(here[0], here[1], 0.095, yaw=yaw))
         assert hues(image, 20, 35)[0] > 20
         assert hues(image, 105, 125)[0] > 20
 

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 
@@ -78,7 +78,9 @@ def test_the_example_application_is_within_the_limits_and_others_are_not(name):
     limits, way = parameters(f"sil-open-{name}", "signal"), rows(name)
     eye, driver = renderer(name), steering.Driver()
     target = np.array([row["groundSteering"] for row in way])
-    signal = [driver.drive(**seen(eye.render(Pose.at(row["x"], row["y"], 0.095, yaw=row["yaw"]))))[0] for row in way]
+    signal = [
+        driver.drive(**seen(eye.render(CameraPose.at(row["x"], row["y"], 0.095, yaw=row["yaw"]))))[0] for row in way
+    ]
     assert within(signal, target, limits) == ["mean", "std", "distance", "share"]
     for wrong in (-np.array(signal), np.zeros(len(way)), np.full(len(way), 0.05)):
         assert {"mean", "share"} & set(within(wrong, target, limits)) == set()
@@ -98,7 +100,7 @@ def test_the_beacon_moves_evenly_and_stays_in_the_lane(name):
 def test_the_truth_holds_the_cones_of_the_picture():
     """Each true box is full of its colour where no other cone hides it, and no cone is outside of all."""
     truth = json.loads((REGISTRY / "truths" / "static-rig.json").read_text())
-    image = renderer("static-rig").render(Pose.at(0, 0, 0.095))[..., :3]
+    image = renderer("static-rig").render(CameraPose.at(0, 0, 0.095))[..., :3]
     hue, saturation, value = cv2.split(cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_BGR2HSV))
     names = {c["id"]: c["name"] for c in truth["categories"]}
     assert sorted(names[a["category_id"]] for a in truth["annotations"]) == ["blue"] * 4 + ["yellow"] * 4

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.model import Application, ApplicationService, Plan, Service
+from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
 from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
@@ -98,8 +98,8 @@ class Bench:
         """One service a layer; the application is in its own, and takes CID and memory by default."""
         prefix = "import os, sys, time\n"
         services = (
-            Service("environment", "camera", "x", "x", self.script(f"{slug}-camera", prefix + environment)),
-            Service("evaluation", "judge", "x", "x", self.script(f"{slug}-judge", prefix + judge), judge=True),
+            PlannedService("environment", "camera", "x", "x", self.script(f"{slug}-camera", prefix + environment)),
+            PlannedService("evaluation", "judge", "x", "x", self.script(f"{slug}-judge", prefix + judge), judge=True),
         )
         app = ApplicationService(
             "app",

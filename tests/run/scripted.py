@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, Service
+from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Verdict
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, VerdictEvent
 
 T = TypeVar("T")
 Events = Sequence[tuple[float, Event]]
@@ -20,8 +20,8 @@ READY: Mapping[str, Events] = {
     "environment": [(1.0, Ready("camera"))],
     "evaluation": [(1.0, Ready("track"))],
 }
-PASSED = Verdict("track", True, "it drove", ())
-FAILED = Verdict("track", False, "hit wall left", ())
+PASSED = VerdictEvent("track", True, "it drove", ())
+FAILED = VerdictEvent("track", False, "hit wall left", ())
 
 
 class _JumpingSelector(selectors.DefaultSelector):
@@ -59,8 +59,8 @@ def run(work: Coroutine[Any, Any, T]) -> T:
 def plan(slug: str = "test", evaluators: Sequence[str] = ("track",), lockstep: float = 0.0, **more: Any) -> Plan:
     """A camera, evaluators and an application; ``lockstep`` is its limit of wall time in s, 0 for real time."""
     services = (
-        Service("environment", "camera", "virtual-camera", "x", ()),
-        *(Service("evaluation", name, "collision", "x", (), judge=True) for name in evaluators),
+        PlannedService("environment", "camera", "virtual-camera", "x", ()),
+        *(PlannedService("evaluation", name, "collision", "x", (), judge=True) for name in evaluators),
     )
     values: dict[str, Any] = {
         "name": slug, "slug": slug, "spec": f"{slug}/{slug}.dodo.yml", "description": "", "level": "sil",
@@ -132,7 +132,7 @@ class ScriptedBackend:
             self._events.put_nowait(event)
 
 
-def drives(seconds: float = 5.0, verdict: Verdict = PASSED) -> dict[str, Events]:
+def drives(seconds: float = 5.0, verdict: VerdictEvent = PASSED) -> dict[str, Events]:
     """The stages of a test that ends with a verdict."""
     return {**READY, "begin": [(seconds, verdict), (seconds, Exited("track", 0))]}
 

@@ -21,7 +21,7 @@ from dodo_dsl.run.protocol import (
     Stopped,
     Time,
     Unstartable,
-    Verdict,
+    VerdictEvent,
 )
 from tests.run.scripted import FAILED, PASSED, READY, Events, ScriptedBackend, drives, plan, run
 
@@ -221,9 +221,9 @@ def test_several_evaluators_end_and_the_worst_verdict_counts() -> None:
         "begin": [
             (1.0, PASSED),
             (1.0, ENDED),
-            (2.0, Verdict("signal", False, "far off", ({"name": "mean"},))),
+            (2.0, VerdictEvent("signal", False, "far off", ({"name": "mean"},))),
             (2.0, Exited("signal", 0)),
-            (3.0, Verdict("objects", True, "found all", ({"name": "recall"},))),
+            (3.0, VerdictEvent("objects", True, "found all", ({"name": "recall"},))),
             (3.0, Exited("objects", 0)),
         ],
     }

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.outcome import Result
-from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
@@ -19,7 +19,7 @@ from dodo_dsl.run.outcomes import (
     lost_messages,
     worst,
 )
-from dodo_dsl.run.protocol import BackendError, Verdict
+from dodo_dsl.run.protocol import BackendError, VerdictEvent
 from tests.run.scripted import plan
 
 RESULTS: tuple[Result, ...] = ("passed", "failed", "error")
@@ -40,8 +40,8 @@ def test_nothing_is_an_error() -> None:
     assert decide(Facts(("track",))) == Finding("error", "no evaluator gave a verdict")
 
 
-def verdict(name: str, passed: bool) -> Verdict:
-    return Verdict(name, passed, f"{name} {passed}", ())
+def verdict(name: str, passed: bool) -> VerdictEvent:
+    return VerdictEvent(name, passed, f"{name} {passed}", ())
 
 
 def test_verdicts_are_findings() -> None:
@@ -72,7 +72,7 @@ def test_exit_codes_in_words(code: int, words: str) -> None:
     assert how_it_ended(code) == words
 
 
-PLAIN = Service("environment", "a", "x", "x", ())
+PLAIN = PlannedService("environment", "a", "x", "x", ())
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ PLAIN = Service("environment", "a", "x", "x", ())
     ],
     ids=["other", "recorder", "evaluator"],
 )
-def test_what_losses_mean(service: Service, meaning: str) -> None:
+def test_what_losses_mean(service: PlannedService, meaning: str) -> None:
     assert lost_messages(service, 2) == f"service 'a' lost 2 messages, as its receive buffer was full: {meaning}"
 
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.schedule import CorePool, Schedule, cores_needed, schedule
 from tests.run.scripted import JumpingLoop, plan
 
 
-def camera(**flags: str) -> Service:
-    return Service("environment", "camera", "x", "x", ("x",), tuple(Flag(k, v) for k, v in flags.items()))
+def camera(**flags: str) -> PlannedService:
+    return PlannedService("environment", "camera", "x", "x", ("x",), tuple(Flag(k, v) for k, v in flags.items()))
 
 
 def test_larger_pictures_need_more_cores() -> None:

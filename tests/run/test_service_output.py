@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.run import service_output
-from dodo_dsl.run.service_output import Output
+from dodo_dsl.run.service_output import ServiceOutput
 
 
 class Read:
@@ -24,7 +24,7 @@ class Read:
         self.log = self.log_path.read_bytes()
 
     async def _read(self, chunks: Sequence[bytes], is_hung: bool) -> None:
-        output = Output(self.log_path, self._take)
+        output = ServiceOutput(self.log_path, self._take)
         writer = os.dup(output.writer)
         output.release_writer()
         for chunk in chunks:
@@ -95,7 +95,7 @@ def test_a_log_that_cannot_be_written_is_said_in_the_tail(tmp_path: Path) -> Non
     lines: list[bytes] = []
 
     async def scene() -> list[str]:
-        output = Output(tmp_path / "logs" / "app.log", lambda line: lines.append(line) is not None)
+        output = ServiceOutput(tmp_path / "logs" / "app.log", lambda line: lines.append(line) is not None)
         os.write(output.writer, b"a\nb\n")
         output.release_writer()
         await asyncio.wait_for(output.done.wait(), 10)
@@ -109,7 +109,7 @@ def test_handing_over_stops_reading_and_keeps_pipe_and_log(tmp_path: Path) -> No
     lines: list[bytes] = []
 
     async def scene() -> tuple[bytes, str]:
-        output = Output(tmp_path / "app.log", lambda line: lines.append(line) is not None)
+        output = ServiceOutput(tmp_path / "app.log", lambda line: lines.append(line) is not None)
         reader, log = output.hand_over()
         os.write(output.writer, b"later\n")
         await asyncio.sleep(0)

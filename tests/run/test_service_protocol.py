@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.run.protocol import Malformed, Overrun, Ready, Stopped, Time, Verdict
+from dodo_dsl.run.protocol import Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
 from dodo_dsl.run.service_protocol import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
@@ -19,8 +19,8 @@ def line(**changes: object) -> bytes:
 
 
 def test_a_complete_verdict_is_taken_from_an_evaluator() -> None:
-    assert read_line("track", True, line()) == Verdict("track", True, "done", (CHECK,))
-    assert read_line("track", True, line(outcome="failed")) == Verdict("track", False, "done", (CHECK,))
+    assert read_line("track", True, line()) == VerdictEvent("track", True, "done", (CHECK,))
+    assert read_line("track", True, line(outcome="failed")) == VerdictEvent("track", False, "done", (CHECK,))
     assert read_line("track", False, line()) is None
     assert read_line("camera", False, b'{"dodo": "ready"}\n') == Ready("camera")
 
@@ -109,7 +109,7 @@ def test_every_well_formed_verdict_is_taken(
 ) -> None:
     document = {"dodo": "verdict", "outcome": "passed" if passed else "failed", "reason": reason, "checks": checks}
     text = json.dumps(document, ensure_ascii=ascii_).encode()
-    assert read_line("track", True, b" " + text + b"\r\n") == Verdict("track", passed, reason, tuple(checks))
+    assert read_line("track", True, b" " + text + b"\r\n") == VerdictEvent("track", passed, reason, tuple(checks))
 
 
 @given(st.binary(max_size=200) | st.text(max_size=100).map(lambda t: ('{"dodo": ' + t).encode("utf-8", "replace")))

@@ -27,9 +27,9 @@ from dodo_dsl.opendlv.memory import pixels  # noqa: E402
 from dodo_dsl.opendlv.messages.message_set import MessageSet  # noqa: E402
 from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder  # noqa: E402
 from services.dynamic_model.model import Vehicle  # noqa: E402
-from services.integrator.model import Integrator, Pose, Twist  # noqa: E402
+from services.integrator.model import BodyPose, Integrator, Twist  # noqa: E402
 from services.integrator.rotation import quaternion  # noqa: E402
-from services.rec_recorder.model import Recording  # noqa: E402
+from services.rec_recorder.model import RecordingFile  # noqa: E402
 from services.virtual_camera.camera import Pinhole  # noqa: E402
 from services.virtual_camera.draw.render import Renderer  # noqa: E402
 from services.virtual_camera.draw.scene import Wishes, load_scene  # noqa: E402
@@ -77,7 +77,7 @@ def program(name: str) -> Any:
 class Recorded:
     """A recording under way; sent and received when it was sampled, so that nothing tells when it was made."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: RecordingFile) -> None:
         self.messages = MessageSet.standard()
         self._recording = recording
         self._encoder = VideoEncoder("i420", *SIZE, KEY_INTERVAL, QUALITY)
@@ -106,7 +106,7 @@ def camera(recorded: Recorded, map_name: str, condition: Condition) -> VirtualCa
     return VirtualCamera(renderer, mounted, lambda _argb, i420, now: recorded.show(i420, now), optics)
 
 
-def frame(pose: Pose) -> dict[str, float]:
+def frame(pose: BodyPose) -> dict[str, float]:
     """The fields of opendlv.sim.Frame."""
     return dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), (*pose.position, *pose.attitude), strict=True))
 
@@ -118,7 +118,7 @@ class Driver:
         self._targets = program("targets/make_targets.py")
         self._track, self._along = track, self._targets.MAPS.LEAD
 
-    def request(self, pose: Pose) -> float:
+    def request(self, pose: BodyPose) -> float:
         """The steering request in rad from where the car is."""
         x, y, _ = pose.position
         near = (self._along + step * 0.005 for step in range(60))
@@ -135,7 +135,7 @@ class Driver:
 def drive(recorded: Recorded) -> None:
     """The car on the Kiwi track; the driver looks with each picture."""
     vehicle, driver = Vehicle(VEHICLE_HZ), Driver("kiwi-track")
-    body = Integrator(Pose((0.0, 0.0, 0.0), quaternion(0.0, 0.0, math.pi / 2)))
+    body = Integrator(BodyPose((0.0, 0.0, 0.0), quaternion(0.0, 0.0, math.pi / 2)))
     eye = camera(recorded, "kiwi-track", ORDINARY)
     for now, is_picture in ticks(DRIVE_S):
         motion = vehicle.update(now)
@@ -162,7 +162,7 @@ def ticks(length: float) -> Iterator[tuple[int, bool]]:
 
 def look(recorded: Recorded) -> None:
     """The board of the static rig, in each condition."""
-    pose = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    pose = BodyPose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
     now = BEGIN
     for condition in RIG:
         eye = camera(recorded, "static-rig", condition)
@@ -179,7 +179,7 @@ def make(folder: Path) -> None:
         path = folder / f"{name}.rec"
         part = path.with_suffix(".part")
         part.unlink(missing_ok=True)
-        with Recording(part) as recording:
+        with RecordingFile(part) as recording:
             play(Recorded(recording))
         part.replace(path)
 

@@ -5,12 +5,12 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.lockstep import answers, rates, rates_fit, step_hz
 from dodo_dsl.diagnostics import Diagnostic
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     if context.spec.clock != "lockstep" or not context.spec.is_whole:
         return
     wiring = context.wiring
@@ -21,7 +21,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         yield Diagnostic(context.spec.span("clock"), "clock-answers", message, hint, severity="warning")
 
 
-def _rates(context: Context) -> Iterator[Diagnostic]:
+def _rates(context: RuleContext) -> Iterator[Diagnostic]:
     known = rates(context.services)
     step = step_hz(context.wiring, known)
     for use in context.spec.uses:

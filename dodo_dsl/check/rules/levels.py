@@ -5,11 +5,11 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     spec = context.spec
     if spec.level == "dil" and spec.kind == "closed-loop":
         message = "a dil test cannot be closed-loop: a recording does not react to what the application does"

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         for name, entry in service.use.parameters.items():
             argument = service.arguments.get(name)
@@ -18,7 +18,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             yield from _known(context, name.partition("/")[0], span)
 
 
-def _known(context: Context, name: str, span: Span) -> Iterator[Diagnostic]:
+def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:
     if name and name not in context.messages:
         hint = did_you_mean(name, context.messages) or "add the files of your own messages under 'messages' in dodo.yml"
         yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint)

@@ -5,7 +5,7 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, shown_path
 
 KEYWORDS = frozenset(
@@ -31,7 +31,7 @@ KEYWORDS = frozenset(
 )
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     spec = context.spec
     if spec.name is None:
         return

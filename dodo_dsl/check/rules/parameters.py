@@ -6,12 +6,12 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.spec.arguments import ResolvedService
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         if service.use.layer not in service.manifest.layers:
             continue  # another service may be meant
@@ -37,7 +37,7 @@ def _from_elsewhere(service: ResolvedService) -> Iterator[Diagnostic]:
             yield argument.problem
 
 
-def _missing(context: Context, service: ResolvedService) -> Iterator[Diagnostic]:
+def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnostic]:
     use, manifest = service.use, service.manifest
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters:
@@ -58,7 +58,7 @@ def _missing(context: Context, service: ResolvedService) -> Iterator[Diagnostic]
         yield Diagnostic(use.span, "missing-parameter", message, hint)
 
 
-def _givers(context: Context, name: str) -> dict[str, str]:
+def _givers(context: RuleContext, name: str) -> dict[str, str]:
     """The values that services of the test give to a parameter, each with the first service's name."""
     givers: dict[str, str] = {}
     for use in context.spec.uses:

@@ -6,13 +6,13 @@ message and sender stamp or of one memory, ``application-input`` (the applicatio
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.manifest import Manifest
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     fits = all(service.use.layer in service.manifest.layers for service in context.services)
     if not context.spec.is_whole or not context.test.is_complete or not fits:
         return  # unknown services and wrong layers come first
@@ -27,7 +27,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     yield from _unsatisfied_application(wiring)
 
 
-def _unsatisfied(context: Context, wiring: Wiring, end: End) -> Diagnostic:
+def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     rule = "no-sample" if end.layer == "evaluation" else "no-producer"
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
@@ -41,7 +41,7 @@ def _unsatisfied(context: Context, wiring: Wiring, end: End) -> Diagnostic:
     return Diagnostic(end.span, rule, message, hint)
 
 
-def _who_could(context: Context, wiring: Wiring, end: End) -> str:
+def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
     """A hint: another sender stamp that is sent, or services that send such messages."""
     stamps = sorted(str(e.port) for e in wiring.produced if e.port.name == end.port.name)
     if stamps:

@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -18,7 +18,7 @@ _MAP = "map.json"
 _MAX_BYTES = 20 << 20
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         for name, entry in service.use.parameters.items():
             argument = service.arguments.get(name)
@@ -70,7 +70,7 @@ def _names(file: Path, key: str) -> tuple[str, ...] | str:
         return f"not JSON: {str(error)[:120]}"
 
 
-def _within(context: Context, service: ResolvedService, seconds: str, entry: Entry) -> Iterator[Diagnostic]:
+def _within(context: RuleContext, service: ResolvedService, seconds: str, entry: Entry) -> Iterator[Diagnostic]:
     timeout = context.spec.timeout_s
     if timeout is not None and float(seconds) >= timeout:
         written = entry.value.text if isinstance(entry.value, Scalar) else seconds

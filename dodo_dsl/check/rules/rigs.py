@@ -5,12 +5,12 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.spec.rig import EMULATED
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     spec = context.spec
     if spec.level == "hil" and spec.rig is None:
         message = "a hil test needs a rig to run on"

@@ -5,11 +5,11 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import Context
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check(context: RuleContext) -> Iterator[Diagnostic]:
     first_layer: dict[str, str] = {}
     for use in context.spec.uses:
         if use.uses.text not in context.manifests:

@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.rec import coco, contents, csv_table, cut, labels
 from dodo_dsl.rec.contents_text import contents_text
-from dodo_dsl.rec.excerpt import NothingSelected, Selection
+from dodo_dsl.rec.excerpt import Excerpt, NothingSelected
 from dodo_dsl.rec.frames import IMAGE
 from dodo_dsl.rec.outputs import refuse_existing
 
@@ -38,7 +38,7 @@ class _Job:
         if self.recording.damage:
             self.tell(f"{self.recording.path}: {self.recording.damage}")
         options = self.options
-        return Selection(options.message, options.start, options.end).rows(self.recording, self.messages)
+        return Excerpt(options.message, options.start, options.end).rows(self.recording, self.messages)
 
     def folder(self) -> Path:
         folder: Path = self.options.output or self.options.file.with_suffix("")

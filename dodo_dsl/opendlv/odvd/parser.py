@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import NoReturn
 
 from dodo_dsl.opendlv.odvd.field_types import Default, default_of
-from dodo_dsl.opendlv.odvd.tokens import OdvdError, Place, Token, tokens
+from dodo_dsl.opendlv.odvd.tokens import OdvdError, TextPlace, Token, tokens
 
-__all__ = ["Definition", "Field", "OdvdError", "Place", "load", "parse"]
+__all__ = ["Definition", "Field", "OdvdError", "TextPlace", "load", "parse"]
 
 MAX_FILE_BYTES = 1_000_000
 MAX_FIELD_NUMBER = 2**29 - 1
@@ -32,7 +32,7 @@ class Field:
     type: str
     number: int
     default: Default
-    place: Place
+    place: TextPlace
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Definition:
     id: int
     package: str
     fields: tuple[Field, ...]
-    place: Place
+    place: TextPlace
 
     def same_layout(self, other: "Definition") -> bool:
         """Whether both describe the same name, id and fields, wherever they are defined."""
@@ -187,9 +187,9 @@ class _Used:
     """Names and ids seen so far, to refuse the second use."""
 
     what: str
-    places: dict[tuple[str, str | int], Place] = field(default_factory=dict)
+    places: dict[tuple[str, str | int], TextPlace] = field(default_factory=dict)
 
-    def add(self, place: Place, **keys: str | int) -> None:
+    def add(self, place: TextPlace, **keys: str | int) -> None:
         for key, value in keys.items():
             earlier = self.places.setdefault((key, value), place)
             if earlier is not place:

@@ -10,7 +10,7 @@ class OdvdError(ValueError):
 
 
 @dataclass(frozen=True)
-class Place:
+class TextPlace:
     """A place in a file; line and column count from 1."""
 
     file: str
@@ -36,7 +36,7 @@ _TOKEN = re.compile(
 class Token:
     kind: str
     text: str
-    place: Place
+    place: TextPlace
 
     def __str__(self) -> str:
         return "the end of the file" if self.kind == "end" else f"'{self.text}'"
@@ -45,7 +45,7 @@ class Token:
 def tokens(text: str, file: str) -> Iterator[Token]:
     position, line, line_start = 0, 1, 0
     while position < len(text):
-        place = Place(file, line, position - line_start + 1)
+        place = TextPlace(file, line, position - line_start + 1)
         match = _TOKEN.match(text, position)
         if match is None:
             raise OdvdError(f"{place}: '{text[position]}' is not allowed here")
@@ -56,4 +56,4 @@ def tokens(text: str, file: str) -> Iterator[Token]:
             line += newlines
             line_start = match.start() + match[0].rindex("\n") + 1
         position = match.end()
-    yield Token("end", "", Place(file, line, position - line_start + 1))
+    yield Token("end", "", TextPlace(file, line, position - line_start + 1))

@@ -6,7 +6,7 @@ MAX_PLACES = 1000
 
 
 @dataclass
-class Place:
+class DamagePlace:
     """Bytes of a file that are no frame: ``size`` of them from byte ``offset``."""
 
     offset: int
@@ -22,7 +22,7 @@ class Place:
 class Damage:
     """All skipped bytes: ``count`` places with ``size`` bytes in total; ``places`` has the first thousand."""
 
-    places: list[Place] = field(default_factory=list)
+    places: list[DamagePlace] = field(default_factory=list)
     count: int = 0
     size: int = 0
     _end: int = -1
@@ -39,7 +39,7 @@ class Damage:
         else:
             self.count += 1
             if self.count <= MAX_PLACES:
-                self.places.append(Place(offset, size, reason))
+                self.places.append(DamagePlace(offset, size, reason))
         self._end = offset + size
 
     def __str__(self) -> str:

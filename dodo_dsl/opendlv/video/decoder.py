@@ -15,7 +15,7 @@ class VideoError(ValueError):
     """Frames that cannot be decoded here: an unknown codec, or PyAV is not installed."""
 
 
-class Frame:
+class DecodedFrame:
     """A decoded frame of ``width`` by ``height`` pixels."""
 
     def __init__(self, frame: Any) -> None:
@@ -48,7 +48,7 @@ class VideoDecoder:
         self._codec.flags |= self._av.codec.context.Flags.low_delay
         self._begun = False
 
-    def decode(self, packet: bytes) -> Frame | None:
+    def decode(self, packet: bytes) -> DecodedFrame | None:
         """The frame of a packet, or None."""
         if not packet or not (self._begun or self._begins(packet)):
             return None
@@ -57,7 +57,7 @@ class VideoDecoder:
         except self._av.FFmpegError:
             return None
         self._begun = self._begun or bool(frames)
-        return Frame(frames[-1]) if frames else None
+        return DecodedFrame(frames[-1]) if frames else None
 
     def _begins(self, packet: bytes) -> bool:
         return not self._is_h264 or has_key_frame(packet)

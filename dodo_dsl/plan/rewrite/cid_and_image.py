@@ -5,10 +5,10 @@ from typing import Any
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import text
 from dodo_dsl.application.service_environment import image_variable
-from dodo_dsl.plan.rewrite.service_copy import Copy
+from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 
-def assign_image(copy: Copy) -> None:
+def assign_image(copy: ServiceCopy) -> None:
     """The image of the file, unless a pipeline sets another one."""
     service, variable = copy.service, image_variable(copy.name)
     if service.get("image") is None and "build" not in service:
@@ -17,7 +17,7 @@ def assign_image(copy: Copy) -> None:
     copy.note(f"image from {variable}, where it is set")
 
 
-def assign_cid(copy: Copy, in_files: tuple[str, ...]) -> None:
+def assign_cid(copy: ServiceCopy, in_files: tuple[str, ...]) -> None:
     """The CID wherever one was written, and in place of the one that ``env_file`` would set."""
     service, cid, assigned = copy.service, copy.setting.cid, []
     for key in ("entrypoint", "command"):

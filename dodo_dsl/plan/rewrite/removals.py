@@ -1,7 +1,7 @@
 """Removes a service's access to the host: hardware, privileges, names, ports, restarts."""
 
 from dodo_dsl.application import host_access
-from dodo_dsl.plan.rewrite.service_copy import Copy
+from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 _REMOVED = {
     "container_name": "compose names the container",
@@ -17,7 +17,7 @@ _REMOVED = {
 _DEPLOY = ("replicas", "mode", "restart_policy", "placement", "update_config", "rollback_config")
 
 
-def remove_machine_settings(copy: Copy) -> None:
+def remove_machine_settings(copy: ServiceCopy) -> None:
     """Removes names, ports and policies; each service of a test runs once."""
     for key, why in _REMOVED.items():
         copy.remove(key, why)
@@ -34,7 +34,7 @@ def remove_machine_settings(copy: Copy) -> None:
         copy.note(f"starts once, not {scale} times")
 
 
-def remove_hardware(copy: Copy) -> None:
+def remove_hardware(copy: ServiceCopy) -> None:
     """Removes devices without a rig, and privileges unless the rig allows them."""
     service, setting = copy.service, copy.setting
     allowed = setting.hil and setting.privileged_allowed
@@ -62,7 +62,7 @@ def remove_hardware(copy: Copy) -> None:
     copy.keep_items("volumes", kept)
 
 
-def _remove_capabilities(copy: Copy) -> None:
+def _remove_capabilities(copy: ServiceCopy) -> None:
     words = copy.service.get("cap_add") or []
     taken = [w for w in words if host_access.capability(w) in host_access.MACHINE_CAPABILITIES]
     copy.keep_items("cap_add", [w for w in words if w not in taken])
@@ -70,7 +70,7 @@ def _remove_capabilities(copy: Copy) -> None:
         copy.note(f"capabilities removed: {', '.join(map(str, taken))}")
 
 
-def _remove_unconfined(copy: Copy) -> None:
+def _remove_unconfined(copy: ServiceCopy) -> None:
     words = copy.service.get("security_opt") or []
     kept = [w for w in words if "unconfined" not in str(w)]
     copy.keep_items("security_opt", kept)

@@ -9,10 +9,10 @@ from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, environment, plain, text
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.plan.rewrite import cid_and_image, removals, service_namespaces, volumes
-from dodo_dsl.plan.rewrite.service_copy import Copy, Setting
+from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 from dodo_dsl.source import Node
 
-_STEPS: tuple[Callable[[Copy], None], ...] = (
+_STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
     cid_and_image.assign_image,
     removals.remove_machine_settings,
     removals.remove_hardware,
@@ -61,7 +61,7 @@ def plan_application(
 
 def _copied(service: ComposeService, node: Node, setting: Setting, changes: list[str]) -> dict[str, Any]:
     kept = {key: value for key, value in plain(node).items() if key not in KEYS}
-    copy = Copy(service.name, kept, setting, changes)
+    copy = ServiceCopy(service.name, kept, setting, changes)
     cid_and_image.assign_cid(copy, service.cid_variables)
     for step in _STEPS:
         step(copy)

@@ -26,7 +26,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Copy:
+class ServiceCopy:
     """A service that is changed in place."""
 
     name: str

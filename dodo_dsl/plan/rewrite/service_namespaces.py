@@ -4,10 +4,10 @@ from typing import Any
 
 from dodo_dsl.application import host_access
 from dodo_dsl.application.model import SANDBOX
-from dodo_dsl.plan.rewrite.service_copy import Copy
+from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 
-def own_namespaces(copy: Copy) -> None:
+def own_namespaces(copy: ServiceCopy) -> None:
     """The namespaces of a test; references between the application's services stay."""
     for key in host_access.NAMESPACES:
         _own_reference(copy, key)
@@ -17,7 +17,7 @@ def own_namespaces(copy: Copy) -> None:
         _host_network(copy)
 
 
-def _own_reference(copy: Copy, key: str) -> None:
+def _own_reference(copy: ServiceCopy, key: str) -> None:
     """``container:x`` becomes ``service:x`` where x is a service of the application that starts."""
     kind, name = host_access.reference(copy.service.get(key))
     if kind == "container":
@@ -28,7 +28,7 @@ def _own_reference(copy: Copy, key: str) -> None:
         copy.remove(key, "that service does not start")
 
 
-def _own_network(copy: Copy) -> None:
+def _own_network(copy: ServiceCopy) -> None:
     service = copy.service
     mode = service.get("network_mode")
     stays = mode == "none" or host_access.reference(mode)[0] == "service"
@@ -42,7 +42,7 @@ def _own_network(copy: Copy) -> None:
     service["ipc"] = f"service:{SANDBOX}"
 
 
-def _own_names(copy: Copy, stays: bool) -> None:
+def _own_names(copy: ServiceCopy, stays: bool) -> None:
     """Removes ``networks``, but keeps the names that a service has there."""
     networks = copy.service.pop("networks", None)
     if networks is None:
@@ -54,7 +54,7 @@ def _own_names(copy: Copy, stays: bool) -> None:
     copy.note("networks removed, the test has a network of its own")
 
 
-def _host_network(copy: Copy) -> None:
+def _host_network(copy: ServiceCopy) -> None:
     service = copy.service
     mode = service.get("network_mode")
     if mode not in ("host", "none") and host_access.reference(mode)[0] != "service":
@@ -77,7 +77,7 @@ def _without_network(sysctls: Any) -> Any:
     return [item for item in sysctls if not str(item).startswith("net.")]
 
 
-def own_dependencies(copy: Copy) -> None:
+def own_dependencies(copy: ServiceCopy) -> None:
     """``depends_on`` of services that start, and of DoDo's that must be ready first."""
     service, setting = copy.service, copy.setting
     raw = service.get("depends_on") or {}
@@ -98,6 +98,6 @@ def own_dependencies(copy: Copy) -> None:
     copy.keep_items("volumes_from", borrowed)
 
 
-def _borrowed(copy: Copy, entry: Any) -> Any:
+def _borrowed(copy: ServiceCopy, entry: Any) -> Any:
     kind, name, options = host_access.borrowed(entry)
     return f"{copy.setting.containers[name]}{options}" if kind == "container" else entry

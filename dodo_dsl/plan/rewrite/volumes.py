@@ -5,7 +5,7 @@ from typing import Any
 
 from dodo_dsl.application import host_access
 from dodo_dsl.application.interpolation import split_outside
-from dodo_dsl.plan.rewrite.service_copy import Copy
+from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 TAKEN = ("tmp", "report")
 """The names of DoDo's own volumes."""
@@ -18,7 +18,7 @@ def renamed(name: str) -> str:
     return f"application-{name}" if name in TAKEN else name
 
 
-def own_mounts(copy: Copy) -> None:
+def own_mounts(copy: ServiceCopy) -> None:
     volumes = copy.service.get("volumes")
     if not isinstance(volumes, list):
         return
@@ -29,7 +29,7 @@ def own_mounts(copy: Copy) -> None:
     copy.keep_items("volumes", list(once.values()))
 
 
-def _renamed(copy: Copy, volume: Any) -> Any:
+def _renamed(copy: ServiceCopy, volume: Any) -> Any:
     found = host_access.mount(volume)
     if found.source not in TAKEN or (isinstance(volume, dict) and volume.get("type", "volume") != "volume"):
         return volume
@@ -39,7 +39,7 @@ def _renamed(copy: Copy, volume: Any) -> Any:
     return ":".join([renamed(found.source), *split_outside(volume, ":")[1:]])
 
 
-def _own(copy: Copy, volume: Any) -> Any:
+def _own(copy: ServiceCopy, volume: Any) -> Any:
     """The mount as an isolated test has it, None for shared memory, which it has already."""
     found = host_access.mount(volume)
     if host_access.is_shared_memory(found):

@@ -7,7 +7,7 @@ State = Literal["ok", "warning", "problem"]
 
 
 @dataclass(frozen=True)
-class Finding:
+class Capability:
     """One thing that was examined; ``advice`` is what to do when it is not ok."""
 
     name: str

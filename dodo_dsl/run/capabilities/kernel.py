@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl.opendlv.bus.address import RECEIVE_BUFFER, group
-from dodo_dsl.run.capabilities.finding import Finding, State
+from dodo_dsl.run.capabilities.finding import Capability, State
 from dodo_dsl.run.process import host_isolation
 
 _RECEIVE_S = 1.0
@@ -19,17 +19,17 @@ _SEGMENTS = 64
 _SEGMENT_BYTES = 64 << 20
 
 
-def namespaces() -> Iterator[Finding]:
+def namespaces() -> Iterator[Capability]:
     """Whether tests can have namespaces of their own."""
     refusal = host_isolation.namespaces_refusal()
     if refusal:
         advice = "tests run on the host with leases; for isolation allow user namespaces or run as root"
-        yield Finding("namespaces", "warning", f"the kernel refuses them: {refusal}", advice)
+        yield Capability("namespaces", "warning", f"the kernel refuses them: {refusal}", advice)
     else:
-        yield Finding("namespaces", "ok", "each test of the process backend gets a network, IPC and /tmp of its own")
+        yield Capability("namespaces", "ok", "each test of the process backend gets a network, IPC and /tmp of its own")
 
 
-def multicast() -> Iterator[Finding]:
+def multicast() -> Iterator[Capability]:
     """Whether a datagram to a multicast group is received."""
     bus, mark = group(254), os.urandom(16)
     membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
@@ -47,32 +47,32 @@ def multicast() -> Iterator[Finding]:
                     raise TimeoutError("only other datagrams were received")
     except OSError as error:
         advice = "sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo"
-        yield Finding(
+        yield Capability(
             "multicast", "problem", f"does not work on the host ({error}); 'isolation: host' needs it", advice
         )
     else:
-        yield Finding("multicast", "ok", "works on the host")
+        yield Capability("multicast", "ok", "works on the host")
 
 
-def receive_buffer() -> Iterator[Finding]:
+def receive_buffer() -> Iterator[Capability]:
     """Whether sockets may buffer as much as OpenDLV requests."""
     limit = _number("/proc/sys/net/core/rmem_max")
     if limit < RECEIVE_BUFFER:
         advice = f"sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}"
         text = f"sockets may hold {limit:,} bytes, OpenDLV requests {RECEIVE_BUFFER:,}: bursts of messages may be lost"
-        yield Finding("receive buffer", "warning", text, advice)
+        yield Capability("receive buffer", "warning", text, advice)
     else:
-        yield Finding("receive buffer", "ok", f"sockets may hold {limit:,} bytes")
+        yield Capability("receive buffer", "ok", f"sockets may hold {limit:,} bytes")
 
 
-def shared_memory() -> Iterator[Finding]:
+def shared_memory() -> Iterator[Capability]:
     """Whether the limits of System V shared memory suffice."""
     segments, size = _number("/proc/sys/kernel/shmmni"), _number("/proc/sys/kernel/shmmax")
     if segments < _SEGMENTS or size < _SEGMENT_BYTES:
         advice = f"sudo sysctl -w kernel.shmmni=4096 kernel.shmmax={_SEGMENT_BYTES * 16}"
-        yield Finding("shared memory", "problem", f"only {segments} segments of {size:,} bytes are allowed", advice)
+        yield Capability("shared memory", "problem", f"only {segments} segments of {size:,} bytes are allowed", advice)
     else:
-        yield Finding("shared memory", "ok", f"{segments:,} segments are allowed")
+        yield Capability("shared memory", "ok", f"{segments:,} segments are allowed")
 
 
 def _number(path: str) -> int:
@@ -82,10 +82,10 @@ def _number(path: str) -> int:
         return 0
 
 
-def disk() -> Iterator[Finding]:
+def disk() -> Iterator[Capability]:
     """Whether there is room for recordings and images."""
     for folder in dict.fromkeys((Path(tempfile.gettempdir()), Path.cwd())):
         free = shutil.disk_usage(folder).free
         state: State = "ok" if free >= _FREE_BYTES else "warning"
         advice = "" if state == "ok" else "free some space: recordings and images need it"
-        yield Finding("disk", state, f"{free / (1 << 30):.1f} GiB free in {folder}", advice)
+        yield Capability("disk", state, f"{free / (1 << 30):.1f} GiB free in {folder}", advice)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.run.capabilities.finding import Finding
+from dodo_dsl.run.capabilities.finding import Capability
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.protocol import BackendError
 
@@ -16,29 +16,29 @@ EMULATOR_PLACES = (package_data.root() / "build" / "firmware", Path("/opt/dodo/f
 _COMPOSE = (2, 20)
 
 
-def docker_engine() -> Iterator[Finding]:
+def docker_engine() -> Iterator[Capability]:
     """Whether a Docker engine answers."""
     try:
         client = connect()
     except BackendError as error:
-        yield Finding("docker engine", "warning", str(error), "needed for --backend docker only")
+        yield Capability("docker engine", "warning", str(error), "needed for --backend docker only")
         return
     with contextlib.closing(client):
         version = client.version()
-        yield Finding("docker engine", "ok", f"version {version.get('Version')}, API {version.get('ApiVersion')}")
+        yield Capability("docker engine", "ok", f"version {version.get('Version')}, API {version.get('ApiVersion')}")
 
 
-def compose() -> Iterator[Finding]:
+def compose() -> Iterator[Capability]:
     """Whether there is Compose of a version that DoDo supports."""
     text = _output("docker", "compose", "version", "--short")
     numbers = tuple(int(n) for n in text.lstrip("v").split("-")[0].split(".")[:2] if n.isdecimal())
     advice = "install Compose v2 (docker-compose-plugin); needed for --backend docker only"
     if not numbers:
-        yield Finding("compose", "warning", "'docker compose' does not run", advice)
+        yield Capability("compose", "warning", "'docker compose' does not run", advice)
     elif numbers < _COMPOSE:
-        yield Finding("compose", "warning", f"version {text} is older than 2.20", advice)
+        yield Capability("compose", "warning", f"version {text} is older than 2.20", advice)
     else:
-        yield Finding("compose", "ok", f"version {text}")
+        yield Capability("compose", "ok", f"version {text}")
 
 
 def _output(*command: str) -> str:
@@ -49,13 +49,15 @@ def _output(*command: str) -> str:
     return result.stdout.strip() if result.returncode == 0 else ""
 
 
-def emulated_rig() -> Iterator[Finding]:
+def emulated_rig() -> Iterator[Capability]:
     """Whether the programs are built that a gantry with ``--serial=emulated`` starts."""
     named = os.environ.get(FIRMWARE)
     places = (Path(named),) if named else EMULATOR_PLACES
     found = next((p for p in places if all((p / name).is_file() for name in ("rig-emulator", "gantry.elf"))), None)
     if found:
-        yield Finding("emulated rig", "ok", f"is built, in {found}")
+        yield Capability("emulated rig", "ok", f"is built, in {found}")
     else:
         advice = f"hil tests on it need it: make firmware in DoDo's checkout, or set {FIRMWARE} to its folder"
-        yield Finding("emulated rig", "warning", f"is not built: it is not in {' or '.join(map(str, places))}", advice)
+        yield Capability(
+            "emulated rig", "warning", f"is not built: it is not in {' or '.join(map(str, places))}", advice
+        )

@@ -19,7 +19,7 @@ from dodo_dsl.run.docker.events import Watch
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.docker.teardown import take_down, writers
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
-from dodo_dsl.run.service_output import Output
+from dodo_dsl.run.service_output import ServiceOutput
 
 
 class DockerBackend:
@@ -49,7 +49,7 @@ class DockerBackend:
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._compose = Compose(plan, folder, report, project, say)
         self._containers: dict[str, Any] = {}
-        self._outputs: dict[str, Output] = {}
+        self._outputs: dict[str, ServiceOutput] = {}
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self.left_behind = False
@@ -97,7 +97,7 @@ class DockerBackend:
             names = [s.name for s in self.plan.application.services if s.name in self._containers]
         evaluators = {s.name for s in self.plan.services if s.judge}
         for name in names:
-            self._outputs[name] = Output(
+            self._outputs[name] = ServiceOutput(
                 self.report / "logs" / f"{layer}.{name}.log", self._line_reader(layer, name, evaluators)
             )
         await asyncio.gather(*(self._start(name) for name in self._compose.in_order(names)))

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.plan.model import ApplicationService, Plan, Service
+from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import begin_frame
 from dodo_dsl.run.process.commands import Command, Commands, changes
@@ -15,7 +15,7 @@ from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Unstartable
-from dodo_dsl.run.service_output import Output
+from dodo_dsl.run.service_output import ServiceOutput
 
 
 class ProcessBackend:
@@ -33,7 +33,7 @@ class ProcessBackend:
         self.cid = slot.cid
         self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue()
-        self._outputs: dict[str, Output] = {}
+        self._outputs: dict[str, ServiceOutput] = {}
         self._sandbox = SandboxClient(
             isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
         )
@@ -67,7 +67,7 @@ class ProcessBackend:
             self._start(command)
         return {command.name: layer != "application" for command in commands}
 
-    def _services(self, layer: str) -> tuple[Service | ApplicationService, ...]:
+    def _services(self, layer: str) -> tuple[PlannedService | ApplicationService, ...]:
         return self.plan.application.services if layer == "application" else self.plan.layer(layer)
 
     def _start(self, command: Command) -> None:
@@ -79,7 +79,7 @@ class ProcessBackend:
                 self._events.put_nowait(event)
             return event is not None
 
-        output = Output(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
+        output = ServiceOutput(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module}
         message = {"do": "start", "id": command.name, **words}

@@ -8,7 +8,7 @@ from pathlib import Path
 from dodo_dsl import package_data
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
-from dodo_dsl.plan.model import ApplicationService, Flag, Plan, Service
+from dodo_dsl.plan.model import ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.process.environment import base_environment, dotenv, expanded, interpolate
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 
@@ -39,11 +39,11 @@ class Commands:
     report: Path
     slot: Slot
 
-    def of(self, service: Service | ApplicationService) -> Command:
+    def of(self, service: PlannedService | ApplicationService) -> Command:
         """The service's command; raises EnvironmentProblem."""
-        return self._own(service) if isinstance(service, Service) else self._application(service)
+        return self._own(service) if isinstance(service, PlannedService) else self._application(service)
 
-    def _own(self, service: Service) -> Command:
+    def _own(self, service: PlannedService) -> Command:
         environment = {
             **base_environment(),
             "PYTHONPATH": package_path(),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl.plan.emulated_rig import CAMERA, DRAWN, hardware
-from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.arguments import Argument, resolved
 from dodo_dsl.spec.manifest import Manifest, Parameter
@@ -38,7 +38,7 @@ def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> 
     if use is None and rig.entry("camera.source") is None:
         raise RigProblem(f"rig '{rig.name}' has no camera in dodo.yml", usage=True)
     flags = _flags(rig, manifests[CAMERA], spec, use)
-    real = Service("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
+    real = PlannedService("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
     service = hardware(real, manifests, "")
     words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags)
     return Snapshot(PROGRAMS[service.uses], words, service.uses == DRAWN)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dodo_dsl.plan.model import Plan, Service
+from dodo_dsl.plan.model import Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.access import query
 from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
@@ -67,7 +67,7 @@ async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:
     return ""
 
 
-def _reads_a_file(service: Service) -> bool:
+def _reads_a_file(service: PlannedService) -> bool:
     return any(flag.kind == "path" and flag.name == "file" for flag in service.flags)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from services.virtual_camera.camera import Pinhole, Pose, View
+from services.virtual_camera.camera import CameraPose, Pinhole, View
 from services.virtual_camera.draw.bodies import Bodies, Drawn
 from services.virtual_camera.draw.bsp import Tree
 from services.virtual_camera.draw.faces import Face
@@ -27,7 +27,7 @@ class Renderer:
         self._tree = Tree(list(scene.faces))
         self.bodies = Bodies(scene.models, self._tree, scene.light, scene.faces)
 
-    def render(self, pose: Pose, out: Image | None = None) -> Image:
+    def render(self, pose: CameraPose, out: Image | None = None) -> Image:
         """What a camera sees: (height, width, 4) in the order B, G, R, A.
 
         ``pose`` is the camera in the world, looking along its x axis with z up. ``out`` takes the
@@ -44,7 +44,7 @@ class Renderer:
                     fill_fixed(image, points, colour)
         return image
 
-    def labels(self, pose: Pose) -> tuple[Labels, dict[int, list[Piece]]]:
+    def labels(self, pose: CameraPose) -> tuple[Labels, dict[int, list[Piece]]]:
         """For each pixel (height, width) the number of the body that it shows, or -1; and all that is drawn of each."""
         view = self.camera.view(pose)
         image = np.full((self.camera.height, self.camera.width), -1, np.int32)

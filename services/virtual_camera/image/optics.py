@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.image.lens import Distortion, Lens
 from services.virtual_camera.image.overlays import Overlay
 from services.virtual_camera.image.sensor import Development, Sensor
-from services.virtual_camera.motion import Motion
+from services.virtual_camera.motion import CameraMotion
 
 
 class Optics:
@@ -37,7 +37,9 @@ class Optics:
         self._ideal = np.empty(shape, np.uint8)
         self._sum = np.zeros(shape, np.uint16) if shutter > 0.0 else None
 
-    def expose(self, renderer: Renderer, motion: Motion, mounted: Pose, sample_time: int, out: Image) -> None:
+    def expose(
+        self, renderer: Renderer, motion: CameraMotion, mounted: CameraPose, sample_time: int, out: Image
+    ) -> None:
         """The picture (height, width, 4) at ``sample_time`` us of a camera ``mounted`` on a body in ``motion``.
 
         The shutter is open half its time before that and half after it.
@@ -55,7 +57,13 @@ class Optics:
         self._development.develop(out, sample_time)
 
     def _blend(
-        self, renderer: Renderer, motion: Motion, mounted: Pose, steps: int, total: npt.NDArray[np.uint16], ideal: Image
+        self,
+        renderer: Renderer,
+        motion: CameraMotion,
+        mounted: CameraPose,
+        steps: int,
+        total: npt.NDArray[np.uint16],
+        ideal: Image,
     ) -> None:
         """The mean of ``steps`` pictures while the shutter is open."""
         total.fill(0)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan.model import Flag, Plan, Service
+from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from tests.faults import Book
 from tests.run.desk import Desk, gone, marks, processes_with, wait_for
 from tests.run.helpers import PASS, READY, WAIT, reserved_cids
@@ -39,7 +39,7 @@ def recorded(plan: Plan) -> Plan:
     """The same test, with the recorder that every compiled test has."""
     flags = (Flag("rec", "test.rec", "report"), Flag("cid", str(plan.cid)))
     process = ("python", "-m", "services.rec_recorder")
-    recorder = Service("environment", "dodo-recorder", "rec-recorder", "x", process, flags)
+    recorder = PlannedService("environment", "dodo-recorder", "rec-recorder", "x", process, flags)
     return replace(plan, services=(recorder, *plan.services))
 
 
@@ -47,7 +47,7 @@ def test_disk_with_the_report_is_full(desk: Desk, small_disk: Path, book: Book) 
     """Logs fill the disk, then the recorder cannot go on; the run says so without a report."""
     plan = desk.bench.plan(READY + WAIT, FLOODS, slug="test-full", timeout_s=30.0)
     script = desk.bench.script("test-talker", "import sys, time\n" + READY + TALKS)
-    talker = Service("environment", "talker", "x", "x", script, (Flag("cid", str(plan.cid)),))
+    talker = PlannedService("environment", "talker", "x", "x", script, (Flag("cid", str(plan.cid)),))
     plan = replace(plan, services=(*recorded(plan).services, talker))
     full = desk.start(plan, *HOST, report=small_disk.name)
     neighbour = desk.start(

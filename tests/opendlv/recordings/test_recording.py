@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.recordings.damage import MAX_PLACES, Damage, Place
+from dodo_dsl.opendlv.recordings.damage import MAX_PLACES, Damage, DamagePlace
 from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError, read_envelopes
 
 times = st.integers(-(2**31) * 1_000_000, 2**31 * 1_000_000 - 1)
@@ -119,7 +119,7 @@ def test_a_frame_that_was_cut_in_the_middle_hides_nothing(tmp_path: Path) -> Non
     frames = [encode_frame(Envelope(1086, bytes([i]) * 30, 1, 2, i, 0)) for i in range(40)]
     found, damage = read(write(tmp_path, b"".join(frames[:20]) + frames[20][:25] + b"".join(frames[21:])))
     assert [e.sample_time for e in found] == [*range(20), *range(21, 40)]
-    assert damage.places == [Place(20 * len(frames[0]), 25, "a frame that holds no envelope")]
+    assert damage.places == [DamagePlace(20 * len(frames[0]), 25, "a frame that holds no envelope")]
     assert str(damage).startswith("skipped 25 bytes at byte ")
 
 
@@ -136,7 +136,7 @@ def test_a_false_header_claims_more_than_there_is(tmp_path: Path) -> None:
     frame = encode_frame(Envelope(1, b"x", 1, 2, 3, 4))
     found, damage = read(write(tmp_path, b"\x0d\xa4\xff\xff\xff" + frame * 5))
     assert len(found) == 5
-    assert damage.places == [Place(0, 5, "a frame that is cut short")]
+    assert damage.places == [DamagePlace(0, 5, "a frame that is cut short")]
 
 
 def test_many_places_are_counted_and_few_are_kept(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from dodo_dsl.plan.model import Flag, Plan, Service
+from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from tests.run.helpers import READY, Bench
 
 CROWD, LAST = 400, 4711
@@ -42,8 +42,10 @@ def crowded(bench: Bench) -> Plan:
     """A judge that sends more than the recorder's small buffer holds."""
     plan = bench.plan()
     cid = Flag("cid", str(plan.cid))
-    recorder = Service("environment", "dodo-recorder", "rec-recorder", "x", bench.script("recorder", SLOW_RECORDER))
-    judge = Service("evaluation", "judge", "x", "x", bench.script("crowd", CROWDING_JUDGE), judge=True)
+    recorder = PlannedService(
+        "environment", "dodo-recorder", "rec-recorder", "x", bench.script("recorder", SLOW_RECORDER)
+    )
+    judge = PlannedService("evaluation", "judge", "x", "x", bench.script("crowd", CROWDING_JUDGE), judge=True)
     flags = (Flag("rec", "test.rec", "report"), cid)
     return replace(plan, services=(replace(recorder, flags=flags), replace(judge, flags=(cid,))))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.plan.model import Flag, Plan, Service
+from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs import health_check
 from dodo_dsl.run.rigs.health_check import CHECKS, TRIES, examine
@@ -49,9 +49,9 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def on_rig() -> Plan:
-    pose = Service("action", "pose", "gantry", "x", (), GANTRY)
-    camera = Service("environment", "camera", "camera", "x", (), CAMERA)
-    other = Service("environment", "clock", "other", "x", (), GANTRY)
+    pose = PlannedService("action", "pose", "gantry", "x", (), GANTRY)
+    camera = PlannedService("environment", "camera", "camera", "x", (), CAMERA)
+    other = PlannedService("environment", "clock", "other", "x", (), GANTRY)
     return replace(plan(), rig="kiwi", services=(camera, pose, other))
 
 
@@ -111,7 +111,7 @@ def test_what_says_nothing_about_the_rig_does_not_quarantine_it(
 
 
 def test_a_camera_that_reads_a_file_is_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    camera = Service("environment", "camera", "camera", "x", (), (Flag("file", "a.png", "path"),))
+    camera = PlannedService("environment", "camera", "camera", "x", (), (Flag("file", "a.png", "path"),))
     programs = Programs()
     assert problem(programs, monkeypatch, replace(on_rig(), services=(camera,))) == ""
     assert programs.calls == []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from services.camera.grabber import Grabber
-from services.camera.picture import CameraError, Picture, from_bgr
+from services.camera.picture import CameraError, SharedPicture, from_bgr
 
 PATIENCE = 20.0
 
@@ -19,7 +19,7 @@ class Scripted:
         self.closed = False
         self.count = 0
 
-    def read(self) -> Picture:
+    def read(self) -> SharedPicture:
         self.waits.release()
         self.told.acquire()
         if self.lost:

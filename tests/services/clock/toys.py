@@ -17,7 +17,7 @@ from services.base.lockstep.channel import Channel
 from services.base.lockstep.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, filters
-from services.clock.application import Application
+from services.clock.application import SteppedApplication
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
 from services.clock.participants import Patience, Roles
@@ -212,7 +212,7 @@ class Toys:
             exchange = Exchange(session, channel, answers.take)
             advance = tuple(name for name in self.cast if name == "mover")
             roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
-            application = Application(answers, self.patience, exchange, stop.is_set)
+            application = SteppedApplication(answers, self.patience, exchange, stop.is_set)
             stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
             try:
                 stepper.connect()

@@ -9,7 +9,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from services.collision.gates import Gate, Gates, crossings
-from services.collision.geometry import Pose
+from services.collision.geometry import VehiclePose
 
 # The path has its corners at whole numbers and the gates theirs aside, so that none lies on the other.
 corners = st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=2, max_size=12)
@@ -25,7 +25,7 @@ def gate(name: str, *ends: tuple[float, float]) -> Gate:
 
 
 def drive(gates: Gates, *places: tuple[float, float]) -> list[float | None]:
-    return [gates.move(Pose(*a, 0), Pose(*b, 0)) for a, b in pairwise(places)]
+    return [gates.move(VehiclePose(*a, 0), VehiclePose(*b, 0)) for a, b in pairwise(places)]
 
 
 def brute(order: list[Gate], path: list[tuple[int, int]]) -> tuple[int, int | None]:
@@ -70,7 +70,7 @@ def test_the_share_is_where_shapely_finds_the_crossing(
     line = shapely.MultiLineString([ends])
     for a, b in pairwise(path):
         point = shapely.LineString([a, b]).intersection(line) if a != b else None
-        found = list(crossings(line, Pose(*a, 0), Pose(*b, 0)))
+        found = list(crossings(line, VehiclePose(*a, 0), VehiclePose(*b, 0)))
         wanted = [] if point is None or point.is_empty else [math.dist(a, (point.x, point.y)) / math.dist(a, b)]
         assert found == pytest.approx(wanted)
 

@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
-from services.collision.geometry import Box, Pose, heading_of, outline, swept
+from services.collision.geometry import VehicleBox, VehiclePose, heading_of, outline, swept
 
-KIWI = Box(0.36, 0.16)
+KIWI = VehicleBox(0.36, 0.16)
 places = st.floats(-2, 2)
-poses = st.builds(Pose, places, places, st.floats(-math.pi, math.pi))
+poses = st.builds(VehiclePose, places, places, st.floats(-math.pi, math.pi))
 lines = st.tuples(places, places, places, places).filter(lambda xy: xy[:2] != xy[2:])
 
 
-def dense(start: Pose, end: Pose, parts: int = 300) -> list[shapely.Polygon]:
+def dense(start: VehiclePose, end: VehiclePose, parts: int = 300) -> list[shapely.Polygon]:
     """Brute force: the rectangle at many poses on the way, turned and moved by shapely itself."""
     change = math.remainder(end.heading - start.heading, math.tau)
     shapes = []
@@ -27,12 +27,12 @@ def dense(start: Pose, end: Pose, parts: int = 300) -> list[shapely.Polygon]:
 
 
 def test_the_rectangle_lies_along_the_heading() -> None:
-    assert outline(Pose(1, 2, 0), KIWI).bounds == pytest.approx((0.82, 1.92, 1.18, 2.08))
-    assert outline(Pose(1, 2, math.pi / 2), KIWI).bounds == pytest.approx((0.92, 1.82, 1.08, 2.18))
+    assert outline(VehiclePose(1, 2, 0), KIWI).bounds == pytest.approx((0.82, 1.92, 1.18, 2.08))
+    assert outline(VehiclePose(1, 2, math.pi / 2), KIWI).bounds == pytest.approx((0.92, 1.82, 1.08, 2.18))
 
 
 @given(poses)
-def test_the_rectangle_is_the_one_that_shapely_turns(pose: Pose) -> None:
+def test_the_rectangle_is_the_one_that_shapely_turns(pose: VehiclePose) -> None:
     # overlays of nearly equal shapes are not reliable, so the distance of their outlines is compared
     assert shapely.hausdorff_distance(outline(pose, KIWI), dense(pose, pose, 1)[0]) < 1e-9
 
@@ -40,7 +40,7 @@ def test_the_rectangle_is_the_one_that_shapely_turns(pose: Pose) -> None:
 @settings(deadline=None)
 @given(poses, poses, lines)
 def test_the_way_touches_what_any_pose_on_it_touches(
-    start: Pose, end: Pose, line: tuple[float, float, float, float]
+    start: VehiclePose, end: VehiclePose, line: tuple[float, float, float, float]
 ) -> None:
     obstacle = shapely.LineString([line[:2], line[2:]])
     area = swept(start, end, KIWI)
@@ -58,7 +58,7 @@ def test_the_way_touches_what_any_pose_on_it_touches(
 def test_a_way_without_a_turn_is_exact(
     x1: float, y1: float, x2: float, y2: float, heading: float, line: tuple[float, float, float, float]
 ) -> None:
-    start, end = Pose(x1, y1, heading), Pose(x2, y2, heading)
+    start, end = VehiclePose(x1, y1, heading), VehiclePose(x2, y2, heading)
     area = swept(start, end, KIWI)
     brute = shapely.union_all([a.union(b).convex_hull for a, b in [(dense(start, end, 1))]])
     assert area.hausdorff_distance(brute) < 1e-9
@@ -66,13 +66,15 @@ def test_a_way_without_a_turn_is_exact(
 
 def test_a_fast_vehicle_does_not_jump_over_a_line() -> None:
     line = shapely.LineString([(5, -1), (5, 1)])
-    assert not line.intersects(outline(Pose(0, 0, 0), KIWI)) and not line.intersects(outline(Pose(10, 0, 0), KIWI))
-    assert line.intersects(swept(Pose(0, 0, 0), Pose(10, 0, 0), KIWI))
+    assert not line.intersects(outline(VehiclePose(0, 0, 0), KIWI)) and not line.intersects(
+        outline(VehiclePose(10, 0, 0), KIWI)
+    )
+    assert line.intersects(swept(VehiclePose(0, 0, 0), VehiclePose(10, 0, 0), KIWI))
 
 
 def test_a_turn_goes_the_shorter_way_round() -> None:
-    area = swept(Pose(0, 0, math.radians(175)), Pose(0, 0, math.radians(-175)), KIWI)
-    assert area.bounds[3] == pytest.approx(outline(Pose(0, 0, math.radians(175)), KIWI).bounds[3])
+    area = swept(VehiclePose(0, 0, math.radians(175)), VehiclePose(0, 0, math.radians(-175)), KIWI)
+    assert area.bounds[3] == pytest.approx(outline(VehiclePose(0, 0, math.radians(175)), KIWI).bounds[3])
 
 
 @given(st.floats(-math.pi + 1e-6, math.pi), st.floats(0.01, 100))

@@ -3,18 +3,18 @@ import math
 import pytest
 
 from services.base import Check
-from services.collision.geometry import Pose
-from services.collision.measures import Measures
+from services.collision.geometry import VehiclePose
+from services.collision.measures import DriveMeasures
 
 SECOND = 1_000_000
 
 
-def at(seconds: float, x: float, y: float = 0.0) -> tuple[int, Pose]:
-    return round(seconds * SECOND), Pose(x, y, 0.0)
+def at(seconds: float, x: float, y: float = 0.0) -> tuple[int, VehiclePose]:
+    return round(seconds * SECOND), VehiclePose(x, y, 0.0)
 
 
 def test_distance_and_speed_add_up_over_moves() -> None:
-    measures = Measures()
+    measures = DriveMeasures()
     measures.move(at(0, 0), at(2, 3, 4))
     measures.move(at(2, 3, 4), at(3, 3, 6))
     distance, speed = measures.drive_checks()
@@ -23,7 +23,7 @@ def test_distance_and_speed_add_up_over_moves() -> None:
 
 
 def test_without_a_move_there_is_no_speed() -> None:
-    assert [check.value for check in Measures().drive_checks()] == [0.0, None]
+    assert [check.value for check in DriveMeasures().drive_checks()] == [0.0, None]
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_without_a_move_there_is_no_speed() -> None:
 def test_the_smallest_margin_keeps_its_limit_and_is_above_zero(
     margins: list[float], limit: float, is_kept: bool
 ) -> None:
-    measures = Measures()
+    measures = DriveMeasures()
     for margin in margins:
         measures.approach(margin)
     smallest = min(margins, default=None)
@@ -47,7 +47,7 @@ def test_the_smallest_margin_keeps_its_limit_and_is_above_zero(
 
 
 def test_goal_and_gates() -> None:
-    assert Measures().goal_check(40) == Check("time-to-goal", None, {"max": 40}, "s", False)
-    assert Measures(time_to_goal=3.5).goal_check(40) == Check("time-to-goal", 3.5, {"max": 40}, "s", True)
-    assert Measures.gate_check(2, 3) == Check("gates", 2, {"min": 3}, "", False)
-    assert Measures.gate_check(3, 3).ok
+    assert DriveMeasures().goal_check(40) == Check("time-to-goal", None, {"max": 40}, "s", False)
+    assert DriveMeasures(time_to_goal=3.5).goal_check(40) == Check("time-to-goal", 3.5, {"max": 40}, "s", True)
+    assert DriveMeasures.gate_check(2, 3) == Check("gates", 2, {"min": 3}, "", False)
+    assert DriveMeasures.gate_check(3, 3).ok

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.base import UnjudgeableError, Verdict
-from services.collision.geometry import Box, Pose
+from services.collision.geometry import VehicleBox, VehiclePose
 from services.collision.model import REQUESTS, TrackEvaluator
 from services.collision.track import Track
 
@@ -30,7 +30,7 @@ LANE = Track(
 
 def judge(track: Track = LANE, requests: Iterable[str] = REQUESTS) -> TrackEvaluator:
     """A judge whose test has begun and who has heard the application."""
-    it = TrackEvaluator(track, Box(0.36, 0.16))
+    it = TrackEvaluator(track, VehicleBox(0.36, 0.16))
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     for name in requests:
@@ -41,7 +41,7 @@ def judge(track: Track = LANE, requests: Iterable[str] = REQUESTS) -> TrackEvalu
 def drive(it: TrackEvaluator, *poses: tuple[float, float, float, float]) -> None:
     """Show poses, each a time in seconds from the begin, x, y and a heading in degrees."""
     for time, x, y, heading in poses:
-        it.look(Pose(x, y, math.radians(heading)), BEGIN + round(time * SECOND))
+        it.look(VehiclePose(x, y, math.radians(heading)), BEGIN + round(time * SECOND))
 
 
 def decided(it: TrackEvaluator) -> Verdict:
@@ -312,35 +312,35 @@ def test_a_start_within_the_margin_is_the_fault_of_the_test() -> None:
 
 
 def test_time_zero_is_the_first_request_when_it_comes_before_the_begin() -> None:
-    it = TrackEvaluator(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, VehicleBox(0.36, 0.16))
     it.update(BEGIN)
-    it.look(Pose(0, 0, 0), BEGIN)
+    it.look(VehiclePose(0, 0, 0), BEGIN)
     it.update(BEGIN + 5 * SECOND)
     it.request(REQUESTS[0])
     it.begin(BEGIN + 6 * SECOND)
-    it.look(Pose(3, 0, 0), BEGIN + 8 * SECOND)
+    it.look(VehiclePose(3, 0, 0), BEGIN + 8 * SECOND)
     assert decided(it).reason == "reached finish after 3.00 s"
 
 
 def test_time_zero_is_the_update_after_a_request_when_none_was_before() -> None:
-    it = TrackEvaluator(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, VehicleBox(0.36, 0.16))
     it.request(REQUESTS[0])
-    it.look(Pose(0, 0, 0), BEGIN)
+    it.look(VehiclePose(0, 0, 0), BEGIN)
     it.update(BEGIN + SECOND)
-    it.look(Pose(3, 0, 0), BEGIN + 4 * SECOND)
+    it.look(VehiclePose(3, 0, 0), BEGIN + 4 * SECOND)
     assert decided(it).reason == "reached finish after 3.00 s"
 
 
 def test_time_zero_is_the_first_update_when_neither_comes() -> None:
-    it = TrackEvaluator(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, VehicleBox(0.36, 0.16))
     it.update(BEGIN)
-    it.look(Pose(0, 0, 0), BEGIN + 2 * SECOND)
-    it.look(Pose(3, 0, 0), BEGIN + 4 * SECOND)
+    it.look(VehiclePose(0, 0, 0), BEGIN + 2 * SECOND)
+    it.look(VehiclePose(3, 0, 0), BEGIN + 4 * SECOND)
     assert decided(it).reason == "reached finish after 4.00 s"
 
 
 def test_the_begin_forgets_what_was_before() -> None:
-    it = TrackEvaluator(LANE, Box(0.36, 0.16))
+    it = TrackEvaluator(LANE, VehicleBox(0.36, 0.16))
     it.update(BEGIN - 9 * SECOND)
     drive(it, (-9, 2, 0.1, 0), (-5, 0, 0, 0))
     it.begin(BEGIN)

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from services.collision.obstacles import MapError, load, pick
+from services.collision.obstacles import ObstaclesError, load, pick
 
 
 def write(folder: Path, document: Any) -> Path:
@@ -65,13 +65,13 @@ def test_a_map_may_have_none(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_map_is_said_with_its_place(tmp_path: Path, document: Any, message: str) -> None:
-    with pytest.raises(MapError) as caught:
+    with pytest.raises(ObstaclesError) as caught:
         load(write(tmp_path, document))
     assert str(caught.value) == f"{tmp_path / 'map.json'}{message}"
 
 
 def test_a_missing_map(tmp_path: Path) -> None:
-    with pytest.raises(MapError) as caught:
+    with pytest.raises(ObstaclesError) as caught:
         load(tmp_path / "nowhere")
     assert (
         str(caught.value) == f"{tmp_path / 'nowhere' / 'map.json'}: cannot be read as a map: No such file or directory"
@@ -83,11 +83,11 @@ def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:
     write(tmp_path, {"obstacles": [{"name": name, "lines": [0, 0, 1, 1]} for name in names]})
     obstacles = load(tmp_path)
     assert list(pick(obstacles, ["right", "left"], "walls", tmp_path)) == ["right", "left"]
-    with pytest.raises(MapError) as caught:
+    with pytest.raises(ObstaclesError) as caught:
         pick(obstacles, ["left", "rigth"], "walls", tmp_path)
     assert str(caught.value) == f"--walls: the map {tmp_path} has no obstacle 'rigth'; did you mean 'right'?"
-    with pytest.raises(MapError) as caught:
+    with pytest.raises(ObstaclesError) as caught:
         pick(obstacles, ["xyz"], "goal", tmp_path)
     assert str(caught.value) == f"--goal: the map {tmp_path} has no obstacle 'xyz'; it has finish, left, right"
-    with pytest.raises(MapError, match="has no obstacle 'xyz'; it has none"):
+    with pytest.raises(ObstaclesError, match="has no obstacle 'xyz'; it has none"):
         pick({}, ["xyz"], "goal", tmp_path)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from services.base import UnjudgeableError, Verdict
 from services.continuous_signal import model
-from services.continuous_signal.measures import Limits, measure
+from services.continuous_signal.measures import SignalLimits, measure
 from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.target import Target
 
@@ -19,7 +19,7 @@ SIGNAL = "groundSteering of opendlv.proxy.GroundSteeringRequest/0"
 samples = st.lists(st.tuples(st.integers(-2 * SECOND, 12 * SECOND), st.floats(-5, 5)), max_size=40)
 
 
-def judge(limits: Limits, target: Target | None = RAMP, from_begin: bool = True) -> SignalEvaluator:
+def judge(limits: SignalLimits, target: Target | None = RAMP, from_begin: bool = True) -> SignalEvaluator:
     it = SignalEvaluator(SIGNAL, target, limits, 60.0, from_begin)
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
@@ -45,7 +45,7 @@ def values(verdict: Verdict) -> dict[str, float | None]:
 def test_the_measures_are_those_of_the_thesis(heard: list[tuple[int, float]], band: float) -> None:
     """Equations 4.6 to 4.9 in numpy and plain Python, on a target that is time itself over 10 s."""
     times, signal = np.array([t for t, _ in heard], np.int64), np.array([v for _, v in heard])
-    found = measure(RAMP, times, signal, Limits(band=band))
+    found = measure(RAMP, times, signal, SignalLimits(band=band))
     d = [abs(v - t / (10 * SECOND)) for t, v in heard if 0 <= t <= 10 * SECOND]
     assert (found.received, found.samples) == (sum(t >= 0 for t, _ in heard), len(d))
     assert found.outside == sum(t > 10 * SECOND for t, _ in heard)
@@ -70,7 +70,7 @@ def test_a_thousand_samples_against_numpy() -> None:
     target = Target(knots, np.sin(knots / SECOND))
     times = np.sort(random_.choice(np.arange(1, 19 * SECOND), 1000, replace=False))
     signal = np.sin(times / SECOND) + random_.normal(0, 0.1, 1000)
-    found = measure(target, times, signal, Limits(band=0.1))
+    found = measure(target, times, signal, SignalLimits(band=0.1))
     d = np.abs(signal - np.interp(times / SECOND, knots / SECOND, target.values))
     assert (found.mean, found.std, found.distance) == pytest.approx((d.mean(), np.std(d), d.max()), rel=1e-9)
     assert (found.mean, found.std) == pytest.approx(
@@ -80,7 +80,7 @@ def test_a_thousand_samples_against_numpy() -> None:
 
 
 def test_a_signal_on_its_target_passes() -> None:
-    it = judge(Limits(mean=0.1, std=0.1, distance=0.2, band=0.1, share=0.75, samples=4))
+    it = judge(SignalLimits(mean=0.1, std=0.1, distance=0.2, band=0.1, share=0.75, samples=4))
     hear(it, (0, 0), (2.5, 0.25), (5, 0.625), (10, 1))
     assert decided(it) == Verdict("passed", (
         f"{SIGNAL} kept to its target over 4 samples: mean 0.03125 (at most 0.1), std 0.05413 (at most 0.1), "
@@ -94,7 +94,7 @@ def test_a_signal_on_its_target_passes() -> None:
 
 
 def test_every_limit_that_is_broken_is_named_with_the_worst_sample() -> None:
-    it = judge(Limits(mean=0.1, std=0.1, distance=0.2, band=0.1, share=0.9))
+    it = judge(SignalLimits(mean=0.1, std=0.1, distance=0.2, band=0.1, share=0.9))
     hear(it, (0, 0), (5, -0.5))
     assert decided(it).outcome == "failed"
     assert decided(it).reason == (
@@ -108,7 +108,7 @@ def test_every_limit_that_is_broken_is_named_with_the_worst_sample() -> None:
 
 @pytest.mark.parametrize(("limit", "outcome"), [(0.5, "passed"), (math.nextafter(0.5, 0), "failed")])
 def test_a_limit_is_kept_by_what_equals_it(limit: float, outcome: str) -> None:
-    it = judge(Limits(distance=limit))
+    it = judge(SignalLimits(distance=limit))
     hear(it, (5, 1.0))
     assert decided(it).outcome == outcome
     if outcome == "failed":
@@ -116,13 +116,13 @@ def test_a_limit_is_kept_by_what_equals_it(limit: float, outcome: str) -> None:
 
 
 def test_a_value_just_above_its_limit_is_told_in_full() -> None:
-    it = judge(Limits(distance=0.5))
+    it = judge(SignalLimits(distance=0.5))
     hear(it, (5, 1 + 2**-17))
     assert decided(it).reason.startswith("the largest distance is 0.5000076293945312 (at most 0.5); worst")
 
 
 def test_no_sample_is_never_a_pass() -> None:
-    verdict = decided(judge(Limits(mean=9.0)), 12.5)
+    verdict = decided(judge(SignalLimits(mean=9.0)), 12.5)
     assert (verdict.outcome, verdict.reason) == (
         "failed",
         f"no sample of {SIGNAL} came before the input ended after 12.50 s",
@@ -131,7 +131,7 @@ def test_no_sample_is_never_a_pass() -> None:
 
 
 def test_samples_outside_the_target_are_left_out_and_counted() -> None:
-    it = judge(Limits(mean=9.0, samples=2))
+    it = judge(SignalLimits(mean=9.0, samples=2))
     hear(it, (-1, 5), (5, 0.5), (11, 50), (12, 50))
     assert decided(it).outcome == "failed"
     assert decided(it).reason.startswith(
@@ -141,23 +141,23 @@ def test_samples_outside_the_target_are_left_out_and_counted() -> None:
 
 
 def test_samples_that_all_miss_the_target_say_where_it_is() -> None:
-    it = judge(Limits(mean=9.0))
+    it = judge(SignalLimits(mean=9.0))
     hear(it, (11, 50), (12, 50))
     assert decided(it).reason == f"none of 2 samples of {SIGNAL} is from the target's time, 0.00 s to 10.00 s"
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_a_sample_that_is_no_number_fails(value: float) -> None:
-    it = judge(Limits(mean=9.0))
+    it = judge(SignalLimits(mean=9.0))
     hear(it, (4, 0.4), (7, value), (5, value))
     assert decided(it).reason.startswith("2 samples are not finite numbers, the first at 5.00 s; worst at 4.00 s")
-    it = judge(Limits(mean=9.0))
+    it = judge(SignalLimits(mean=9.0))
     hear(it, (7, value))
     assert decided(it).reason == f"{SIGNAL} was not a finite number in its one sample, first at 7.00 s"
 
 
 def test_the_window() -> None:
-    it = judge(Limits(mean=0.0, start=2_500_000, until=5 * SECOND))
+    it = judge(SignalLimits(mean=0.0, start=2_500_000, until=5 * SECOND))
     hear(it, (2.499999, 9), (2.5, 0.25), (5, 0.5), (5.000001, 9))
     assert values(decided(it)) | {"samples": 2, "distance": 0.0} == values(decided(it))
 
@@ -168,7 +168,7 @@ def test_the_order_of_samples_does_not_matter(heard: list[tuple[int, float]], ra
     random_.shuffle(mixed)
     both = []
     for order in (heard, mixed):
-        it = judge(Limits(mean=1.0, samples=1))
+        it = judge(SignalLimits(mean=1.0, samples=1))
         hear(it, *((time / SECOND, value) for time, value in order))
         both.append(decided(it))
     assert both[0].outcome == both[1].outcome
@@ -177,7 +177,7 @@ def test_the_order_of_samples_does_not_matter(heard: list[tuple[int, float]], ra
 
 def test_sample_times_meet_those_of_the_target() -> None:
     target = Target(RAMP.times, RAMP.values, start=500 * SECOND)
-    it = judge(Limits(mean=0.0, start=SECOND), target, from_begin=False)
+    it = judge(SignalLimits(mean=0.0, start=SECOND), target, from_begin=False)
     it.take(9.0, 500 * SECOND)
     it.take(0.3, 503 * SECOND)
     it.take(9.0, BEGIN + 3 * SECOND)
@@ -185,7 +185,7 @@ def test_sample_times_meet_those_of_the_target() -> None:
 
 
 def test_a_live_target_is_interpolated_when_all_is_there() -> None:
-    it = judge(Limits(mean=0.0, distance=0.0), target=None)
+    it = judge(SignalLimits(mean=0.0, distance=0.0), target=None)
     hear(it, (1, 0.125), (4, 0.5), (9, 9.0))
     for time, value in ((8, 1.0), (0, 0.0), (2, 0.25)):
         it.take_target(value, BEGIN + time * SECOND)
@@ -193,7 +193,7 @@ def test_a_live_target_is_interpolated_when_all_is_there() -> None:
 
 
 def test_without_a_live_target_there_is_no_verdict() -> None:
-    it = judge(Limits(mean=0.0), target=None)
+    it = judge(SignalLimits(mean=0.0), target=None)
     hear(it, (1, 0.1))
     with pytest.raises(UnjudgeableError, match=r"^no sample of the target came before the input ended after 3.00 s$"):
         it.end_of_input(BEGIN + 3 * SECOND)
@@ -202,7 +202,7 @@ def test_without_a_live_target_there_is_no_verdict() -> None:
 
 
 def test_the_time_is_over() -> None:
-    it = judge(Limits(mean=0.0))
+    it = judge(SignalLimits(mean=0.0))
     it.update(BEGIN + 60 * SECOND)
     assert it.verdict is None
     it.update(BEGIN + 60 * SECOND + 1)
@@ -210,7 +210,7 @@ def test_the_time_is_over() -> None:
 
 
 def test_the_first_verdict_and_the_first_begin_stand() -> None:
-    it = judge(Limits(mean=0.0, samples=1))
+    it = judge(SignalLimits(mean=0.0, samples=1))
     it.begin(BEGIN + 5 * SECOND)
     hear(it, (5, 0.5))
     first = decided(it)
@@ -220,7 +220,7 @@ def test_the_first_verdict_and_the_first_begin_stand() -> None:
 
 
 def test_time_0_is_the_first_update_when_nobody_says_begin() -> None:
-    it = SignalEvaluator(SIGNAL, RAMP, Limits(mean=0.0, samples=1), 60.0, True)
+    it = SignalEvaluator(SIGNAL, RAMP, SignalLimits(mean=0.0, samples=1), 60.0, True)
     it.update(BEGIN)
     hear(it, (5, 0.5))
     assert decided(it).outcome == "passed"
@@ -228,7 +228,7 @@ def test_time_0_is_the_first_update_when_nobody_says_begin() -> None:
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model, "MOST_SAMPLES", 3)
-    it = judge(Limits(mean=1e-9, samples=1))
+    it = judge(SignalLimits(mean=1e-9, samples=1))
     hear(it, (1, 0.1), (2, 0.2), (3, 0.3))
     it.update(BEGIN + 4 * SECOND)
     assert it.verdict is not None and it.verdict.outcome == "passed"

@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
 
-from services.continuous_signal.measures import Limits, Measures, Worst
+from services.continuous_signal.measures import SignalLimits, SignalMeasures, WorstSample
 from services.continuous_signal.reason import verdict
 from services.continuous_signal.target import Target
 
 TARGET = Target(np.array([0, 10_000_000]), np.array([0.0, 1.0]))
-GOOD = Measures(12, 12, 0, (), mean=0.01, std=0.02, distance=0.3, share=0.9, worst=Worst(12.3, 0.1, 0.4))
-LIMITS = Limits(mean=0.05, band=0.1, share=0.8, samples=10)
+GOOD = SignalMeasures(12, 12, 0, (), mean=0.01, std=0.02, distance=0.3, share=0.9, worst=WorstSample(12.3, 0.1, 0.4))
+LIMITS = SignalLimits(mean=0.05, band=0.1, share=0.8, samples=10)
 
 
-def reason(measures: Measures, limits: Limits = LIMITS) -> str:
+def reason(measures: SignalMeasures, limits: SignalLimits = LIMITS) -> str:
     return verdict("speed", TARGET, measures, limits, "within 9.00 s").reason
 
 
@@ -24,7 +24,7 @@ def test_a_pass_names_the_kept_limits() -> None:
 
 
 def test_all_broken_limits_are_named() -> None:
-    bad = Measures(12, 9, 3, (4.5,), mean=0.0500001, std=0.0, distance=0.3, share=0.5)
+    bad = SignalMeasures(12, 9, 3, (4.5,), mean=0.0500001, std=0.0, distance=0.3, share=0.5)
     assert reason(bad) == (
         "the mean distance is 0.0500001 (at most 0.05); the share of samples within 0.1 of the target is 0.5 "
         "(at least 0.8); only 9 samples came (at least 10), and 3 outside the target's time; "
@@ -35,12 +35,12 @@ def test_all_broken_limits_are_named() -> None:
 @pytest.mark.parametrize(
     ("measures", "text"),
     [
-        (Measures(0, 0, 0, ()), "no sample of speed came within 9.00 s"),
-        (Measures(1, 0, 0, (2.5,)), "speed was not a finite number in its one sample, first at 2.50 s"),
-        (Measures(2, 0, 0, (2.5, 3.0)), "speed was not a finite number in 2 samples, first at 2.50 s"),
-        (Measures(3, 0, 3, ()), "none of 3 samples of speed is from the target's time, 0.00 s to 10.00 s"),
+        (SignalMeasures(0, 0, 0, ()), "no sample of speed came within 9.00 s"),
+        (SignalMeasures(1, 0, 0, (2.5,)), "speed was not a finite number in its one sample, first at 2.50 s"),
+        (SignalMeasures(2, 0, 0, (2.5, 3.0)), "speed was not a finite number in 2 samples, first at 2.50 s"),
+        (SignalMeasures(3, 0, 3, ()), "none of 3 samples of speed is from the target's time, 0.00 s to 10.00 s"),
     ],
 )
-def test_without_samples_the_reason_is_why(measures: Measures, text: str) -> None:
+def test_without_samples_the_reason_is_why(measures: SignalMeasures, text: str) -> None:
     failed = verdict("speed", TARGET, measures, LIMITS, "within 9.00 s")
     assert (failed.outcome, failed.reason, failed.silent) == ("failed", text, measures.received == 0)

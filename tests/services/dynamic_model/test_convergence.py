@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 from scipy.integrate import solve_ivp
 
-from services.dynamic_model.model import Motion, Vehicle
+from services.dynamic_model.model import BodyMotion, Vehicle
 
 MASS, INERTIA, FRONT, REAR, STIFFNESS = 1.113, 0.01, 0.12, 0.104, 15.0
 SECONDS = 2.0
@@ -26,7 +26,7 @@ def equations(wheel: float, force: float):  # type: ignore[no-untyped-def]
     return derivative
 
 
-def solved(start: Motion, steering: float, force: float) -> list[float]:
+def solved(start: BodyMotion, steering: float, force: float) -> list[float]:
     """By LSODA, which changes to implicit steps where the equations are stiff."""
     wheel = steering * 0.6 / 0.290888
     state = (start.vx, start.vy, start.yaw_rate)
@@ -34,7 +34,7 @@ def solved(start: Motion, steering: float, force: float) -> list[float]:
     return [float(values[-1]) for values in result.y]
 
 
-def driven(start: Motion, steering: float, pedal: float, steps: int) -> list[float]:
+def driven(start: BodyMotion, steering: float, pedal: float, steps: int) -> list[float]:
     vehicle = Vehicle(100, steps=steps)
     vehicle.motion = start
     vehicle.steer(steering)
@@ -47,13 +47,13 @@ def driven(start: Motion, steering: float, pedal: float, steps: int) -> list[flo
 @pytest.mark.parametrize(
     ("start", "steering", "pedal", "force"),
     [
-        (Motion(0.5), 0.1, 0.14, 26 * 0.14),
-        (Motion(0.9, 0.05, -1.0), -0.2, 0.1, 26 * 0.1),
-        (Motion(-0.3), 0.15, -0.5, -5 * 0.5),
-        (Motion(0.8, 0.1, 2.0), 0.0, 0.05, 26 * 0.05),
+        (BodyMotion(0.5), 0.1, 0.14, 26 * 0.14),
+        (BodyMotion(0.9, 0.05, -1.0), -0.2, 0.1, 26 * 0.1),
+        (BodyMotion(-0.3), 0.15, -0.5, -5 * 0.5),
+        (BodyMotion(0.8, 0.1, 2.0), 0.0, 0.05, 26 * 0.05),
     ],
 )
-def test_the_error_goes_down_as_the_steps_do(start: Motion, steering: float, pedal: float, force: float) -> None:
+def test_the_error_goes_down_as_the_steps_do(start: BodyMotion, steering: float, pedal: float, force: float) -> None:
     exact = solved(start, steering, force)
     errors = [math.dist(driven(start, steering, pedal, steps), exact) for steps in (1, 2, 4, 8, 16, 100)]
     for coarse, fine in pairwise(errors[1:5]):

@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.dynamic_model.car import KIWI
-from services.dynamic_model.model import Motion, Vehicle, pedal_position, step, wheel_angle
+from services.dynamic_model.model import BodyMotion, Vehicle, pedal_position, step, wheel_angle
 
 SECOND = 1_000_000
 
 
-def drive(vehicle: Vehicle, seconds: float, period: int = 10_000, start: int = 0) -> Motion:
+def drive(vehicle: Vehicle, seconds: float, period: int = 10_000, start: int = 0) -> BodyMotion:
     for now in range(start, start + int(seconds * SECOND) + 1, period):
         vehicle.update(now)
     return vehicle.motion
@@ -48,7 +48,7 @@ def test_euler_steps_are_the_ones_of_the_difference_equation() -> None:
 
 def test_one_step_by_hand() -> None:
     wheel, dt = 0.2, 0.01
-    before = Motion(vx=0.5, vy=0.02, yaw_rate=0.3)
+    before = BodyMotion(vx=0.5, vy=0.02, yaw_rate=0.3)
     front = wheel - (0.02 + 0.12 * 0.3) / 0.5
     rear = (0.104 * 0.3 - 0.02) / 0.5
     after = step(before, wheel, 0.1, dt)
@@ -58,7 +58,7 @@ def test_one_step_by_hand() -> None:
 
 
 def test_slip_in_reverse_divides_by_the_amount_of_the_speed() -> None:
-    before = Motion(vx=-0.5, vy=0.02, yaw_rate=0.3)
+    before = BodyMotion(vx=-0.5, vy=0.02, yaw_rate=0.3)
     after = step(before, 0.2, 0.0, 0.01)
     front, rear = 0.2 - (0.02 + 0.036) / 0.5, (0.0312 - 0.02) / 0.5
     assert after.vy == pytest.approx(0.02 + 0.01 * (15 * (front + rear) / 1.113 + 0.5 * 0.3))
@@ -66,7 +66,7 @@ def test_slip_in_reverse_divides_by_the_amount_of_the_speed() -> None:
 
 @pytest.mark.parametrize("vx", [0.0, 0.1, -0.1, 0.05])
 def test_tyres_carry_nothing_sideways_at_low_speed(vx: float) -> None:
-    after = step(Motion(vx, 0.3, 2.0), 0.6, 0.0, 0.01)
+    after = step(BodyMotion(vx, 0.3, 2.0), 0.6, 0.0, 0.01)
     assert (after.vy, after.yaw_rate) == (0.0, 0.0)
 
 
@@ -112,7 +112,7 @@ def test_requests_that_are_no_numbers_change_nothing(value: float) -> None:
 def test_the_first_update_advances_nothing() -> None:
     vehicle = Vehicle(100)
     vehicle.press(0.14)
-    assert vehicle.update(5 * SECOND) == Motion()
+    assert vehicle.update(5 * SECOND) == BodyMotion()
     assert vehicle.update(5 * SECOND + 10_000).vx == pytest.approx(0.01 * KIWI.gain_forward * 0.14 / KIWI.mass)
 
 
@@ -149,7 +149,7 @@ def test_finer_steps_are_stable_where_the_public_scheme_is_not() -> None:
     def swing(steps: int) -> float:
         vehicle = Vehicle(100, steps=steps)
         vehicle.press(4 * 0.12 / 26)
-        vehicle.motion = Motion(0.12, 0.0, 0.1)
+        vehicle.motion = BodyMotion(0.12, 0.0, 0.1)
         drive(vehicle, 2)
         return abs(vehicle.motion.yaw_rate)
 
@@ -162,9 +162,11 @@ def test_the_limit_of_stability_is_where_the_motion_stops_to_decay(rate: float) 
     limit = KIWI.stable_above(rate)
     assert limit == pytest.approx(19.14 / rate, rel=1e-3)
     for speed, decays in ((limit * 0.99, False), (limit * 1.01, True)):
-        motion = Motion(speed, 0.0, 0.1)
+        motion = BodyMotion(speed, 0.0, 0.1)
         for _ in range(4000):
-            motion = step(Motion(speed, motion.vy, motion.yaw_rate), 0.0, 0.0, 1 / rate, replace(KIWI, slip_speed=0.01))
+            motion = step(
+                BodyMotion(speed, motion.vy, motion.yaw_rate), 0.0, 0.0, 1 / rate, replace(KIWI, slip_speed=0.01)
+            )
         assert (abs(motion.yaw_rate) < 0.1) is decays
 
 
@@ -173,7 +175,7 @@ def test_one_step_in_each_period_is_what_it_always_was() -> None:
     vehicle = Vehicle(100)
     vehicle.press(0.12)
     vehicle.steer(0.2)
-    motion = Motion()
+    motion = BodyMotion()
     vehicle.update(0)
     for tick in range(1, 500):
         motion = step(motion, 0.2 * (0.6 / 0.290888), 0.12, 0.01)
@@ -186,7 +188,7 @@ def test_reset_is_standing_still() -> None:
     vehicle.steer(0.2)
     assert drive(vehicle, 1).vx > 0
     vehicle.reset()
-    assert drive(vehicle, 1, start=SECOND) == Motion()
+    assert drive(vehicle, 1, start=SECOND) == BodyMotion()
 
 
 def test_steps_too_long_for_the_tyres_are_an_error_and_not_a_state() -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.gantry.motion import FARTHEST, HOME, Limits, Shaper, Velocity, box, turned
+from services.gantry.motion import FARTHEST, HOME, MotionLimits, Shaper, Velocity, box, turned
 from services.gantry.protocol import Position
 
 MIDDLE = Position(0, 0, 0)
@@ -12,7 +12,7 @@ velocities = st.builds(Velocity, st.floats(-3, 3), st.floats(-3, 3), st.floats(-
 
 
 def settled(body: Velocity, at: Position) -> Velocity:
-    shaper = Shaper(Limits())
+    shaper = Shaper(MotionLimits())
     for _ in range(200):
         velocity = shaper.step(body, at, 0.05)
     return velocity
@@ -36,7 +36,7 @@ def test_too_fast_is_cut_without_a_change_of_direction() -> None:
 
 
 def test_speeds_change_no_faster_than_the_accelerations() -> None:
-    shaper = Shaper(Limits(acceleration=0.4, yaw_acceleration=0.8))
+    shaper = Shaper(MotionLimits(acceleration=0.4, yaw_acceleration=0.8))
     velocity = shaper.step(Velocity(1, 0, 1), MIDDLE, 0.05)
     assert (velocity.x, velocity.y, velocity.yaw) == pytest.approx((0.02, 0, 0.04))
     shaper.halt()
@@ -47,7 +47,7 @@ def test_speeds_change_no_faster_than_the_accelerations() -> None:
 @given(velocities, st.sampled_from([0.01, 0.05, 0.2]))
 def test_no_request_drives_the_rig_out_of_its_workspace(body: Velocity, dt: float) -> None:
     """The rig here follows its commands one step late, as real ones do at best."""
-    limits = Limits()
+    limits = MotionLimits()
     shaper, at, before = Shaper(limits), MIDDLE, Velocity()
     for _ in range(int(6 / dt)):
         velocity = shaper.step(body, at, dt)

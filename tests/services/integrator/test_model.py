@@ -4,18 +4,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.integrator.model import Integrator, Pose, Twist
+from services.integrator.model import BodyPose, Integrator, Twist
 from services.integrator.rotation import quaternion
 
 SECOND = 1_000_000
 CIRCLE = Twist((0.8, 0.1, 0.0), (0.0, 0.0, 1.3))
 
 
-def start(x: float = 0, y: float = 0, yaw: float = 0) -> Pose:
-    return Pose((x, y, 0.0), quaternion(0, 0, yaw))
+def start(x: float = 0, y: float = 0, yaw: float = 0) -> BodyPose:
+    return BodyPose((x, y, 0.0), quaternion(0, 0, yaw))
 
 
-def on_the_circle(begin: Pose, yaw: float, time: float) -> tuple[float, float, float]:
+def on_the_circle(begin: BodyPose, yaw: float, time: float) -> tuple[float, float, float]:
     """Exact pose after `time` seconds of CIRCLE: the body turns about a centre that it holds to its left."""
     (vx, vy, _), rate = CIRCLE.velocity, CIRCLE.rates[2]
     angle = yaw + rate * time
@@ -24,7 +24,7 @@ def on_the_circle(begin: Pose, yaw: float, time: float) -> tuple[float, float, f
     return x, y, angle
 
 
-def heading(pose: Pose) -> float:
+def heading(pose: BodyPose) -> float:
     return 2 * math.atan2(pose.attitude[2], pose.attitude[3])
 
 
@@ -41,7 +41,7 @@ def test_a_circle_is_exact_whatever_the_step(period: int) -> None:
 
 
 def test_a_plane_motion_stays_in_the_plane_exactly() -> None:
-    body = Integrator(Pose((0.0, 0.0, 0.25), quaternion(0, 0, 1)))
+    body = Integrator(BodyPose((0.0, 0.0, 0.25), quaternion(0, 0, 1)))
     body.update(0)
     body.feed(CIRCLE, 0)
     for now in range(0, SECOND, 10_000):

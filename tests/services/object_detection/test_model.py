@@ -4,7 +4,7 @@ from services.base import UnjudgeableError, Verdict
 from services.object_detection.boxes import Box, LabelledBox
 from services.object_detection.frames import FrameKey, TypeNumber
 from services.object_detection.model import DetectionEvaluator
-from services.object_detection.score import Limits, Rules
+from services.object_detection.score import DetectionLimits, Rules
 from services.object_detection.truth import Truth
 
 SECOND = 1_000_000
@@ -15,10 +15,12 @@ BOARD = Truth("one", {0: (YELLOW, BLUE)})
 FILM = Truth("sample-time", {number * SECOND: (YELLOW, BLUE) for number in range(1, 6)})
 
 
-def judge(truth: Truth | None = BOARD, limits: Limits | None = None, **rules: float | list[str]) -> DetectionEvaluator:
+def judge(
+    truth: Truth | None = BOARD, limits: DetectionLimits | None = None, **rules: float | list[str]
+) -> DetectionEvaluator:
     """A judge whose test has begun; ``rules`` replace the usual ones."""
     usual = {"iou": 0.5, "labels": [], "max_delay": 1.0, "max_time": 60.0}
-    it = DetectionEvaluator(truth, Rules(**{**usual, **rules}), limits or Limits(recall=0.9))  # type: ignore[arg-type]
+    it = DetectionEvaluator(truth, Rules(**{**usual, **rules}), limits or DetectionLimits(recall=0.9))  # type: ignore[arg-type]
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     return it
@@ -56,7 +58,7 @@ def values(verdict: Verdict) -> dict[str, float | None]:
 
 
 def test_what_is_found_passes() -> None:
-    it = judge(limits=Limits(0.7, 0.7, 0.7, frames=2))
+    it = judge(limits=DetectionLimits(0.7, 0.7, 0.7, frames=2))
     detect(it, 1, YELLOW, BLUE)
     at(it, 0.5)
     detect(it, 2, BLUE, LabelledBox("red", FAR))
@@ -77,7 +79,7 @@ def test_what_is_found_passes() -> None:
 
 
 def test_every_limit_that_is_broken_is_named_with_the_worst_frame() -> None:
-    it = judge(limits=Limits(0.9, 0.9, 0.9, frames=3))
+    it = judge(limits=DetectionLimits(0.9, 0.9, 0.9, frames=3))
     detect(it, 1, YELLOW, BLUE)
     at(it, 0.5)
     detect(it, 2, LabelledBox("yellow", FAR))
@@ -99,13 +101,13 @@ def test_colours_swapped_are_false_and_missed() -> None:
 
 @pytest.mark.parametrize(("limit", "outcome"), [(0.5, "passed"), (0.500001, "failed")])
 def test_a_limit_is_kept_by_what_equals_it(limit: float, outcome: str) -> None:
-    it = judge(limits=Limits(recall=limit))
+    it = judge(limits=DetectionLimits(recall=limit))
     detect(it, 1, YELLOW)
     assert decided(it).outcome == outcome
 
 
 def test_a_share_without_a_whole_keeps_no_limit() -> None:
-    it = judge(truth=None, limits=Limits(0.0, 0.0, 0.0), labels=["yellow"])
+    it = judge(truth=None, limits=DetectionLimits(0.0, 0.0, 0.0), labels=["yellow"])
     it.announce(FrameKey(2 * SECOND, 1), by_application=True)
     reveal(it, 2, LabelledBox("red", FAR))
     assert decided(it).reason == (
@@ -242,7 +244,7 @@ def test_without_a_delay_the_end_is_the_verdict() -> None:
 
 
 def test_the_begin_forgets_what_was_before() -> None:
-    it = DetectionEvaluator(FILM, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
+    it = DetectionEvaluator(FILM, Rules(0.5, [], 1.0, 60.0), DetectionLimits(recall=1.0))
     it.update(BEGIN - 9 * SECOND)
     detect(it, 1)
     detect(it, 2, YELLOW)
@@ -270,7 +272,7 @@ def test_frames_before_the_start_do_not_count() -> None:
 
 
 def test_classes_that_do_not_count() -> None:
-    it = judge(labels=["yellow"], limits=Limits(1.0, 1.0))
+    it = judge(labels=["yellow"], limits=DetectionLimits(1.0, 1.0))
     detect(it, 1, YELLOW, LabelledBox("red", FAR), LabelledBox("", FAR))
     assert decided(it).outcome == "passed" and "recall-blue" not in values(decided(it))
 
@@ -285,7 +287,7 @@ def test_a_detection_without_a_property_is_of_its_type_or_of_no_class() -> None:
 
 
 def test_limits_of_each_class() -> None:
-    limits = Limits(recall=0.5, each_class=True)
+    limits = DetectionLimits(recall=0.5, each_class=True)
     it = judge(limits=limits)
     detect(it, 1, YELLOW)
     assert decided(it).reason == (
@@ -309,7 +311,7 @@ def test_the_first_verdict_stands() -> None:
 
 
 def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
-    it = DetectionEvaluator(BOARD, Rules(0.5, [], 1.0, 60.0), Limits(recall=1.0))
+    it = DetectionEvaluator(BOARD, Rules(0.5, [], 1.0, 60.0), DetectionLimits(recall=1.0))
     it.update(BEGIN + 5 * SECOND)
     it.begin(BEGIN)
     detect(it, 1, YELLOW)
@@ -321,7 +323,7 @@ def test_a_begin_that_is_heard_late_does_not_make_frames_older() -> None:
 
 @pytest.mark.parametrize("begun", [True, False])
 def test_a_frame_from_before_the_judge_knows_the_time_does_not_begin_the_test(begun: bool) -> None:
-    it = DetectionEvaluator(None, Rules(0.5, [], 1.0, 60.0), Limits(recall=0.9))
+    it = DetectionEvaluator(None, Rules(0.5, [], 1.0, 60.0), DetectionLimits(recall=0.9))
     reveal(it, 1, YELLOW)
     if begun:
         it.begin(BEGIN)

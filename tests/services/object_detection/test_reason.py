@@ -1,6 +1,6 @@
 from services.object_detection.counts import Counts, CountsByClass
 from services.object_detection.reason import verdict
-from services.object_detection.score import Limits, Score
+from services.object_detection.score import DetectionLimits, Score
 
 
 def score(hits: int, false: int, missed: int, **about: int) -> Score:
@@ -9,7 +9,7 @@ def score(hits: int, false: int, missed: int, **about: int) -> Score:
 
 
 def test_a_pass_names_the_kept_limits() -> None:
-    passed = verdict(score(9, 1, 0), Limits(precision=0.9, f1=0.5), "")
+    passed = verdict(score(9, 1, 0), DetectionLimits(precision=0.9, f1=0.5), "")
     assert (passed.outcome, passed.reason) == (
         "passed",
         "found 9 of 9 objects in 2 frames, with 1 false detection: precision 0.9 (at least 0.9), "
@@ -18,12 +18,12 @@ def test_a_pass_names_the_kept_limits() -> None:
 
 
 def test_a_value_just_under_its_limit_is_written_in_full() -> None:
-    failed = verdict(score(89999, 10001, 0), Limits(precision=0.9), "")
+    failed = verdict(score(89999, 10001, 0), DetectionLimits(precision=0.9), "")
     assert failed.reason == "precision is 0.89999 (at least 0.9), with 10001 false detections beside 89999 found"
 
 
 def test_what_was_left_out_is_named() -> None:
-    reason = verdict(score(1, 0, 0, without_truth=1, late=2, repeated=1), Limits(recall=0.1), "").reason
+    reason = verdict(score(1, 0, 0, without_truth=1, late=2, repeated=1), DetectionLimits(recall=0.1), "").reason
     assert reason.endswith(
         "; left out: 1 frame without ground truth, 2 detections too late, 1 detection under a detectionId "
         "that was in use"
@@ -31,7 +31,7 @@ def test_what_was_left_out_is_named() -> None:
 
 
 def test_silence_is_explained() -> None:
-    nothing = Limits(recall=0.1)
+    nothing = DetectionLimits(recall=0.1)
     assert verdict(Score(), nothing, "within 9.00 s").reason == "no detection came within 9.00 s"
     assert verdict(Score(frames=1), nothing, "within 9.00 s").reason == "no detection came within 9.00 s, in 1 frame"
     assert verdict(Score(without_truth=3), nothing, "").reason == (
@@ -40,7 +40,7 @@ def test_silence_is_explained() -> None:
 
 
 def test_a_measure_without_a_value_says_why() -> None:
-    reason = verdict(score(0, 0, 0), Limits(precision=0.1, recall=0.1), "").reason
+    reason = verdict(score(0, 0, 0), DetectionLimits(precision=0.1, recall=0.1), "").reason
     assert reason == (
         "precision has no value (at least 0.1), as nothing was detected; "
         "recall has no value (at least 0.1), as there was nothing to detect"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from services.object_detection.boxes import Box, LabelledBox
 from services.object_detection.frames import FrameKey
-from services.object_detection.truth import TruthError, load
+from services.object_detection.truth import TruthFileError, load
 from tests.services.process import ROOT
 
 COCO = {
@@ -93,20 +93,20 @@ def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said
     document = copy.deepcopy(COCO)
     change(path, value)(document)
     file = write(tmp_path, document)
-    with pytest.raises(TruthError) as raised:
+    with pytest.raises(TruthFileError) as raised:
         load(file, "sample-time")
     assert str(raised.value).startswith(f"{file}{said}")
 
 
 def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TruthError, match=r"has 2 images, expected one for all frames; see --truth-frames$"):
+    with pytest.raises(TruthFileError, match=r"has 2 images, expected one for all frames; see --truth-frames$"):
         load(write(tmp_path, COCO), "one")
 
 
 @pytest.mark.parametrize("text", ["", "[1, 2", "\x00", "[" * 100_000])
 def test_files_that_are_no_json(tmp_path: Path, text: str) -> None:
     for path in (write(tmp_path, text), tmp_path / "absent.json", tmp_path):
-        with pytest.raises(TruthError, match=r"cannot be read as COCO JSON: "):
+        with pytest.raises(TruthFileError, match=r"cannot be read as COCO JSON: "):
             load(path, "one")
 
 
@@ -117,7 +117,7 @@ values = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_s
 @given(st.recursive(values, lambda v: st.lists(v, max_size=3) | st.dictionaries(st.sampled_from(KEYS), v)))
 def test_any_json_is_a_truth_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, document: Any) -> None:
     path = write(tmp_path_factory.getbasetemp(), document)
-    with pytest.raises(TruthError, match=r"truth\.json: "):
+    with pytest.raises(TruthFileError, match=r"truth\.json: "):
         load(path, "number")
 
 

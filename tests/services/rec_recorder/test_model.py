@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from services.rec_recorder.model import Recording, RecordingError
+from services.rec_recorder.model import RecordingFile, RecordingFileError
 
 times = st.integers(0, 2**31 * 1_000_000 - 1)
 envelopes = st.builds(Envelope, st.integers(1, 5000), st.binary(max_size=300), times, times, times, st.integers(0, 9))
@@ -17,7 +17,7 @@ envelopes = st.builds(Envelope, st.integers(1, 5000), st.binary(max_size=300), t
 @given(st.lists(envelopes, max_size=20))
 def test_what_is_written_is_read_again(tmp_path_factory: pytest.TempPathFactory, written: list[Envelope]) -> None:
     path = tmp_path_factory.mktemp("rec") / "drive.rec"
-    with Recording(path) as recording:
+    with RecordingFile(path) as recording:
         for envelope in written:
             recording.write(envelope)
         assert list(read_envelopes(path)) == written  # before it is closed: a killed recorder leaves this
@@ -27,15 +27,15 @@ def test_what_is_written_is_read_again(tmp_path_factory: pytest.TempPathFactory,
 def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "drive.rec"
     path.write_bytes(b"dear")
-    with pytest.raises(RecordingError) as caught:
-        Recording(path)
+    with pytest.raises(RecordingFileError) as caught:
+        RecordingFile(path)
     assert str(caught.value) == f"{path} exists and is not overwritten"
     assert path.read_bytes() == b"dear"
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"drive\.rec cannot be written: No such file or directory"):
-        Recording(tmp_path / "nowhere" / "drive.rec")
+    with pytest.raises(RecordingFileError, match=r"drive\.rec cannot be written: No such file or directory"):
+        RecordingFile(tmp_path / "nowhere" / "drive.rec")
 
 
 def envelope(number: int) -> Envelope:
@@ -44,7 +44,7 @@ def envelope(number: int) -> Envelope:
 
 def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "drive.rec"
-    with Recording(path, max_size=300) as recording:
+    with RecordingFile(path, max_size=300) as recording:
         for number in range(5):
             recording.write(envelope(number))
     assert len(list(read_envelopes(path))) == 2
@@ -57,7 +57,7 @@ def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureF
 
 def test_commands_stop_it_and_let_it_go_on(tmp_path: Path) -> None:
     path = tmp_path / "drive.rec"
-    with Recording(path) as recording:
+    with RecordingFile(path) as recording:
         for number, command in enumerate((1, 2, 7, 1, 1, 2)):
             recording.write(envelope(number))
             recording.command(command)
@@ -71,7 +71,7 @@ def test_a_full_disk_ends_it_with_a_readable_file(tmp_path: Path) -> None:
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
     try:
-        with Recording(path) as recording, pytest.raises(RecordingError) as caught:
+        with RecordingFile(path) as recording, pytest.raises(RecordingFileError) as caught:
             for number in range(50):
                 recording.write(envelope(number))
     finally:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl.opendlv.memory import pixels
-from services.rec_recorder.snapshot import Snapshot
+from services.rec_recorder.snapshot import SnapshotWriter
 from services.rec_recorder.source import MemorySpec, Source
 from tests.services.built import built, refusal
 from tests.services.rec_recorder.test_pictures import HEIGHT, WIDTH, CameraMemory, scene
@@ -29,7 +29,7 @@ def taken(path: Path) -> list[int]:
 
 def test_the_first_picture_and_then_that_of_the_begin(camera: CameraMemory, tmp_path: Path) -> None:
     path, seen = tmp_path / "snapshot.png", []
-    snapshot = Snapshot(Source(MemorySpec(camera.name, WIDTH, HEIGHT), 1), path)
+    snapshot = SnapshotWriter(Source(MemorySpec(camera.name, WIDTH, HEIGHT), 1), path)
     for number in range(6):
         snapshot.update(number)
         seen.append(taken(path))
@@ -51,7 +51,7 @@ def test_the_first_picture_and_then_that_of_the_begin(camera: CameraMemory, tmp_
 def test_what_cannot_be_written_is_told(
     camera: CameraMemory, tmp_path: Path, caplog: pytest.LogCaptureFixture, width: int, place: str, words: str
 ) -> None:
-    snapshot = Snapshot(Source(MemorySpec(camera.name, width, HEIGHT), 1), tmp_path / place / "snapshot.png")
+    snapshot = SnapshotWriter(Source(MemorySpec(camera.name, width, HEIGHT), 1), tmp_path / place / "snapshot.png")
     snapshot.update(0)
     camera.show(1)
     snapshot.update(1)

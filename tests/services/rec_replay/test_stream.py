@@ -8,7 +8,7 @@ from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.opendlv.video.decoder import VideoError
 from services.rec_replay.pictures import PictureMemories, first_frame, pixels
 from services.rec_replay.selection import Selection, select
-from services.rec_replay.stream import Stream
+from services.rec_replay.stream import EntryStream
 from tests.services.rec_replay.recordings import IMAGE, S, images, message, picture, write
 
 
@@ -19,11 +19,11 @@ def path(tmp_path: Path) -> Path:
     return write(tmp_path / "drive.rec", [*images(times), *pedals])
 
 
-def stream(recording: Recording) -> Stream:
-    return Stream(recording, select(recording, Selection(), MessageSet.standard(), S))
+def stream(recording: Recording) -> EntryStream:
+    return EntryStream(recording, select(recording, Selection(), MessageSet.standard(), S))
 
 
-def shown(one: Stream) -> list[int | None]:
+def shown(one: EntryStream) -> list[int | None]:
     """The number of the next entry's picture, and so on to the end; None where an entry has none."""
     numbers: list[int | None] = []
     while True:

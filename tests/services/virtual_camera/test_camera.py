@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.virtual_camera.camera import Pinhole, Pose, clip, euler_rotation, quaternion_rotation
+from services.virtual_camera.camera import CameraPose, Pinhole, clip, euler_rotation, quaternion_rotation
 
 angles = st.floats(-3.0, 3.0)
 
@@ -35,8 +35,8 @@ def test_what_is_no_rotation_is_refused(bad):
 
 
 def test_what_is_carried_moves_and_turns_with_its_body():
-    body = Pose.at(1, 2, 3, yaw=math.pi / 2)
-    camera = body.carrying(Pose.at(0.1, 0.2, 0.3, yaw=math.pi / 2))
+    body = CameraPose.at(1, 2, 3, yaw=math.pi / 2)
+    camera = body.carrying(CameraPose.at(0.1, 0.2, 0.3, yaw=math.pi / 2))
     assert camera.position == pytest.approx([0.8, 2.1, 3.3])
     assert camera.rotation @ [1, 0, 0] == pytest.approx([-1, 0, 0])
 
@@ -44,7 +44,7 @@ def test_what_is_carried_moves_and_turns_with_its_body():
 def test_the_pinhole_equation():
     camera = Pinhole(640, 480, math.radians(90))
     assert camera.focal == pytest.approx(240)
-    view = camera.view(Pose.at(1, 1, 1, yaw=math.pi / 2))
+    view = camera.view(CameraPose.at(1, 1, 1, yaw=math.pi / 2))
     # 2 m ahead (+y), 0.5 m to the left (-x), 0.25 m up
     u, v = camera.project(view.to_camera(np.array([0.5, 3.0, 1.25])))
     assert (u + 0.5, v + 0.5) == pytest.approx((320 - 240 * 0.5 / 2, 240 - 240 * 0.25 / 2))

@@ -16,7 +16,7 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.model import to_i420
@@ -70,7 +70,7 @@ def test_libcluon_gets_the_pictures_of_the_frames_it_sends(start, cid):
     seen = json.loads(output)
     yaw = 2 * math.atan2(frame.qz, frame.qw)
     renderer = Renderer(load_scene(STRAIGHT), 320, 240, math.radians(48.8))
-    expected = renderer.render(Pose.at(0.1 * math.cos(yaw), 1.5 + 0.1 * math.sin(yaw), 0.095, yaw=yaw))
+    expected = renderer.render(CameraPose.at(0.1 * math.cos(yaw), 1.5 + 0.1 * math.sin(yaw), 0.095, yaw=yaw))
     bgr = np.ascontiguousarray(expected[..., :3])
     for memory, picture in zip(seen, (expected, to_i420(expected), bgr), strict=True):
         assert (memory["size"], memory["sha256"]) == (picture.nbytes, hashlib.sha256(picture).hexdigest())

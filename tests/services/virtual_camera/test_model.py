@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.model import VirtualCamera, mount, to_i420
@@ -46,7 +46,7 @@ def test_a_picture_shows_the_latest_frame_and_bears_the_time_of_the_update(rende
     camera.update(1_000_000)
     camera.update(1_100_000)
     expected = renderer.render(
-        Pose.at(
+        CameraPose.at(
             1 + 0.1 * math.cos(0.4) + 0.05 * math.sin(0.4), 0.5 + 0.1 * math.sin(0.4) - 0.05 * math.cos(0.4), 0.3,
             math.radians(2.0), math.radians(5.0), 0.4 + math.radians(10.0),
         )

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
-from services.virtual_camera.truth import Limits, Truth, classes_of
+from services.virtual_camera.truth import SceneTruth, TruthLimits, classes_of
 
 MAPS = package_data.registry() / "maps"
 FOVY = math.radians(48.8)
@@ -32,9 +32,9 @@ def peer():
 @pytest.mark.parametrize(
     ("name", "pose"),
     [
-        ("straight", Pose.at(0, 0, 0.095, yaw=math.pi / 2)),
-        ("left-curve", Pose.at(0.1, 0.6, 0.15, roll=0.1, pitch=0.2, yaw=1.9)),
-        ("kiwi-track", Pose.at(0, 0, 0.095, yaw=math.pi / 2)),
+        ("straight", CameraPose.at(0, 0, 0.095, yaw=math.pi / 2)),
+        ("left-curve", CameraPose.at(0.1, 0.6, 0.15, roll=0.1, pitch=0.2, yaw=1.9)),
+        ("kiwi-track", CameraPose.at(0, 0, 0.095, yaw=math.pi / 2)),
     ],
 )
 def test_shipped_maps_look_alike(peer, name, pose):
@@ -55,7 +55,7 @@ def test_models_and_blocks_that_intersect_look_alike(peer, write_map):
     folder = write_map({"model": models, "block": blocks})
     ours, theirs = Renderer(load_scene(folder), 320, 240, FOVY), peer.GlPeer(folder, 320, 240, FOVY)
     for angle in (0.0, 2.0, 4.0):
-        pose = Pose.at(3 - 3 * math.cos(angle), -3 * math.sin(angle), 1.2, pitch=0.25, yaw=angle)
+        pose = CameraPose.at(3 - 3 * math.cos(angle), -3 * math.sin(angle), 1.2, pitch=0.25, yaw=angle)
         view = ours.camera.view(pose)
         one, other = ours.render(pose), theirs.render(view.position, view.axes)
         assert peer.ssim(one, other) > 0.95
@@ -69,11 +69,11 @@ def test_boxes_hold_the_pixels_that_opengl_draws(peer, tmp_path):
         model = {"name": "cone", "file": "cone.obj", "color": [1, 0, 0], "instances": [[x, y, 0, angle]]}
         (tmp_path / "map.json").write_text(json.dumps({"model": [model]}))
         ours, theirs = Renderer(load_scene(tmp_path), 640, 480, FOVY), peer.GlPeer(tmp_path, 640, 480, FOVY)
-        pose = Pose.at(0, 0, 0.095)
+        pose = CameraPose.at(0, 0, 0.095)
         view = ours.camera.view(pose)
         picture = theirs.render(view.position, view.axes)
         rows, columns = np.nonzero((picture[..., 2] > 120) & (picture[..., 0] < 60))
-        (box,) = Truth(ours, classes_of([], ours.bodies.names), Limits(0.0, 0.0)).boxes(pose)
+        (box,) = SceneTruth(ours, classes_of([], ours.bodies.names), TruthLimits(0.0, 0.0)).boxes(pose)
         seen = (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
         told = (box.left, box.top, box.left + box.width, box.top + box.height)
         assert told == pytest.approx(seen, abs=1.5)

@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Output
 from services.base.flags import parse
 from services.base.manifest import load_manifest
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.service import build
@@ -132,7 +132,7 @@ def test_each_parameter_changes_the_picture(camera, name):
 def test_without_flags_the_picture_is_the_plain_one(camera):
     shot = camera().shoot((0.0, 0.1, 0.0), (0.0, 0.12, 0.05))
     plain = Renderer(load_scene(STRAIGHT), 160, 120, math.radians(48.8))
-    assert np.array_equal(shot.argb, plain.render(Pose.at(0, 0.12, 0.095, yaw=math.pi / 2 + 0.05)))
+    assert np.array_equal(shot.argb, plain.render(CameraPose.at(0, 0.12, 0.095, yaw=math.pi / 2 + 0.05)))
     assert shot.outputs == []
 
 

@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.light import DIRECTION, Light, direction_of
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import SceneOptions, load_scene
 
 
 def draw(folder, light, *pose, **angles):
-    return Renderer(load_scene(folder, SceneOptions(light)), 64, 48, 1.0).render(Pose.at(*pose, **angles))
+    return Renderer(load_scene(folder, SceneOptions(light)), 64, 48, 1.0).render(CameraPose.at(*pose, **angles))
 
 
 def test_what_nobody_asks_for_is_the_usual_light():

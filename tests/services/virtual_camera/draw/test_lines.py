@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.lines import TAPE
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import SceneOptions, load_scene
@@ -16,7 +16,7 @@ def test_tape_is_where_the_pinhole_puts_the_line(write_map):
     floor = {"name": "f", "dimension": [40, 40, 1], "color": [0, 0, 0], "instances": [[0, 0, -0.5, 0]]}
     folder = write_map({"obstacles": lines, "block": [floor]})
     renderer = Renderer(load_scene(folder, SceneOptions(lines=("left",), line_width=0.1)), 640, 480, 1.0)
-    image = renderer.render(Pose.at(0, 0, 0.5))
+    image = renderer.render(CameraPose.at(0, 0, 0.5))
     for row in (300, 340, 390):
         depth = 0.5 * renderer.camera.focal / (row + 0.5 - 240)
         middle, half = 320 - renderer.camera.focal * 0.3 / depth, renderer.camera.focal * 0.05 / depth

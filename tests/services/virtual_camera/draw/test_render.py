@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 
@@ -18,7 +18,7 @@ FOCAL = 240 / math.tan(FOVY / 2)
 
 
 def draw(folder, *pose, size=(640, 480), **angles):
-    return Renderer(load_scene(folder), *size, FOVY).render(Pose.at(*pose, **angles))
+    return Renderer(load_scene(folder), *size, FOVY).render(CameraPose.at(*pose, **angles))
 
 
 def red_box(image):
@@ -81,7 +81,7 @@ def test_silhouettes_cover_what_all_the_faces_would():
     small, large = (Renderer(scene, 480 * k, 360 * k, 0.5) for k in (1, 4))
     covered = []
     for x in np.linspace(-2.5, -2.1, 9):
-        pose = Pose.at(float(x), 1.4, 0.4, pitch=0.25)
+        pose = CameraPose.at(float(x), 1.4, 0.4, pitch=0.25)
         covered.append([(r.render(pose)[..., 0] < 30).sum() for r in (small, large)])
     few, many = np.sum(covered, axis=0)
     assert few > 500
@@ -137,7 +137,7 @@ def test_a_block_hides_what_stands_behind_it_though_its_centre_is_farther(write_
 
 def test_two_renders_are_equal_whatever_was_drawn_between(cube_at):
     folder = cube_at([4, 0, 0, 0.2], [9, 3, 0, 0], [0.6, 0, 0, 1])
-    pose, other = Pose.at(0, 0.1, 0.3, 0.02, 0.1, 0.1), Pose.at(1, 5, 2, yaw=3)
+    pose, other = CameraPose.at(0, 0.1, 0.3, 0.02, 0.1, 0.1), CameraPose.at(1, 5, 2, yaw=3)
     one, two = (Renderer(load_scene(folder), 320, 240, FOVY) for _ in range(2))
     first = one.render(pose)
     one.render(other)
@@ -222,6 +222,6 @@ def crowded(tmp_path_factory):
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.tuples(coordinate, coordinate, coordinate), st.tuples(angle, angle, angle))
 def test_any_pose_gives_a_whole_picture(crowded, place, angles):
-    image = crowded.render(Pose.at(*place, *angles))
+    image = crowded.render(CameraPose.at(*place, *angles))
     assert (image[..., 3] == 255).all()
-    assert np.array_equal(image, crowded.render(Pose.at(*place, *angles)))
+    assert np.array_equal(image, crowded.render(CameraPose.at(*place, *angles)))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.raster import SHIFT
 from services.virtual_camera.draw.shading import Group, cut, gather, silhouettes, whole
@@ -15,7 +15,7 @@ LIGHT = Light(np.array([-1.0, 0.0, 0.0]), 0.25, 0.75, True)
 
 def seen(*positions: tuple[float, float, float], turns: float = 0.0) -> Group:
     """White cubes of 1 m before a camera at the origin, 0.5 m high, that looks along x; the light is behind it."""
-    view = Pinhole(200, 100, 1.0).view(Pose.at(0, 0, 0.5))
+    view = Pinhole(200, 100, 1.0).view(CameraPose.at(0, 0, 0.5))
     count = len(positions)
     return gather(view, CUBE, np.full(3, 200.0), np.array(positions), np.full(count, turns), LIGHT)
 

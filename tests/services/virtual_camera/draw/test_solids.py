@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.bodies import Bodies
 from services.virtual_camera.draw.bsp import Tree
 from services.virtual_camera.draw.light import Light
@@ -49,7 +49,7 @@ def test_cubes_that_intersect_hide_one_another_as_rays_say(write_map, seed):
     random = np.random.RandomState(seed)
     spots = [(3 + random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), 0, random.uniform(0, 3)) for _ in range(3)]
     renderer = Renderer(crossing(write_map, *spots), 160, 120, 0.9)
-    pose = Pose.at(0, random.uniform(-1, 1), random.uniform(0.3, 2.5), pitch=0.3)
+    pose = CameraPose.at(0, random.uniform(-1, 1), random.uniform(0.3, 2.5), pitch=0.3)
     image, owner = renderer.render(pose), nearest(spots, renderer.camera.view(pose))
     labels, _ = renderer.labels(pose)
     assert np.isin(labels, [-1, 0, 1, 2]).all()
@@ -62,7 +62,7 @@ def test_cubes_that_intersect_hide_one_another_as_rays_say(write_map, seed):
 def test_a_cube_that_is_sunk_in_the_floor_shows_what_is_above(write_map):
     floor = {"name": "f", "dimension": [90, 90, 1], "color": [1, 1, 1], "instances": [[0, 0, -0.5, 0]]}
     renderer = Renderer(crossing(write_map, (3, 0, -0.6, 0), block=[floor]), 160, 120, 0.9)
-    red = renderer.labels(Pose.at(0, 0, 0.5))[0] == 0
+    red = renderer.labels(CameraPose.at(0, 0, 0.5))[0] == 0
     focal, rows = renderer.camera.focal, np.flatnonzero(red.any(axis=1))
     assert rows.max() + 1 == pytest.approx(60 + focal * 0.5 / 2.5, abs=1)
     assert rows.min() == pytest.approx(60 + focal * 0.1 / 3.5, abs=1)
@@ -72,7 +72,7 @@ def test_a_cube_through_a_wall_shows_on_both_sides(write_map):
     wall = {"name": "w", "dimension": [0.1, 9, 9], "color": [0, 0, 0], "instances": [[3, 0, 0, 0]]}
     renderer = Renderer(crossing(write_map, (3, 0, 0, 0.4), block=[wall]), 160, 120, 0.9)
     for x, yaw in ((0, 0), (6, math.pi)):
-        assert (renderer.labels(Pose.at(x, 0, 0.5, yaw=yaw))[0] == 0).sum() > 300
+        assert (renderer.labels(CameraPose.at(x, 0, 0.5, yaw=yaw))[0] == 0).sum() > 300
 
 
 def test_models_that_only_stand_side_by_side_are_not_cut_up(write_map):
@@ -93,5 +93,5 @@ def test_too_many_faces_are_not_cut_up_and_that_is_told(write_map, caplog):
     lines += [f"f {i + 1} {(i + 1) % steps + 1} {(i + 1) % steps + 1 + steps} {i + 1 + steps}" for i in range(steps)]
     model = {"name": "m", "file": "m.obj", "color": [1, 0, 0], "instances": [[5, 0, 0, 0], [5.5, 0, 0, 0]]}
     scene = load_scene(write_map({"model": [model]}, {"m.obj": "\n".join(lines)}))
-    Renderer(scene, 64, 48, 1.0).render(Pose.at(0, 0, 0.5))
+    Renderer(scene, 64, 48, 1.0).render(CameraPose.at(0, 0, 0.5))
     assert "2 models that intersect have" in caplog.text

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.faces import Face, TextureMap
 from services.virtual_camera.draw.surfaces import draw_backdrop, draw_face
 from services.virtual_camera.map.json_node import MapError
@@ -36,7 +36,7 @@ def floor(half: float, tile: float, size: int) -> Face:
     return Face(points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
 
 
-def traced(camera: Pinhole, pose: Pose, half: float, tile: float) -> tuple[np.ndarray, np.ndarray]:
+def traced(camera: Pinhole, pose: CameraPose, half: float, tile: float) -> tuple[np.ndarray, np.ndarray]:
     """The same floor by one ray a pixel: colours (h, w, 3) and where it is met at all (h, w)."""
     v, u = np.mgrid[0 : camera.height, 0 : camera.width] + 0.5
     left, up = (camera.width / 2 - u) / camera.focal, (camera.height / 2 - v) / camera.focal
@@ -53,7 +53,7 @@ def traced(camera: Pinhole, pose: Pose, half: float, tile: float) -> tuple[np.nd
     st.sampled_from([16, 64, 333]),
 )  # fmt: skip
 def test_a_textured_floor_is_what_rays_see(x, z, roll, pitch, yaw, size):
-    camera, pose = Pinhole(160, 120, math.radians(60)), Pose.at(x, -x, z, roll, pitch, yaw)
+    camera, pose = Pinhole(160, 120, math.radians(60)), CameraPose.at(x, -x, z, roll, pitch, yaw)
     image = np.zeros((120, 160, 4), np.uint8)
     draw_face(image, camera.view(pose), floor(4.0, 2.0, size))
     colours, met = traced(camera, pose, 4.0, 2.0)
@@ -72,7 +72,7 @@ def test_a_fine_texture_is_sharp_when_near_and_its_mean_when_far():
     face = Face(floor(50, 1, 8).points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
     camera, image, spread = Pinhole(128, 96, 1.0), np.zeros((96, 128, 4), np.uint8), []
     for height in (0.2, 4.0, 40.0):
-        draw_face(image, camera.view(Pose.at(0.3, 0.3, height, pitch=math.pi / 2)), face)
+        draw_face(image, camera.view(CameraPose.at(0.3, 0.3, height, pitch=math.pi / 2)), face)
         spread.append(float(image[..., 0].std()))
     assert spread[0] > 45  # of the 74 of the noise; interpolation between texels takes some
     assert 5 < spread[1] < 30
@@ -82,7 +82,7 @@ def test_a_fine_texture_is_sharp_when_near_and_its_mean_when_far():
 
 def test_a_floor_seen_from_below_or_along_is_not_drawn():
     camera, image = Pinhole(64, 48, 1.0), np.zeros((48, 64, 4), np.uint8)
-    draw_face(image, camera.view(Pose.at(0, 0, 0)), floor(4.0, 1.0, 64))
+    draw_face(image, camera.view(CameraPose.at(0, 0, 0)), floor(4.0, 1.0, 64))
     assert not image.any()
 
 
@@ -91,7 +91,7 @@ def test_a_tile_that_does_not_fit_the_canvas_is_wrapped():
     lie = TextureMap(texture, np.array([0.3, 0.1, 0.0]), np.array([tile, 0, 0]), np.array([0, tile, 0.0]))
     small = Face(floor(4.0, tile, 64).points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
     images = np.zeros((2, 48, 64, 4), np.uint8)
-    view = Pinhole(64, 48, 1.0).view(Pose.at(0, 0, 3, pitch=1.0))
+    view = Pinhole(64, 48, 1.0).view(CameraPose.at(0, 0, 3, pitch=1.0))
     for image, face in zip(images, (small, floor(4.0, tile, 64)), strict=True):
         draw_face(image, view, face)
     assert images[0].any()
@@ -101,7 +101,7 @@ def test_a_tile_that_does_not_fit_the_canvas_is_wrapped():
 @pytest.mark.parametrize("height", [480, 481])
 def test_the_horizon_is_in_the_middle_of_a_level_picture(height):
     image = np.zeros((height, 64, 4), np.uint8)
-    draw_backdrop(image, Pinhole(64, height, 0.8).view(Pose.at(3, 4, 0.1, yaw=1.0)), SKY, GROUND)
+    draw_backdrop(image, Pinhole(64, height, 0.8).view(CameraPose.at(3, 4, 0.1, yaw=1.0)), SKY, GROUND)
     sky = (image == SKY).all(axis=-1)
     assert sky[: height // 2].all()
     assert not sky[(height + 1) // 2 :].any()
@@ -109,16 +109,16 @@ def test_the_horizon_is_in_the_middle_of_a_level_picture(height):
 
 def test_a_roll_tilts_and_a_pitch_moves_the_horizon():
     camera, image = Pinhole(200, 200, math.radians(90)), np.zeros((200, 200, 4), np.uint8)
-    draw_backdrop(image, camera.view(Pose.at(0, 0, 1, pitch=math.atan(0.5))), SKY, GROUND)
+    draw_backdrop(image, camera.view(CameraPose.at(0, 0, 1, pitch=math.atan(0.5))), SKY, GROUND)
     assert [(image[row, 7] == SKY).all() for row in (49, 50)] == [True, False]  # looking down lifts it
-    draw_backdrop(image, camera.view(Pose.at(0, 0, 1, roll=math.atan(0.5))), SKY, GROUND)
+    draw_backdrop(image, camera.view(CameraPose.at(0, 0, 1, roll=math.atan(0.5))), SKY, GROUND)
     rows = [(image[:, column] == SKY).all(axis=-1).sum() for column in (0, 199)]
     assert rows == pytest.approx([150, 50], abs=1)  # the right side of the camera is low: the ground is there
 
 
 def test_looking_straight_up_there_is_only_sky():
     image = np.zeros((20, 20, 4), np.uint8)
-    draw_backdrop(image, Pinhole(20, 20, 1.0).view(Pose.at(0, 0, 1, pitch=-math.pi / 2)), SKY, GROUND)
+    draw_backdrop(image, Pinhole(20, 20, 1.0).view(CameraPose.at(0, 0, 1, pitch=-math.pi / 2)), SKY, GROUND)
     assert (image == SKY).all()
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.virtual_camera.camera import Pinhole, Pose
+from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.image.lens import Distortion, Lens
@@ -48,13 +48,13 @@ def edge_of(image):
 @pytest.mark.parametrize("k1", [-0.15, 0.3])
 def test_straight_lines_bend_as_the_polynomial_says(cube_at, k1):
     """The far edge of a white floor, well above the middle."""
-    scene, pose = load_scene(cube_at([60, 60, 0, 0])), Pose.at(40, 0, 1, pitch=0.45)
+    scene, pose = load_scene(cube_at([60, 60, 0, 0])), CameraPose.at(40, 0, 1, pitch=0.45)
     straight = edge_of(Renderer(scene, 160, 120, 1.0).render(pose))
     assert np.ptp(straight) <= 1
     optics = Optics(CAMERA, Distortion(k1))
     out = np.empty((120, 160, 4), np.uint8)
     renderer = Renderer(scene, optics.wide.width, optics.wide.height, optics.wide.fovy)
-    optics.expose(renderer, still(pose), Pose.at(0, 0, 0), 0, out)
+    optics.expose(renderer, still(pose), CameraPose.at(0, 0, 0), 0, out)
     across = np.linspace(-1.2, 1.2, 500)
     line = np.column_stack([across, np.full(500, (straight[80] - 59.5) / CAMERA.focal)])
     u, v = (Distortion(k1).forward(line) * CAMERA.focal + CAMERA.centre).T

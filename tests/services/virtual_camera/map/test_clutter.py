@@ -1,7 +1,7 @@
 import numpy as np
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import Pose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import SceneOptions, load_scene
 from services.virtual_camera.map.clutter import FARTHEST, NEAREST, clutter
@@ -24,7 +24,7 @@ def test_clutter_stands_around_the_models_and_has_no_name():
 def test_the_seed_alone_decides_the_clutter():
     def drawn(seed):
         renderer = Renderer(load_scene(STRAIGHT, SceneOptions(clutter=30, seed=seed)), 160, 120, 1.0)
-        return renderer.render(Pose.at(0, 0, 0.1, yaw=1.57))
+        return renderer.render(CameraPose.at(0, 0, 0.1, yaw=1.57))
 
     assert np.array_equal(drawn(3), drawn(3))
     assert not np.array_equal(drawn(3), drawn(4))
