@@ -75,7 +75,7 @@ def processes_with(mark: str) -> list[str]:
     return found
 
 
-def gone(mark: str, seconds: float = 8.0) -> bool:
+def gone(mark: str, seconds: float = 30.0) -> bool:
     deadline = time.monotonic() + seconds
     while processes_with(mark):
         if time.monotonic() > deadline:

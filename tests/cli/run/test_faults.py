@@ -53,7 +53,7 @@ def test_disk_with_the_report_is_full(desk: Desk, small_disk: Path, book: Book) 
     neighbour = desk.start(
         desk.bench.plan(READY + "time.sleep(2)\n" + PASS, slug="test-beside"), *HOST, report="beside"
     )
-    out, beside = full.communicate(timeout=60)[0], neighbour.communicate(timeout=60)[0]
+    out, beside = full.communicate(timeout=200)[0], neighbour.communicate(timeout=200)[0]
     assert neighbour.returncode == 0, beside
     (reason,) = re.findall(r"^ERROR   test-full  (.*) \(set-up", out, re.MULTILINE)
     assert reason.startswith("service 'dodo-recorder' of layer environment ended with exit code 1 after ")
@@ -71,7 +71,7 @@ def test_killed_runner_leaves_nothing(desk: Desk, isolation: str) -> None:
     process = desk.start(desk.bench.plan(judge=READY + WAIT), "--isolation", isolation)
     wait_for(process, "running")
     process.kill()
-    process.communicate(timeout=30)
+    process.communicate(timeout=200)
     assert gone(marks(desk))
 
 
@@ -84,12 +84,12 @@ def test_next_run_removes_what_a_killed_sandbox_left_on_the_host(desk: Desk, boo
     os.kill(int(sandboxes[0]), signal.SIGSTOP)
     process.kill()
     os.kill(int(sandboxes[0]), signal.SIGKILL)
-    process.communicate(timeout=30)
+    process.communicate(timeout=200)
     while len(processes_with(marks(desk))) > 1:
         time.sleep(0.02)
     assert processes_with(marks(desk))
     second = desk.start(desk.bench.plan(slug="second"), *HOST, report="second")
-    out, _ = second.communicate(timeout=30)
+    out, _ = second.communicate(timeout=200)
     assert second.returncode == 0, out
     (note,) = [line for line in out.splitlines() if line.startswith("removed what a killed run left: test: 1 proc")]
     assert gone(marks(desk))
@@ -104,7 +104,7 @@ def parent(pid: str) -> int:
 def test_two_runs_at_once(desk: Desk, book: Book) -> None:
     plans = [desk.bench.plan(slug=f"test-{n}", judge=READY + "time.sleep(1)\n" + PASS) for n in range(2)]
     processes = [desk.start(p, "--isolation", "host", report=p.slug) for p in plans]
-    outs = [p.communicate(timeout=60)[0] for p in processes]
+    outs = [p.communicate(timeout=200)[0] for p in processes]
     assert [p.returncode for p in processes] == [0, 0], outs
     results = [desk.results(p.slug)[0] for p in plans]
     assert len({result["cid"] for result in results}) == 2
