@@ -78,11 +78,13 @@ def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path
     spec, compose = hostile_test(tmp_path)
     words = [str(spec), "--application", str(compose), "--report", str(tmp_path / "hostile")]
     hostile = start(tmp_path, *words)
-    wait_for(hostile, "running")
-    theirs = lockstep(tmp_path, "docker")
-    assert hostile.poll() is None
-    (tmp_path / "stop" / "now").touch()
-    out, _ = hostile.communicate(timeout=300)
+    try:
+        wait_for(hostile, "running")
+        theirs = lockstep(tmp_path, "docker")
+        assert hostile.poll() is None
+    finally:
+        (tmp_path / "stop" / "now").touch()
+        out, _ = hostile.communicate(timeout=600)
     (test,) = results(tmp_path / "hostile").values()
     assert test["outcome"] == "failed", out
     assert re.match(r"application service '\w+' ended with exit code 0 after ", test["reason"]), test

@@ -1,4 +1,6 @@
-"""An application that harms whom it can reach, and drives nobody, until there is a file /stop/now.
+"""An application that harms whom it can reach, and drives nobody.
+
+It ends when there is a file /stop/now, at the latest after ten minutes.
 
 python3 hostile.py --cid=111 --name=video0.argb --harm=flood|groups|memory|tmp
 """
@@ -80,6 +82,7 @@ print(f"hostile: {FLAGS['harm']}", flush=True)
 harm = {"flood": flood, "groups": groups, "memory": memory, "tmp": tmp}[FLAGS["harm"]]
 thread = Thread(target=harm, daemon=True)
 thread.start()
-while not Path("/stop/now").exists() and thread.is_alive():
+end = time.monotonic() + 600
+while not Path("/stop/now").exists() and thread.is_alive() and time.monotonic() < end:
     time.sleep(0.1)
 sys.exit(0 if thread.is_alive() else 1)
