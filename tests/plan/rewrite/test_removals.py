@@ -1,0 +1,89 @@
+"""Access to the host that is removed from copied services."""
+
+from typing import Any
+
+import pytest
+
+from dodo_dsl.plan.rewrite.removals import remove_hardware, remove_machine_settings
+from tests.plan.rewrite.copies import copy
+
+
+def test_names_ports_and_policies() -> None:
+    own = copy({"image": "x", "container_name": "c", "restart": "always", "ports": ["1:1"], "profiles": []})
+    remove_machine_settings(own)
+    assert own.service == {"image": "x"}
+    assert own.changes == [
+        "a: container_name removed, compose names the container",
+        "a: restart removed, containers are not restarted",
+        "a: ports removed, tests publish none",
+        "a: profiles removed",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("service", "changed", "notes"),
+    [
+        ({"scale": 1}, {}, []),
+        ({"scale": 3}, {}, ["a: starts once, not 3 times"]),
+        (
+            {"scale": 3, "deploy": {"replicas": 2, "resources": {}}},
+            {"deploy": {"resources": {}}},
+            ["a: deploy keeps only resources and labels", "a: starts once, not 2 times"],
+        ),
+        ({"deploy": {"mode": "global"}}, {}, ["a: deploy keeps only resources and labels"]),
+        ({"deploy": {"labels": ["x"]}}, {"deploy": {"labels": ["x"]}}, []),
+    ],
+)
+def test_each_service_runs_once(service: dict[str, Any], changed: dict[str, Any], notes: list[str]) -> None:
+    own = copy(service)
+    remove_machine_settings(own)
+    assert (own.service, own.changes) == (changed, notes)
+
+
+FULL = {
+    "privileged": True,
+    "cap_add": ["NET_RAW", "SYS_ADMIN"],
+    "security_opt": ["seccomp:unconfined", "label:x"],
+    "build": {"context": ".", "privileged": True},
+    "devices": ["/dev/video0"],
+    "volumes": ["/dev/bus:/dev/bus", "./a:/a"],
+}
+UNPRIVILEGED = {"cap_add": ["NET_RAW"], "security_opt": ["label:x"], "build": {"context": "."}}
+
+
+def test_without_a_rig() -> None:
+    own = copy(dict(FULL))
+    remove_hardware(own)
+    assert own.service == {**UNPRIVILEGED, "volumes": ["./a:/a"]}
+    assert own.changes == [
+        "a: privileged removed",
+        "a: capabilities removed: SYS_ADMIN",
+        "a: security_opt keeps the engine's confinement",
+        "a: privileged removed from build",
+        "a: devices removed, the test has no hardware",
+        "a: /dev/bus removed, the test has no hardware",
+    ]
+
+
+def test_on_a_rig_devices_stay() -> None:
+    own = copy(dict(FULL), hil=True)
+    remove_hardware(own)
+    assert own.service == {**UNPRIVILEGED, "devices": ["/dev/video0"], "volumes": ["/dev/bus:/dev/bus", "./a:/a"]}
+
+
+def test_on_a_rig_that_allows_privileges_everything_stays() -> None:
+    own = copy(dict(FULL), hil=True, privileged=True)
+    remove_hardware(own)
+    assert (own.service, own.changes) == (FULL, [])
+
+
+def test_privileges_need_a_rig() -> None:
+    own = copy(dict(FULL), privileged=True)
+    remove_hardware(own)
+    assert "privileged" not in own.service
+
+
+def test_privileged_false_is_not_worth_a_note() -> None:
+    own = copy({"privileged": False})
+    remove_hardware(own)
+    assert (own.service, own.changes) == ({}, [])

@@ -1,0 +1,26 @@
+"""From messages about compiled files to lines of the spec."""
+
+import pytest
+
+from dodo_dsl.plan.trace import trace, traced
+from tests.plan.plans import BASE
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("service camera has no image", 8),
+        ('service "track-camera" has no image', 12),
+        ("no such service: my-camera", None),
+        ("cameras", None),
+        ("driver exited", None),
+    ],
+)
+def test_the_service_that_a_message_names(text: str, line: int | None) -> None:
+    place = trace(BASE, text)
+    assert (place.line if place else None) == line
+
+
+def test_a_message_with_its_place() -> None:
+    assert traced(BASE, "camera failed") == "camera failed (tests/drive/drive.dodo.yml:8:3)"
+    assert traced(BASE, "driver failed") == "driver failed"
