@@ -1,14 +1,13 @@
 """The emulated rig, built once where its tools are there."""
 
 import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.drive.applications import ROOT
 from tests.drive.rig import Hardware
+from tests.firmware.programs import make
 
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 
@@ -17,7 +16,7 @@ SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 def firmware() -> None:
     if shutil.which("avr-gcc") is None or not SIMAVR.is_file():
         pytest.skip("avr-gcc or simavr is missing: scripts/install-firmware-tools installs them on Debian")
-    subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), "firmware", "emulator"], check=True)
+    make("firmware", "emulator")
 
 
 @pytest.fixture

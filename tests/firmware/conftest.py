@@ -2,24 +2,17 @@
 
 import os
 import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.firmware.programs import BUILT, ROOT, Bench, Rig
+from tests.firmware.programs import BUILT, Bench, Rig, make
 
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 CLOSE = (-0.8, -0.6, -141.7)
 """Near home (m, m, degrees), so that homing is short. x and y are whole electrical turns from it, so that no rotor
 stands exactly between two poles in the middle."""
-
-
-def _make(*targets: str) -> None:
-    words = ["make", "-s", "-C", str(ROOT / "firmware"), *targets]
-    made = subprocess.run(words, check=False, capture_output=True, text=True)
-    assert made.returncode == 0, made.stdout + made.stderr
 
 
 @pytest.fixture(scope="session")
@@ -28,7 +21,7 @@ def bench_program() -> Path:
         return Path(os.environ["BENCH"])
     if shutil.which("gcc") is None or shutil.which("make") is None:
         pytest.skip("gcc or make is missing: scripts/install-firmware-tools installs them on Debian")
-    _make("bench")
+    make("bench")
     return BUILT / "bench"
 
 
@@ -37,7 +30,7 @@ def firmware() -> None:
     """The binary and its emulator are there."""
     if shutil.which("avr-gcc") is None or not SIMAVR.is_file():
         pytest.skip("avr-gcc or simavr is missing: scripts/install-firmware-tools installs them on Debian")
-    _make("firmware", "emulator")
+    make("firmware", "emulator")
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """The programs that the tests of the firmware drive: its core on this machine, and the emulated rig with its binary."""
 
+import fcntl
 import json
 import math
 import subprocess
@@ -19,6 +20,16 @@ MIDDLE = (0.1, -0.1, 11.0)
 
 
 NEAR_HOME = (-0.85, -0.65, -140.0)
+
+
+def make(*targets: str) -> None:
+    """Builds targets of the firmware's Makefile; test processes side by side do so one after the other."""
+    BUILT.mkdir(parents=True, exist_ok=True)
+    with (BUILT / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        words = ["make", "-s", "-C", str(ROOT / "firmware"), *targets]
+        made = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert made.returncode == 0, made.stdout + made.stderr
 
 
 class Program:

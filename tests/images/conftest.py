@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.firmware.programs import make
 from tests.images.dockerfile import ROOT
 
 BASE = "dodo-test-base"
@@ -52,7 +53,7 @@ def build(base_image: str, *words: str) -> dict[str, str]:
 def built(base_image: str) -> dict[str, str]:
     """All images under the names that compiled tests ask for; the gantry's holds the emulated rig where it can be."""
     if shutil.which("avr-gcc"):
-        subprocess.run(["make", "-s", "-C", ROOT / "firmware", "firmware", "emulator"], check=False)
+        make("firmware", "emulator")
     return build(base_image)
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from dodo_dsl.plan.model import Application, ApplicationService, Flag, Lockstep, Place, Plan, Service
+from dodo_dsl.plan.model import Application, ApplicationService, Flag, Lockstep, Place, Plan, PlannedService
 
 BASE = Plan(
     name="drive[light=dark]",
@@ -22,8 +22,8 @@ BASE = Plan(
     tag="sil",
     sandbox_image="dodo/sandbox:1",
     services=(
-        Service("environment", "camera", "virtual-camera", "dodo/camera:1", ("python", "-m", "camera")),
-        Service(
+        PlannedService("environment", "camera", "virtual-camera", "dodo/camera:1", ("python", "-m", "camera")),
+        PlannedService(
             "evaluation", "track-camera", "collision", "dodo/collision:1", (), (Flag("goal", "finish"),), judge=True
         ),
     ),
@@ -43,7 +43,7 @@ _flags = st.builds(Flag, _texts, _texts, st.sampled_from(["text", "memory", "mem
     Flag, _texts, _inside, st.sampled_from(["path", "report"])
 )
 _services = st.builds(
-    Service,
+    PlannedService,
     layer=st.sampled_from(["environment", "action", "evaluation"]),
     name=_names,
     uses=_texts,

@@ -1,19 +1,19 @@
 """The virtual camera of an emulated rig."""
 
 from dodo_dsl.plan.emulated_rig import hardware
-from dodo_dsl.plan.model import Flag, Service
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.spec.manifest import load_manifests
 
 MANIFESTS, _ = load_manifests()
 
 
-def camera(source: str, **flags: str) -> Service:
+def camera(source: str, **flags: str) -> PlannedService:
     given = (Flag("source", source), *(Flag(name, value) for name, value in flags.items()), Flag("cid", "140"))
-    return Service("environment", "eye", "camera", "dodo/camera:1", ("camera",), given)
+    return PlannedService("environment", "eye", "camera", "dodo/camera:1", ("camera",), given)
 
 
 def test_hardware_stays() -> None:
-    for service in (camera("/dev/video0"), Service("action", "pose", "gantry", "dodo/gantry:1", ("gantry",))):
+    for service in (camera("/dev/video0"), PlannedService("action", "pose", "gantry", "dodo/gantry:1", ("gantry",))):
         assert hardware(service, MANIFESTS, "dodo/virtual-camera:1") is service
 
 

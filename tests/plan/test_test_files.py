@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan import test_files
-from dodo_dsl.plan.test_files import Copy, FilesError, copies
+from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
 
 
 @pytest.fixture
@@ -18,16 +18,16 @@ def root(tmp_path: Path) -> Path:
 
 
 def test_a_file_and_a_folder(root: Path) -> None:
-    assert copies(root / "other.csv", root) == [Copy("other.csv", root / "other.csv")]
+    assert copies(root / "other.csv", root) == [FileCopy("other.csv", root / "other.csv")]
     assert copies(root / "map", root) == [
-        Copy("map/map.json", root / "map/map.json"),
-        Copy("map/sub/a.png", root / "map/sub/a.png"),
+        FileCopy("map/map.json", root / "map/map.json"),
+        FileCopy("map/sub/a.png", root / "map/sub/a.png"),
     ]
 
 
 def test_symlinks_within_the_registry(root: Path) -> None:
     (root / "map/link.csv").symlink_to(root / "other.csv")
-    assert Copy("map/link.csv", root / "other.csv") in copies(root / "map", root)
+    assert FileCopy("map/link.csv", root / "other.csv") in copies(root / "map", root)
 
 
 def test_symlinks_out_of_it(root: Path) -> None:
