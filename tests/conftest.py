@@ -21,6 +21,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-goldens", action="store_true", help="write expected output instead of comparing")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whatever needs the rig's firmware in its simulator is slow."""
+    for item in items:
+        if "firmware" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(autouse=True, scope="session")
 def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Runs of tests are no part of this user's history."""
