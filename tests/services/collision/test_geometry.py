@@ -37,6 +37,7 @@ def test_the_rectangle_is_the_one_that_shapely_turns(pose: VehiclePose) -> None:
     assert shapely.hausdorff_distance(outline(pose, KIWI), dense(pose, pose, 1)[0]) < 1e-9
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(poses, poses, lines)
 def test_the_way_touches_what_any_pose_on_it_touches(

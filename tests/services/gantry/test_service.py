@@ -27,7 +27,7 @@ from tests.services.gantry.fake_rig import FakeRig
 from tests.services.process import PATIENCE, ROOT, launch, receive, running, send
 
 FRAME, STATE, STATUS = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.system.SystemStatusMessage"
-INSTANTS = itertools.count(0, 20_000)
+INSTANTS = itertools.count(0, 100_000)
 MANIFEST = load_manifest(ROOT / "services" / "gantry")
 
 
@@ -202,9 +202,9 @@ def test_a_rig_that_falls_silent_ends_the_test_and_is_stopped(rig: FakeRig, monk
 
 
 def test_a_rig_that_never_answers(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link, "PATIENCE", 1.5)
+    monkeypatch.setattr(link, "PATIENCE", 0.5)
     rig.silent = True
-    assert refused(rig) == f"the rig at {rig.path} gave no answer for 1.5 s: it does not answer"
+    assert refused(rig) == f"the rig at {rig.path} gave no answer for 0.5 s: it does not answer"
 
 
 def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: FakeRig) -> None:
@@ -245,7 +245,7 @@ def test_the_log_tells_jitter_and_latency(cid: int, rig: FakeRig) -> None:
 @contextlib.contextmanager
 def ready(rig: FakeRig, *flags: str) -> Iterator[Gantry]:
     """The service in this process, at its start, after some turns."""
-    with built("gantry", f"--serial={rig.path}", "--freq=50", *flags) as model:
+    with built("gantry", f"--serial={rig.path}", "--freq=10", *flags) as model:
         turn(model, 3)
         yield model
 

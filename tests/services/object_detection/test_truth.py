@@ -114,6 +114,7 @@ KEYS = ["images", "annotations", "categories", "id", "name", "bbox", "width", "h
 values = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=3)
 
 
+@pytest.mark.slow
 @given(st.recursive(values, lambda v: st.lists(v, max_size=3) | st.dictionaries(st.sampled_from(KEYS), v)))
 def test_any_json_is_a_truth_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, document: Any) -> None:
     path = write(tmp_path_factory.getbasetemp(), document)

@@ -51,6 +51,7 @@ def test_a_box_holds_the_projection_of_all_corners(straight, x, y, z, pitch, yaw
         assert edges(box) == pytest.approx([f(part) for part in cut for f in (np.min, np.max)], abs=1e-6)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(-0.2, 0.2), st.floats(-0.3, 3), st.floats(0.05, 0.3), st.floats(1.0, 2.2))
 def test_a_model_that_is_seen_has_a_box_around_its_pixels(straight, x, y, z, yaw):
@@ -135,6 +136,7 @@ def test_clutter_has_no_boxes_and_changes_no_numbers():
     assert len(plain) > 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k1", [-0.25, 0.4])
 def test_through_a_lens_boxes_are_where_the_lens_shows_the_models(cube_at, k1):
     scene = load_scene(cube_at([3.05, 1.0, 0, 0], [3.05, -0.4, 0.5, 0], half=0.05, height=0.1))

@@ -34,6 +34,7 @@ def hit(face: Face, eye: np.ndarray, ray: np.ndarray) -> float | None:
     return far if far > 1e-6 and same_side else None
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 10**6))
 def test_what_a_ray_meets_first_is_drawn_last(scene, rays):
@@ -46,6 +47,7 @@ def test_what_a_ray_meets_first_is_drawn_last(scene, rays):
         assert met == sorted(met, reverse=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 10**6))
 def test_a_place_is_drawn_after_what_lies_behind_it_and_before_what_hides_it(scene, places):

@@ -219,6 +219,7 @@ def crowded(tmp_path_factory):
     return Renderer(load_scene(crowded_map(tmp_path_factory.mktemp("crowded"))), 96, 64, 1.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.tuples(coordinate, coordinate, coordinate), st.tuples(angle, angle, angle))
 def test_any_pose_gives_a_whole_picture(crowded, place, angles):
