@@ -1,6 +1,6 @@
 """Whether a camera is alive and lit: ``python -m services.camera.health_check --source=...`` prints one JSON object.
 
-It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason`` says why) or gives no picture (``error``).
+It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason``) or gives no picture (``error``).
 """
 
 import contextlib

@@ -47,7 +47,7 @@ class ServiceLink(Protocol):
 
 
 IsStopped = Callable[[], bool]
-"""Whether the clock was told to stop."""
+"""Whether the clock has to stop."""
 
 
 @dataclass(frozen=True)

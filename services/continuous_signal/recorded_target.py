@@ -31,8 +31,8 @@ def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
         elif envelope.data_type == id_:
             others[envelope.sender_stamp] += 1
     if not chosen or first is None:
-        told = f"; of other senders: {', '.join(map(str, sorted(others)))}" if others else ""
-        raise TargetError(f"{path}: holds no {signal.message} of sender {signal.sender}{told}")
+        found = f", but of {', '.join(map(str, sorted(others)))}" if others else ""
+        raise TargetError(f"{path}: has no {signal.message} of sender {signal.sender}{found}")
     times = np.array([time_of(envelope) for envelope in chosen], np.int64)
     return in_order(times - first, _values(path, chosen, signal, messages), first)
 

@@ -11,7 +11,7 @@ RESET = "reset"
 
 
 class DynamicModel(Service):
-    """Takes requests of any sender and says how the body moves, under the sender stamp ``frame-id``."""
+    """Takes requests of any sender and sends the body's velocities, under the sender stamp ``frame-id``."""
 
     def __init__(self, context: Context) -> None:
         self._log = context.log

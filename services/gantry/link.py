@@ -65,14 +65,14 @@ class Link:
             if lines != REQUEST_STATE:
                 self._status = None
             self._port.write(lines)
-            heard = self._answers(self._port, patience)
+            answers = self._answers(self._port, patience)
         except OSError as error:
             self._let_go()
             self._miss(str(error))
             return LinkAnswers()
         if self._now() - self._last_state > SILENCE:
             self._miss("it does not answer")
-        return heard._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *heard.refusals))
+        return answers._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *answers.refusals))
 
     def close(self) -> None:
         """Stop the rig, wait for its confirmation as far as the line allows, and close the line.

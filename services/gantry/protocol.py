@@ -44,7 +44,7 @@ SENTENCES = {
 }
 """What a status means that ends a test, with the rig as subject."""
 LATCHED = frozenset({Status.LIMIT, Status.STALL, Status.HOT, Status.FAULT})
-"""Faults for which the firmware has stopped the rig; it refuses to move, and says so, until STOP acknowledges them."""
+"""Faults for which the firmware has stopped the rig; it refuses to move until STOP acknowledges them."""
 
 
 @dataclass(frozen=True)

@@ -42,10 +42,10 @@ def trouble(link: Link, status: Status) -> str:
 
 def give(link: Link, word: Word, *arguments: float) -> Status | None:
     """Give a command; the status after it, None when that did not come. Raises RigError when it is refused."""
-    heard = link.exchange(command(word, *arguments) + command(Word.STATUS), ANSWER)
-    if heard.refusals:
-        raise RigError(f"the rig at {link.name} refuses {word}: {heard.refusals[0]}")
-    return heard.status
+    answers = link.exchange(command(word, *arguments) + command(Word.STATUS), ANSWER)
+    if answers.refusals:
+        raise RigError(f"the rig at {link.name} refuses {word}: {answers.refusals[0]}")
+    return answers.status
 
 
 def calibrate(link: Link, patience: float, poll: float = POLL) -> float:

@@ -17,7 +17,7 @@ OLD_FRAME = Path(__file__).with_name("frame-0.9.odvd")
 
 
 class Integration(Service):
-    """Takes kinematic states and says where the body is, both under the sender stamp ``frame-id``."""
+    """Takes kinematic states and sends the body's position, both under the sender stamp ``frame-id``."""
 
     def __init__(self, context: Context) -> None:
         flags = context.flags

@@ -1,4 +1,4 @@
-"""A recording as it is written: frames one after the other, up to a size, while recording is on."""
+"""A recording that is written: frames in order, up to a size, while recording is on."""
 
 import logging
 from pathlib import Path

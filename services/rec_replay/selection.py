@@ -96,5 +96,5 @@ def _parsed(text: str, known: MessageSet) -> tuple[int, int | None]:
     try:
         id_ = int(name) if name.isdecimal() else known.id(name)
     except UnknownMessage as error:
-        raise SelectionError(f"{error}, nor an id") from None
+        raise SelectionError(f"{error} (or give an id)") from None
     return id_, int(stamp) if slash else None

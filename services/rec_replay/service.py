@@ -80,7 +80,7 @@ class Replay(Service):
             yield Output(status, 0)
 
     def _next_picture(self, now: int) -> int:
-        """The update that shows the next picture, 0 when there is none or nobody knows when that will be."""
+        """The time of the update that shows the next picture, 0 when there is none or that is unknown."""
         number = int(np.searchsorted(self._pictures, self._player.position))
         is_over = number == len(self._pictures)
         if not self._player.playing or not len(self._pictures) or (is_over and not self._player.rewinds):

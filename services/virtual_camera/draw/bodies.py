@@ -26,7 +26,7 @@ _DRAWINGS: list[Callable[[Group], list[list[Piece]]]] = [silhouettes, whole, cut
 
 
 class Bodies:
-    """All copies of all models, in fixed order; ``tree`` says which region of space each stands in."""
+    """All copies of all models, in fixed order; ``tree`` divides the space in which they stand."""
 
     def __init__(self, models: tuple[Copies, ...], tree: Tree, light: Light, faces: Sequence[Face] = ()) -> None:
         self._models, self._light = models, light

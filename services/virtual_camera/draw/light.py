@@ -10,7 +10,7 @@ from services.virtual_camera.camera import Array
 
 AMBIENT, DIFFUSE = 0.62, 0.38
 DIRECTION = np.array([-0.35, -0.25, 0.9]) / np.linalg.norm([-0.35, -0.25, 0.9])
-"""The direction towards the light, in the world, where nothing else is said."""
+"""The direction towards the light, in the world, by default."""
 
 
 def direction_of(azimuth: float, elevation: float) -> Array:
@@ -23,7 +23,7 @@ def direction_of(azimuth: float, elevation: float) -> Array:
 class Light:
     """``direction`` (3,) points towards the light; ``on_blocks`` tells whether it shades blocks and the ground too.
 
-    A map's blocks are shown in their own colours as long as nobody asks for a light.
+    Without a chosen light a map's blocks are shown in their own colours.
     """
 
     direction: Array
@@ -37,7 +37,7 @@ class Light:
 
     @classmethod
     def of_flags(cls, azimuth: float | None, elevation: float | None, ambient: float | None) -> Self:
-        """From angles in deg and the share of light from everywhere; what is None is as usual."""
+        """From angles in deg and the share of light from everywhere; None for the usual value."""
         if azimuth is None and elevation is None and ambient is None:
             return cls.usual()
         x, y, z = DIRECTION.tolist()

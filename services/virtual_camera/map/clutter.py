@@ -7,7 +7,7 @@ from services.virtual_camera.draw.copies import Copies
 from services.virtual_camera.draw.shape import Shape, make_shape
 
 KINDS = 8
-"""At most so many sizes and colours: boxes of a kind are drawn together."""
+"""The most sizes and colours; boxes of a kind are drawn together."""
 NEAREST, FARTHEST = 0.5, 3.0
 """How far from the rectangle around all models the boxes stand, in m."""
 _SIDES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])

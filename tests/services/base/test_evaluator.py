@@ -1,6 +1,6 @@
 import pytest
 
-from services.base import Evaluator, Span, Verdict
+from services.base import Evaluator, JudgedTime, Verdict
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND
@@ -11,7 +11,7 @@ class Spans(Evaluator):
 
     def __init__(self, max_time: float = 10.0, max_delay: float = 0.0) -> None:
         super().__init__(max_time, max_delay)
-        self.spans: list[Span] = []
+        self.spans: list[JudgedTime] = []
         self.begun: list[int] = []
         self.advanced: list[int] = []
 
@@ -21,7 +21,7 @@ class Spans(Evaluator):
     def advance(self, now: int) -> None:
         self.advanced.append(now)
 
-    def decide(self, span: Span) -> Verdict:
+    def decide(self, span: JudgedTime) -> Verdict:
         self.spans.append(span)
         return Verdict("passed", span.within)
 
@@ -33,7 +33,7 @@ def test_the_time_of_a_test_is_limited() -> None:
     assert evaluator.verdict is None
     evaluator.update(BEGIN + 10 * SECOND + 1)
     assert evaluator.verdict == Verdict("passed", "within 10.00 s")
-    assert evaluator.spans == [Span("within 10.00 s", "for 10.00 s", False)]
+    assert evaluator.spans == [JudgedTime("within 10.00 s", "for 10.00 s", False)]
 
 
 def test_the_end_of_the_input_is_the_end() -> None:
@@ -41,7 +41,7 @@ def test_the_end_of_the_input_is_the_end() -> None:
     evaluator.begin(BEGIN)
     evaluator.end_of_input(BEGIN + 12_340_000)
     over = "the input ended after 12.34 s"
-    assert evaluator.spans == [Span(f"before {over}", f"until {over}", True)]
+    assert evaluator.spans == [JudgedTime(f"before {over}", f"until {over}", True)]
 
 
 def test_answers_may_follow_the_input() -> None:
@@ -52,7 +52,9 @@ def test_answers_may_follow_the_input() -> None:
     evaluator.update(BEGIN + 7 * SECOND - 1)
     assert evaluator.verdict is None
     evaluator.update(BEGIN + 7 * SECOND)
-    assert evaluator.spans == [Span("before the input ended after 5.00 s", "until the input ended after 5.00 s", True)]
+    assert evaluator.spans == [
+        JudgedTime("before the input ended after 5.00 s", "until the input ended after 5.00 s", True)
+    ]
 
 
 def test_there_is_one_verdict() -> None:

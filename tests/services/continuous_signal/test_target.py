@@ -145,10 +145,10 @@ def test_a_recording_counts_from_its_first_message_and_is_put_in_order(tmp_path:
 @pytest.mark.parametrize(
     ("samples", "said"),
     [
-        ([], "holds no opendlv.proxy.GroundSteeringRequest of sender 3"),
+        ([], "has no opendlv.proxy.GroundSteeringRequest of sender 3"),
         (
             [(1, 7, 0.0), (2, 4, 0.0)],
-            "holds no opendlv.proxy.GroundSteeringRequest of sender 3; of other senders: 4, 7",
+            "has no opendlv.proxy.GroundSteeringRequest of sender 3, but of 4, 7",
         ),
         (
             [(1, 3, 0.0), (2, 3, float("nan"))],
