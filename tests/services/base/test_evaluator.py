@@ -1,6 +1,7 @@
 import pytest
 
-from services.base import Evaluator, JudgedTime, Verdict
+from services.base import Verdict
+from services.base.evaluator import Evaluator, JudgedTime
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from services.base import Check, Verdict
+from services.base.verdict import Check, Verdict
 
 
 def test_the_line() -> None:

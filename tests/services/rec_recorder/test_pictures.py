@@ -16,6 +16,7 @@ from dodo_dsl.opendlv.memory import pixels
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
+from services.rec_recorder.service import Recorder
 from tests.services.built import MESSAGES, built
 from tests.services.process import running, send
 from tests.services.rec_replay.viewer import Viewer
@@ -55,7 +56,7 @@ def recorded(path: Path) -> list[int]:
 class Stage:
     """The recorder in this process, beside a camera."""
 
-    def __init__(self, recorder: Any, camera: CameraMemory) -> None:
+    def __init__(self, recorder: Recorder, camera: CameraMemory) -> None:
         self.recorder, self.camera = recorder, camera
         self.update()
 
