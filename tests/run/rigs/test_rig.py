@@ -125,15 +125,20 @@ def test_what_says_nothing_about_the_rig_does_not_quarantine_it(place: Place) ->
 
 
 def test_unplugged_in_mid_test_and_then_quarantined(place: Place) -> None:
+    over = threading.Event()
+
     def pull() -> None:
-        while not any(place.rig.velocity):
-            time.sleep(0.02)
+        while not any(place.rig.velocity) and not over.wait(0.02):
+            pass
         place.rig.unplug()
 
     puller = threading.Thread(target=pull)
     puller.start()
-    test = place.test(code=3)
-    puller.join()
+    try:
+        test = place.test(code=3)
+    finally:
+        over.set()
+        puller.join()
     assert test["outcome"] == "error" and "is lost: " in test["reason"] + "".join(test["last_lines"])
     assert not list((place.folder / "state").glob("*"))
     place.rig.plug()
