@@ -6,7 +6,7 @@ import pytest
 
 from dodo_dsl.cli.run.progress import LiveProgress, PlainProgress, about, choose, count
 from tests.cli.terminal import SAID, Terminal, shown, wide
-from tests.report.test_write import OUTCOME
+from tests.report.test_report_folder import OUTCOME
 
 
 @pytest.fixture(autouse=True)

@@ -4,7 +4,7 @@ from dataclasses import replace
 from io import StringIO
 
 from dodo_dsl.cli.run import summary
-from tests.report.test_write import OUTCOME
+from tests.report.test_report_folder import OUTCOME
 
 PASSED = replace(OUTCOME, name="ok", slug="ok", outcome="passed", reason="reached it", setup_s=1.0, execution_s=2.25)
 

@@ -100,40 +100,13 @@ def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
     assert (tmp_path / "project" / "logs").is_dir()
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"dodo": "results", "version": 1, "tests": [3]}', "[" * 100_000])
-def test_results_that_are_none(tmp_path: Path, text: str) -> None:
-    (tmp_path / "results.json").write_text(text)
-    with pytest.raises(results.ResultsError):
-        results.load(tmp_path / "results.json")
-
-
-STRANGE = [{"slug": 3}, {"slug": ["a"]}, {"outcome": "maybe"}, {"checks": 3}, {"reason": "\ud800"}, {"more": 1}]
-
-
-@pytest.mark.parametrize("change", STRANGE, ids=str)
-def test_results_of_a_strange_shape_are_none_and_stop_no_run(tmp_path: Path, change: dict[str, object]) -> None:
-    document = json.loads(results.to_json([OUTCOME]))
-    document["tests"][0].update(change)
-    (tmp_path / "results.json").write_text(json.dumps(document))
-    with pytest.raises(results.ResultsError):
-        results.load(tmp_path / "results.json")
-    forget(tmp_path, ["test"])
-
-
-def test_results_that_cannot_be_read_stop_no_run(tmp_path: Path) -> None:
-    (tmp_path / "results.json").mkdir()
-    with pytest.raises(results.ResultsError, match="cannot be read: Is a directory"):
-        results.load(tmp_path / "results.json")
-    forget(tmp_path, ["test"])
-
-
 def test_times_that_cannot_be_drawn_cost_no_report(tmp_path: Path) -> None:
     (problem,) = write_report(tmp_path, [OUTCOME], {}, {"test": []})
     assert problem.startswith("the times of these tests cannot be drawn: ")
     assert {p.name for p in tmp_path.iterdir()} == {"results.json", "junit.xml", "metrics.txt", "index.html"}
 
 
-def test_names_that_are_no_text_are_reported(tmp_path: Path) -> None:
+def test_names_that_utf_8_cannot_encode_are_reported(tmp_path: Path) -> None:
     outcome = replace(OUTCOME, reason="no file a\udcff", notes=("\udcff",), last_lines=("\udcff",))
     assert write_report(tmp_path, [outcome], {}) == []
     (loaded,) = results.load(tmp_path / "results.json")
