@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.plan.clock_service import CLOCK
@@ -103,6 +103,7 @@ CHECKS = st.fixed_dictionaries(
 )
 
 
+@settings(max_examples=50)
 @given(st.booleans(), NAMES, st.lists(CHECKS, max_size=4), st.booleans())
 def test_every_well_formed_verdict_is_taken(
     passed: bool, reason: str, checks: list[dict[str, Any]], ascii_: bool

@@ -138,8 +138,17 @@ DESK = ("desk", "--picture", "desk.png")
         (("nobody", *BOX), "there is no rig 'nobody', expected one of emulated, blind, desk, kiwi-static"),
         (("emulated",), "the emulated rig's camera sees the map of a test: name one with --test"),
         (("emulated", "--test", "hil-camera-scenes"), "matches 6 tests, expected one"),
-        (("emulated", "--test", "hil-camera"), "the test judges blue, yellow: write --classes cone_yellow=CLASS"),
-        (("emulated", "--test", "hil-camera", "--classes", "cone_red=red"), "there is no model 'cone_red' in the map"),
+        pytest.param(
+            *(("emulated", "--test", "hil-camera"), "the test judges blue, yellow: write --classes cone_yellow=CLASS"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            *(
+                ("emulated", "--test", "hil-camera", "--classes", "cone_red=red"),
+                "there is no model 'cone_red' in the map",
+            ),
+            marks=pytest.mark.slow,
+        ),
         (("emulated", "--picture", "desk.png"), "--picture has no virtual scene"),
     ],
 )
