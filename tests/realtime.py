@@ -2,19 +2,17 @@
 
 import contextlib
 import os
-import subprocess
-from typing import Any
 
 _NICE = -15
 
 
-def hurry(process: "subprocess.Popen[Any]") -> None:
+def hurry(process: int) -> None:
     """A process just started, and what it starts, goes ahead of ordinary ones where this user may have it so."""
     with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, process.pid, _NICE)
+        os.setpriority(os.PRIO_PROCESS, process, _NICE)
 
 
-def wait_for_nobody(process: "subprocess.Popen[Any]") -> None:
+def wait_for_nobody(process: int) -> None:
     """A process goes ahead of all others, as a rig waits for nobody; it must use little of the processor."""
     with contextlib.suppress(OSError):
-        os.sched_setscheduler(process.pid, os.SCHED_RR, os.sched_param(1))
+        os.sched_setscheduler(process, os.SCHED_RR, os.sched_param(1))

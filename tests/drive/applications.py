@@ -29,7 +29,7 @@ def dodo(*words: str, code: int, before: Sequence[str] = ()) -> str:
     """The output of a command, after the words ``before`` it, that must end with an exit code."""
     command = [*before, sys.executable, "-m", "dodo_dsl", *words]
     process = subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    hurry(process)
+    hurry(process.pid)
     try:
         output, _ = process.communicate(timeout=600)
     finally:

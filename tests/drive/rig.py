@@ -51,7 +51,7 @@ class Hardware:
         self._extremes: list[dict[str, Any]] = []
         words = [BUILT / "rig-emulator", "--start", START, "--link", path, BUILT / "gantry.elf"]
         self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        wait_for_nobody(self.process)
+        wait_for_nobody(self.process.pid)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -167,7 +167,7 @@ def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
         stderr=subprocess.STDOUT,
         text=True,
     )
-    hurry(runner)
+    hurry(runner.pid)
     try:
         yield Run(folder, rig, runner)
     finally:

@@ -85,7 +85,7 @@ def start(words: list[str], **variables: str) -> "subprocess.Popen[str]":
         stderr=subprocess.STDOUT,
         text=True,
     )
-    hurry(process)
+    hurry(process.pid)
     return process
 
 
