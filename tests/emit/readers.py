@@ -9,16 +9,21 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.main import main
+from dodo_dsl.cli import main
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = Path.home() / ".docker/cli-plugins/docker-compose"
 
 
+_parser = functools.cache(main.parser)
+
+
 def run(*words: str) -> tuple[int, str, str]:
-    """The exit code and the two outputs of a ``dodo`` command in this process."""
+    """The exit code and the two outputs of a ``dodo`` command in this process, with one parser for all."""
     stdout, stderr = StringIO(), StringIO()
-    code = main(words, stdout, stderr)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(main, "parser", _parser)
+        code = main.main(words, stdout, stderr)
     return code, stdout.getvalue(), stderr.getvalue()
 
 

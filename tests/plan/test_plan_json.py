@@ -13,7 +13,7 @@ from dodo_dsl.spec.settings import Settings
 from tests.plan.plans import BASE, plans
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(plans)
 def test_a_plan_survives_its_file(plan: Plan) -> None:
     assert from_json(to_json(plan)) == plan

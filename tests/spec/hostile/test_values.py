@@ -42,11 +42,13 @@ TEXTS = [
 quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    examples.write(f"# dodo.yml\nservices: [own]\n# own/judge/service.yml\n{MANIFEST}", tmp_path)
-    (tmp_path / "tests/base/base.dodo.yml").unlink()
-    return tmp_path
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A deployment with an evaluator of its own; each test writes the spec."""
+    path = tmp_path_factory.mktemp("values")
+    examples.write(f"# dodo.yml\nservices: [own]\n# own/judge/service.yml\n{MANIFEST}", path)
+    (path / "tests/base/base.dodo.yml").unlink()
+    return path
 
 
 def compiled(folder: Path, spec: str) -> dict[str, str]:
