@@ -16,10 +16,10 @@ from services.collision.model import TrackEvaluator
 from services.collision.obstacles import load, pick
 from services.collision.track import Track
 from services.dynamic_model.model import Vehicle
+from services.integrator.model import BodyPose as Attitude
 from services.integrator.model import Integrator, Twist
-from services.integrator.model import VehiclePose as Attitude
 from services.integrator.rotation import quaternion
-from services.virtual_camera.camera import VehiclePose as CameraPose
+from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import load_scene
 
