@@ -84,9 +84,10 @@ def test_flags_that_leave_something_open_are_refused(truth: Path, words: tuple[s
     assert said in str(raised.value)
 
 
+@pytest.mark.slow
 def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
     now = time.time_ns() // 1000
-    words = (f"--cid={cid}", f"--truth={truth}", *LIMITS)
+    words = (f"--cid={cid}", f"--truth={truth}", "--max-delay=4", *LIMITS)
     with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
         send(session, "dodo.TestBegin", sample_time=now)
         for frame in range(20):
