@@ -17,8 +17,8 @@ from dodo_dsl.opendlv.bus import session
 session.RECEIVE_BUFFER = 8192
 from services.base import run
 from services.rec_recorder import model, service
-write = model.Recording.write
-model.Recording.write = lambda self, envelope: (time.sleep(0.002), write(self, envelope))
+write = model.RecordingFile.write
+model.RecordingFile.write = lambda self, envelope: (time.sleep(0.002), write(self, envelope))
 sys.exit(run(pathlib.Path({str(package_data.root())!r}, "services", "rec_recorder"), service.build))
 """
 CROWDING_JUDGE = f"""
