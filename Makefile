@@ -48,7 +48,8 @@ check:
 
 test:
 	@$(MAKE) --no-print-directory -j 3 style types tools
-	$(PYTEST) --durations=15
+	$(PYTEST) -m "not slow"
+	.venv/bin/pytest --quiet -m slow --durations=15
 
 bench:
 	@scripts/setup dev
