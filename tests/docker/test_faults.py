@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import engine
+from dodo_dsl.run import engine, work_folder
 from dodo_dsl.run.capabilities import examine
 from tests.docker.broken_registry import BrokenRegistry
 from tests.docker.compose import IMAGE, Crate
@@ -160,4 +160,5 @@ def test_kept_project_stays_until_it_is_taken_down(crate: Crate) -> None:
     assert len([name for name in crate.left() if crate.mark in name]) == 7
     subprocess.run(line.removeprefix("take it down: ").split(), capture_output=True, check=True)
     assert not any(crate.mark in name for name in crate.left())
-    examine.clean()  # the record of the run
+    work_folder.reap_folders()  # with the record of the run
+    examine.clean()
