@@ -47,7 +47,10 @@ ENDS = {
 
 def told(process: "subprocess.Popen[str]", result: str) -> str:
     """The reason in the last lines of a run of one test."""
-    out, _ = process.communicate(timeout=600)
+    assert process.stdout is not None
+    with process.stdout as stream:  # lines that came before may still be in its buffer, which communicate() passes over
+        out = stream.read()
+    process.wait(timeout=600)
     assert "Traceback" not in out
     (reason,) = re.findall(rf"^{result} +\S+  (.*?)(?: \(set-up .*\))?$", out, re.MULTILINE)
     return str(reason)
