@@ -19,6 +19,9 @@ LINE = {
 }  # fmt: skip
 
 
+NEVER_BEGAN = error_outcome(plan("c"), "process", "no engine")
+
+
 def took(setup_s: float, execution_s: float, slug: str = "a") -> tuple[str, Outcome]:
     """A test of a name that passed."""
     outcome = error_outcome(plan(slug), "process", "it drove")
@@ -28,7 +31,7 @@ def took(setup_s: float, execution_s: float, slug: str = "a") -> tuple[str, Outc
 def test_what_was_added_is_kept_once_it_is_saved(tmp_path: Path) -> None:
     path = tmp_path / "state" / "history.jsonl"
     added = History(path, lambda: 4711.5)
-    added.add([took(1.0, 2.0), ("b", error_outcome(plan("b"), "process", "it broke"))])
+    added.add([took(1.0, 2.0), ("b", replace(took(1.0, 2.0, "b")[1], outcome="error")), ("c", NEVER_BEGAN)])
     assert not path.exists()
     added.save()
     added.add([took(3.0, 4.0)])
@@ -37,7 +40,7 @@ def test_what_was_added_is_kept_once_it_is_saved(tmp_path: Path) -> None:
     assert [(line["test"], line["when"], line["setup_s"]) for line in lines] == [("a", 4711, 1.0), ("a", 4711, 3.0)]
     found = History(path)
     assert found.seconds("a/a.dodo.yml", "a", "process", "realtime") == 5.0
-    assert found.seconds("b/b.dodo.yml", "b", "process", "realtime") is None
+    assert found.seconds("b/b.dodo.yml", "b", "process", "realtime") is None, "an error says nothing about the time"
     assert found.seconds("a/a.dodo.yml", "a", "docker", "realtime") is None
     assert found.seconds("a/a.dodo.yml", "a", "process", "lockstep") is None
 
