@@ -135,6 +135,5 @@ def test_services_are_waited_for_until_they_are_ready(host: Bench, monkeypatch: 
     services = tuple(replace(service, setup_s=30.0) for service in plan.services)
     (outcome,) = host.run(replace(plan, services=services))
     assert outcome.outcome == "passed"
-    assert outcome.setup_s is not None and outcome.execution_s is not None
+    assert outcome.setup_s is not None
     assert outcome.setup_s >= 0.5
-    assert outcome.execution_s >= 0.3
