@@ -57,7 +57,7 @@ def other_inputs(wiring: Wiring) -> list[str]:
 
 
 def _from_application(wiring: Wiring) -> list[End]:
-    """The ends that consume what the application may produce, and no service of the test does."""
+    """The inputs of services that only the application can feed."""
     return [
         end
         for end in wiring.consumed

@@ -1,5 +1,6 @@
 """The base of all evaluators: when a test is over, and the one verdict that follows."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ class JudgedTime(NamedTuple):
     """Whether the input ended, rather than the time of the test."""
 
 
-class Evaluator(Service):
+class Evaluator(Service, ABC):
     """Judges in test time (microseconds) and gives its verdict at the latest when time or input are over.
 
     Time zero is the first of ``begin``, ``update`` and whatever else looks at ``elapsed``; ``begin`` counts once and
@@ -93,9 +94,9 @@ class Evaluator(Service):
     def advance(self, now: int) -> None:
         """An update before the verdict."""
 
+    @abstractmethod
     def decide(self, span: JudgedTime) -> Verdict:
         """The verdict on what was observed in a span."""
-        raise NotImplementedError
 
     def _check_time(self, now: int) -> None:
         if self._ended is None:

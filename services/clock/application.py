@@ -51,7 +51,7 @@ class SteppedApplication:
                     return
                 if self._left <= 0:
                     self._link.clear()
-                    raise ApplicationSilent(self._sentence(f"nobody waited for a picture of '{camera.service}'"))
+                    raise ApplicationSilent(self._sentence(f"no reader waited for a picture of '{camera.service}'"))
                 self._link.pump(SLICE_S)
                 again = self._repeat_first(again)
             self.answers.seen()
@@ -102,7 +102,7 @@ class SteppedApplication:
     def _missing(self) -> str:
         if self.answers.is_expected:
             return " and ".join(name.rpartition(".")[2] for name in self.answers.missing) + " missing"
-        return f"nobody waited for the next picture of '{min(self._reading)}'"
+        return f"no reader waited for the next picture of '{min(self._reading)}'"
 
     def _sentence(self, what: str) -> str:
         return f"the application did not answer frame {self.frames} within {self._limit:g} s ({what})"

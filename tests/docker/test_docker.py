@@ -164,8 +164,6 @@ def test_the_emulated_rig_in_containers(tmp_path: Path) -> None:
         if "waiting for evaluation" in line:
             hurry_emulators()
     process.wait()
-    if "could not keep real time" in out and process.returncode == 3:
-        pytest.skip("this machine is too busy for the emulated rig: each of three attempts was late")
     assert process.returncode == 0, out
     assert {test["outcome"] for test in results(report).values()} == {"passed"}
     assert (report / "hil-dynamic" / "snapshot.png").read_bytes().startswith(b"\x89PNG")
@@ -236,8 +234,7 @@ def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
     up = ["docker", "compose", "up", "--exit-code-from", "track"]
     result = subprocess.run(up, cwd=folder, capture_output=True, text=True, check=False, timeout=900)
     subprocess.run(["docker", "compose", "down", "-v"], cwd=folder, capture_output=True, check=True)
-    # it drives in real time, in which a busy machine may fail it: what counts is that it ran and was judged
-    assert '"dodo": "verdict"' in result.stdout, result.stdout[-3000:] + result.stderr[-3000:]
+    assert '"outcome": "passed"' in result.stdout, result.stdout[-3000:] + result.stderr[-3000:]
     assert result.returncode == 0
 
 

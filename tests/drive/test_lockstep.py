@@ -96,7 +96,7 @@ def run_with_clock(tmp_path: Path, manner: str, code: int, flag: str, value: str
 def test_the_first_picture_has_a_patience_of_its_own(tmp_path: Path) -> None:
     """The 30 s are shortened in what was compiled."""
     test = run_with_clock(tmp_path, "silent", 1, "first-patience", "1")
-    nobody = "nobody waited for a picture of 'camera'"
+    nobody = "no reader waited for a picture of 'camera'"
     assert test["reason"] == f"the application did not answer frame 1 within 1 s ({nobody})"
     assert test["sim_s"] == 0.0
 

@@ -210,7 +210,7 @@ def test_an_end_in_the_middle_is_named(toys: Toys) -> None:
         toys.run(toys.application(most=7))
     assert (
         str(caught.value)
-        == "the application did not answer frame 8 within 0.2 s (nobody waited for a picture of 'eye')"
+        == "the application did not answer frame 8 within 0.2 s (no reader waited for a picture of 'eye')"
     )
 
 
