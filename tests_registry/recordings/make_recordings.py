@@ -32,7 +32,7 @@ from services.integrator.rotation import quaternion  # noqa: E402
 from services.rec_recorder.model import RecordingFile  # noqa: E402
 from services.virtual_camera.camera import Pinhole  # noqa: E402
 from services.virtual_camera.draw.render import Renderer  # noqa: E402
-from services.virtual_camera.draw.scene import Wishes, load_scene  # noqa: E402
+from services.virtual_camera.draw.scene import SceneOptions, load_scene  # noqa: E402
 from services.virtual_camera.image.lens import Distortion  # noqa: E402
 from services.virtual_camera.image.optics import Optics  # noqa: E402
 from services.virtual_camera.image.sensor import Sensor  # noqa: E402
@@ -99,7 +99,7 @@ class Recorded:
 
 def camera(recorded: Recorded, map_name: str, condition: Condition) -> VirtualCamera:
     """The camera in front of the car, which records what it sees."""
-    scene = load_scene(HERE.parent / "maps" / map_name, Wishes(clutter=CLUTTER, seed=SEED))
+    scene = load_scene(HERE.parent / "maps" / map_name, SceneOptions(clutter=CLUTTER, seed=SEED))
     optics = Optics(Pinhole(*SIZE, FOVY), LENS, Sensor(condition.exposure, 1.0, condition.noise, SEED), (), SHUTTER)
     renderer = Renderer(scene, optics.wide.width, optics.wide.height, optics.wide.fovy)
     mounted = mount(0.0, 0.0, ABOVE, 0.0, 0.0, 0.0)
