@@ -129,8 +129,7 @@ class ToyApplication:
             memory = SharedMemory.attach(self.name)
             try:
                 while not stopped() and len(self.seen) < self.most:
-                    if not memory.wait(0.05):
-                        continue
+                    memory.wait()  # as libcluon's readers do: one that looks away now and then may miss a picture
                     time.sleep(self.delay)
                     with memory.lock():
                         (place,), sampled = struct.unpack("<d", memory.buffer[:8]), memory.sample_time()
@@ -202,26 +201,30 @@ class Toys:
     def run(self, *applications: Runs) -> tuple[list[tuple[int, float]], Stepper]:
         """Raises what the Stepper raises."""
         stop = threading.Event()
-        with self._services(stop), Session(self.cid) as session:
-            apps = [threading.Thread(target=each.run, args=(stop.is_set,)) for each in applications]
-            for app in apps:
-                app.start()
-            channel = Channel(self.cid, session.messages)
-            ids = {name: session.messages.id(name) for name in session.messages.names()}
-            answers = Answers(filters(self.answers, ids), filters(self.relayed, ids))
-            exchange = Exchange(session, channel, answers.take)
-            advance = tuple(name for name in self.cast if name == "mover")
-            roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
-            application = SteppedApplication(answers, self.patience, exchange, stop.is_set)
-            stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
-            try:
-                stepper.connect()
-                stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
-            finally:
-                stop.set()
+        apps = [threading.Thread(target=each.run, args=(stop.is_set,)) for each in applications]
+        started: list[threading.Thread] = []
+        try:
+            with self._services(stop), Session(self.cid) as session:
                 for app in apps:
-                    app.join()
-                channel.close()
+                    app.start()
+                    started.append(app)
+                channel = Channel(self.cid, session.messages)
+                ids = {name: session.messages.id(name) for name in session.messages.names()}
+                answers = Answers(filters(self.answers, ids), filters(self.relayed, ids))
+                exchange = Exchange(session, channel, answers.take)
+                advance = tuple(name for name in self.cast if name == "mover")
+                roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
+                application = SteppedApplication(answers, self.patience, exchange, stop.is_set)
+                stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
+                try:
+                    stepper.connect()
+                    stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
+                finally:
+                    stop.set()
+                    channel.close()
+        finally:
+            for app in started:  # the services have removed the memory that it waits for
+                app.join()
         return self.evaluator.path, stepper
 
     @contextmanager
