@@ -157,13 +157,12 @@ def test_the_emulated_rig_in_containers(tmp_path: Path) -> None:
     if not (ROOT / "build" / "firmware" / "rig-emulator").exists():
         pytest.skip("the emulated rig is not built: make firmware")
     report = tmp_path / "report"
-    process = start(tmp_path, "hil-dynamic", "--retry-errors", "2", "--report", str(report))
     out = ""
-    for line in process.stdout or ():
-        out += line
-        if "waiting for evaluation" in line:
-            hurry_emulators()
-    process.wait()
+    with start(tmp_path, "hil-dynamic", "--retry-errors", "2", "--report", str(report)) as process:
+        for line in process.stdout or ():
+            out += line
+            if "waiting for evaluation" in line:
+                hurry_emulators()
     assert process.returncode == 0, out
     assert {test["outcome"] for test in results(report).values()} == {"passed"}
     assert (report / "hil-dynamic" / "snapshot.png").read_bytes().startswith(b"\x89PNG")
