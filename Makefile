@@ -4,6 +4,9 @@ DODO := .venv/bin/dodo
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 PYTEST := .venv/bin/pytest --quiet --numprocesses $(WORKERS) --dist loadgroup
 
+# Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help demo check test dev style types quick-tests tools lint bench firmware format goldens schema clean
 
 help:
@@ -35,7 +38,7 @@ types: dev
 	.venv/bin/mypy
 
 quick-tests: dev
-	$(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow" --hypothesis-profile=quick
 
 tools:
 	@scripts/install-test-tools

@@ -14,7 +14,8 @@ from hypothesis import HealthCheck, settings
 from tests.faults import Book
 
 settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("dodo")  # how fast a machine is decides no test
+settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
+settings.load_profile("dodo")  # how fast a machine is decides no test; `make check` chooses the other
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -50,6 +50,7 @@ def test_a_long_difference_is_shown_with_diff_only(output: Path) -> None:
     assert tree(output) == before
 
 
+@pytest.mark.slow
 def test_stale_tests_leave_the_output(output: Path) -> None:
     (output / "mine").mkdir()
     (output / "mine" / "notes.txt").write_text("keep")

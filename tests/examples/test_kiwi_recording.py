@@ -32,6 +32,7 @@ def perception(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     del sys.modules["perception"]
 
 
+@pytest.mark.slow
 def test_it_finds_what_a_person_sees(perception: Any, shared_data: Callable[[str], Path]) -> None:
     path, messages, decoder = shared_data("track-1-2025-05-08.rec"), MessageSet.standard(), VideoDecoder("h264")
     counts = []

@@ -4,6 +4,7 @@ import runpy
 import subprocess
 import sys
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -47,6 +48,7 @@ def test_only_valid_commands_move_the_core(bench: Bench, data: bytes) -> None:
         bench.extremes()
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=ONE_BENCH)
 @given(runs=st.lists(st.tuples(speeds, speeds, speeds, st.floats(0.05, 3)), min_size=1, max_size=6))
 def test_no_sequence_of_runs_leaves_the_workspace(bench: Bench, runs: list[tuple[float, ...]]) -> None:

@@ -138,6 +138,7 @@ def test_a_run_lives_on_while_the_clock_wraps(bench: Bench, wraps: float) -> Non
     assert bench.status() == Status.MOVING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wraps", WRAPS)
 def test_goto_is_watched_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
     bench.command(f"wraps {wraps}")

@@ -115,6 +115,7 @@ def test_many_jobs_are_a_warning_at_the_test_with_most_instances(plan: Plan, num
     assert problem.message.endswith(f"({number - 1} of this test)")
 
 
+@pytest.mark.slow
 def test_the_gate_counts_and_needs_stay_few(plan: Plan, on_rig: OnRig) -> None:
     plans = [replace(plan, slug=f"sil-{n}") for n in range(499)]
     assert problems(*plans, replace(plan, slug="last")) == []

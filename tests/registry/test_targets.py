@@ -73,6 +73,7 @@ def within(signal, target, limits) -> list[str]:
     return [name for name, ok in met.items() if ok]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["straight", "left-curve"])
 def test_the_example_application_is_within_the_limits_and_others_are_not(name):
     limits, way = parameters(f"sil-open-{name}", "signal"), rows(name)

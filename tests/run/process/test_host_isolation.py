@@ -69,6 +69,7 @@ def test_foreign_traffic_is_an_error_that_names_its_sender(cid: int, traffic: in
     assert list(folder.glob("*.json")) == []
 
 
+@pytest.mark.slow
 def test_a_slot_has_names_of_its_own_unless_it_is_alone(cid: int, folder: Path) -> None:
     slots = [leased(cid), leased(cid), leased(cid, alone=True)]
     assert all(leftovers.SLOT_NAME.fullmatch(slot.name) for slot in slots)
@@ -77,12 +78,14 @@ def test_a_slot_has_names_of_its_own_unless_it_is_alone(cid: int, folder: Path) 
     assert list(folder.glob("*.json")) == []
 
 
+@pytest.mark.slow
 def test_applications_without_flags_run_alone(tmp_path: Path) -> None:
     bench = Bench(tmp_path)
     words = ((), ("--cid=1",), ("--name=a",), ("--cid=1", "--name=a"))
     assert [runs_alone(bench.plan(command=command)) for command in words] == [True, True, True, False]
 
 
+@pytest.mark.slow
 def test_what_a_killed_run_left_is_removed(cid: int, folder: Path) -> None:
     """Processes of its slot, its shared memory and ready files, and its record."""
     name = f"dodo-{os.getpid():08x}-"

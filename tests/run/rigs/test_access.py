@@ -15,6 +15,7 @@ from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
 PYTHON = (sys.executable, "-c")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "kind", "sentence", "usage"),
     [
@@ -46,6 +47,7 @@ def test_a_program_that_hangs_is_ended() -> None:
         asyncio.run(query(PYTHON, ["import time; time.sleep(600)"], patience_s=0.2))
 
 
+@pytest.mark.slow
 def test_a_cancelled_program_stops_the_rig(tmp_path: Path) -> None:
     """It gets SIGTERM, and the time to act on it."""
     program = f"""

@@ -176,6 +176,7 @@ def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest
         toys.run(toys.application())
 
 
+@pytest.mark.slow
 def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each burst the first three get through only, as where the receive buffer is small."""
     plain, sent = channel.Channel.send, dict[int, tuple[float, int]]()
