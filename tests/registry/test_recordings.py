@@ -84,6 +84,6 @@ def test_pictures_are_those_of_the_committed_recording(made: Path, name: str) ->
 def test_two_makings_are_equal_byte_for_byte(made: Path, tmp_path: Path) -> None:
     maker = load()
     path = tmp_path / "static-rig.rec"
-    with maker.Recording(path) as recording:
+    with maker.RecordingFile(path) as recording:
         maker.look(maker.Recorded(recording))
     assert path.read_bytes() == (made / "static-rig.rec").read_bytes()
