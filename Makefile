@@ -2,12 +2,15 @@
 DODO := .venv/bin/dodo
 # One worker more than there are cores, as many tests wait for something
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
-PYTEST := .venv/bin/pytest --quiet --numprocesses $(WORKERS) --dist loadgroup
+PYTEST := .venv/bin/pytest --quiet
+JUNIT := build/tests
+# Three parts of `make test` run side by side: tests in real time first in line for the processor, the rest last
+PARTS := engine-tests realtime-tests other-tests
 
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test dev style types quick-tests tools lint bench firmware format goldens schema clean
+.PHONY: help demo check test dev style types quick-tests $(PARTS) tools lint bench firmware format goldens schema clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
@@ -38,7 +41,16 @@ types: dev
 	.venv/bin/mypy
 
 quick-tests: dev
-	$(PYTEST) -m "not slow" --hypothesis-profile=quick
+	$(PYTEST) -n $(WORKERS) -m "not slow" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
+
+engine-tests:
+	nice -n 5 $(PYTEST) -m engine --junitxml=$(JUNIT)/engine.xml
+
+realtime-tests:
+	$(PYTEST) -m realtime --junitxml=$(JUNIT)/realtime.xml
+
+other-tests:
+	nice -n 10 $(PYTEST) -n $(WORKERS) --dist loadgroup -m "not engine and not realtime" --junitxml=$(JUNIT)/others.xml
 
 tools:
 	@scripts/install-test-tools
@@ -51,8 +63,8 @@ check:
 
 test:
 	@$(MAKE) --no-print-directory -j 3 style types tools
-	$(PYTEST) -m "not slow"
-	.venv/bin/pytest --quiet -m slow --durations=15
+	@status=0; $(MAKE) --no-print-directory -j 3 --keep-going --output-sync=target $(PARTS) || status=$$?; \
+		.venv/bin/python scripts/slowest-tests $(JUNIT)/engine.xml $(JUNIT)/realtime.xml $(JUNIT)/others.xml; exit $$status
 
 bench:
 	@scripts/setup dev

@@ -23,9 +23,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever needs the rig's firmware in its simulator is slow."""
+    """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow."""
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.realtime)
+        if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
 
 

@@ -17,7 +17,7 @@ from tests.run.desk import wait_for
 from tests.run.helpers import BEGUN, DRIVES, PASS, READY, WAIT
 from tests.run.process.test_faults import FAULTS, NEIGHBOUR
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("host"), pytest.mark.usefixtures("images")]
+pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
 HUNGRY = """
 held = []

@@ -14,7 +14,7 @@ from dodo_dsl.run.docker.archive import copy_out
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, reap_projects
 from dodo_dsl.run.docker.client import connect
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("host")]
+pytestmark = pytest.mark.engine
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import yaml
 from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.drive.applications import ROOT, dodo, results
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.realtime
 
 BOTH = ("sil-closed-straight", "sil-closed-left-curve")
 
@@ -38,7 +38,6 @@ def test_they_pass_at_once_in_real_time(tmp_path: Path) -> None:
     good_drives(tmp_path)
 
 
-@pytest.mark.xdist_group("host")
 def test_they_pass_at_once_on_the_host_and_leave_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Shared memory and semaphores of the host, which this run has for itself, and token files are gone at the end."""
     if why := namespaces_refusal():

@@ -21,7 +21,7 @@ from tests.faults import Book
 from tests.realtime import hurry
 from tests.run.desk import processes_with, wait_for
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.realtime
 
 SHIMS = Path(__file__).parent / "shims"
 SPEC = """

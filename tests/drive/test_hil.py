@@ -48,7 +48,7 @@ MICROSTEPS = tuple(1.01 * step for step in MICROSTEP.values())
 MEASURED, TRUE = 0, 1
 
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("firmware")]
+pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("firmware")]
 
 
 def run(report: Path, *words: str, code: int) -> dict[str, Any]:

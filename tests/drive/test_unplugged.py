@@ -21,7 +21,7 @@ from services.gantry.rig_table import ACCELERATION
 from tests.drive.applications import results
 from tests.drive.rig import REST, Hardware, Pose, Run, at_its_start, on_its_way, running
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("unplugged")]
+pytestmark = pytest.mark.realtime
 
 BEGIN, AT_ONCE, REST_YAW = 0.55, 0.1, 0.05
 """s until braking begins, s in which a rig without current stands, rad/s below which it does (rotors swing)."""

@@ -19,7 +19,7 @@ from tests.images.conftest import build, docker
 from tests.images.dockerfile import ROOT
 from tests.images.layers import layers
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("host")]
+pytestmark = pytest.mark.engine
 
 MANIFESTS, _ = load_manifests()
 HARDENED = ("--read-only", "--cap-drop", "ALL", "--security-opt", "no-new-privileges:true")

@@ -61,7 +61,7 @@ def until(is_so: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize("module", CAMERAS)
 def test_readers_and_the_recorder_survive_a_restart_of_a_camera(module: str, cid: int, tmp_path: Path) -> None:
     name, rec = f"dodo-test-{uuid.uuid4().hex[:8]}", tmp_path / "test.rec"
@@ -86,7 +86,7 @@ def test_readers_and_the_recorder_survive_a_restart_of_a_camera(module: str, cid
         assert recorder.poll() is None and application.poll() is None
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_second_recorder_goes_on_where_a_killed_one_ended(cid: int, tmp_path: Path) -> None:
     parts = []
     with running("beacon", tmp_path, f"--cid={cid}", *WAY, "--points=0 0,90 0", "--speed=1") as beacon:
@@ -100,7 +100,7 @@ def test_a_second_recorder_goes_on_where_a_killed_one_ended(cid: int, tmp_path: 
     assert all((np.diff(part) == 20_000).all() for part in parts) and parts[0][-1] < parts[1][0]
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_an_evaluator_survives_a_restart_of_what_moves_the_vehicle(cid: int, tmp_path: Path) -> None:
     track = ["--map-path=tests_registry/maps/straight", "--gates=finish", "--walls=left,right", "--frame-id=3"]
     with Session(cid) as session, running("collision", tmp_path, f"--cid={cid}", *track) as judge:

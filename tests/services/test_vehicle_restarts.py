@@ -24,7 +24,7 @@ def pressed(session: Session, message: str, true: Callable[[float], bool], pedal
     raise AssertionError("it did not come to be")
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_the_integrator_survives_a_restart_of_the_dynamic_model(cid: int, tmp_path: Path) -> None:
     with Session(cid) as session, running("integrator", tmp_path, f"--cid={cid}") as integrator:
         with running("dynamic_model", tmp_path, f"--cid={cid}") as first:
@@ -41,7 +41,7 @@ def test_the_integrator_survives_a_restart_of_the_dynamic_model(cid: int, tmp_pa
         assert integrator.poll() is None
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_the_dynamic_model_survives_a_restart_of_the_integrator(cid: int, tmp_path: Path) -> None:
     with Session(cid) as session, running("dynamic_model", tmp_path, f"--cid={cid}") as vehicle:
         for start in (0, 5):

@@ -19,7 +19,7 @@ def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) 
     assert "RIG" in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_manual_use(place: Place) -> None:
     assert "fake: the rig is idle, x = -0.880 m" in place.dodo("rig", "status", code=0)
     moved = place.dodo("rig", "goto", "fake", "0.1", "-0.2", "45", code=0)
@@ -32,7 +32,7 @@ def test_manual_use(place: Place) -> None:
     assert "there is no rig 'fke'" in place.dodo("rig", "home", "fke", code=2)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_one_user_at_a_time(place: Place) -> None:
     with busy(place, "rig", "goto", "fake", "0", "0", "0"):
         said = place.dodo("rig", "status", "fake", "--wait", "0.3", code=3)
@@ -40,7 +40,7 @@ def test_one_user_at_a_time(place: Place) -> None:
     assert place.rig.last() == "STOP"
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_two_repositories_that_name_one_port_exclude_each_other(place: Place, tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.mkdir()
@@ -51,7 +51,7 @@ def test_two_repositories_that_name_one_port_exclude_each_other(place: Place, tm
         assert "no device came free within 0.3 s; test 'dodo rig goto'" in said
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_status_shows_a_fault_until_calibrate_acknowledges_it(place: Place) -> None:
     place.rig.status = 3
     for _ in range(2):

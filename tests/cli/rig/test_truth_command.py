@@ -57,7 +57,7 @@ def files(place: Path, stem: str) -> list[str]:
     return sorted(path.name for path in place.iterdir() if stem in path.name)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_the_scene_knows_the_shipped_truth(place: Path) -> None:
     said = rig("emulated", "--test", "hil-camera", "--classes", CONES, "-o", "board.json")
     assert said.startswith("board.json: 8 boxes (4 blue, 4 yellow) in 640 x 480 pixels")
@@ -76,7 +76,7 @@ def test_the_scene_knows_the_shipped_truth(place: Path) -> None:
         assert changed[round(y) : round(y) + 2, round(x) + 5 : round(x + width) - 5].any(axis=0).all()
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_the_scene_has_the_light_of_its_test(place: Path) -> None:
     means = []
     for light in ("0.5", "1.6"):
@@ -87,7 +87,7 @@ def test_the_scene_has_the_light_of_its_test(place: Path) -> None:
     assert boxes(place / "0.5.json") == boxes(place / "1.6.json")
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_test_whose_truth_is_missing_gets_one(place: Path) -> None:
     path = place / "tests" / "truths" / "static-rig.json"
     path.unlink()
@@ -95,7 +95,7 @@ def test_a_test_whose_truth_is_missing_gets_one(place: Path) -> None:
     assert len(boxes(path)) == 8
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_boxes_marked_by_hand_on_a_snapshot(place: Path) -> None:
     assert "desk-1.png: a snapshot of 320 x 240 pixels; mark boxes with" in rig("desk", "-o", "desk-1.json")
     assert files(place, "desk-1") == ["desk-1.png"]
@@ -140,14 +140,14 @@ DESK = ("desk", "--picture", "desk.png")
         (("emulated", "--test", "hil-camera-scenes"), "matches 6 tests, expected one"),
         pytest.param(
             *(("emulated", "--test", "hil-camera"), "the test judges blue, yellow: write --classes cone_yellow=CLASS"),
-            marks=pytest.mark.slow,
+            marks=pytest.mark.realtime,
         ),
         pytest.param(
             *(
                 ("emulated", "--test", "hil-camera", "--classes", "cone_red=red"),
                 "there is no model 'cone_red' in the map",
             ),
-            marks=pytest.mark.slow,
+            marks=pytest.mark.realtime,
         ),
         (("emulated", "--picture", "desk.png"), "--picture has no virtual scene"),
     ],
@@ -157,14 +157,14 @@ def test_what_is_not_a_truth(place: Path, words: tuple[object, ...], sentence: s
     assert files(place, "desk-2") == []
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_camera_that_gives_nothing_is_an_error(place: Path) -> None:
     (place / "desk.png").unlink()
     assert "desk.png" in rig("desk", "-o", "desk-2.json", *BOX, code=3)
     assert files(place, "desk-2") == []
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_what_help_and_page_show_works(place: Path) -> None:
     page = (ROOT / "docs" / "rigs.md").read_text()
     for words in re.findall(r"dodo rig truth ([^`\n]*)", page.split("## Truth files")[1]):
@@ -180,7 +180,7 @@ def test_what_help_and_page_show_works(place: Path) -> None:
     assert boxes(place / "truths" / "desk.json") == boxes(place / "marked.json")
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_dark_picture_is_taken_with_a_warning(place: Path) -> None:
     cv2.imwrite("desk.png", np.kron(np.eye(8), np.ones((40, 40))).astype(np.uint8))
     said = rig("desk", "-o", "dusk.json", *BOX)

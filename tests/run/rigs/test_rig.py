@@ -20,7 +20,7 @@ from tests.run.rigs.place import APPLICATION, Place, place
 from tests.services.process import receive, running, send
 
 __all__ = ["place"]
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.realtime
 
 
 def test_a_hil_test_on_a_real_rig(place: Place) -> None:

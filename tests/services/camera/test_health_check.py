@@ -49,9 +49,9 @@ def test_the_program_prints_its_result(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("mode", "words"),
     [
-        pytest.param("lit", "", marks=pytest.mark.slow),
+        pytest.param("lit", "", marks=pytest.mark.realtime),
         ("dark", "is it lit?"),
-        pytest.param("frozen", "has shown the same picture for 2 s", marks=pytest.mark.slow),
+        pytest.param("frozen", "has shown the same picture for 2 s", marks=pytest.mark.realtime),
         ("lost", "rpicam-vid ended with code 1"),
     ],
 )

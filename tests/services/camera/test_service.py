@@ -27,7 +27,7 @@ def attached(names: list[str]) -> tuple[SharedMemory, SharedMemory]:
     return argb, i420
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_video_goes_into_both_memories_at_its_times(tmp_path: Path, names: list[str], video: Path) -> None:
     flags = [*names, *SIZE, "--source=file", f"--file={video}", "--freq=20"]
     with running("camera", tmp_path, *flags):
@@ -47,7 +47,7 @@ def test_a_video_goes_into_both_memories_at_its_times(tmp_path: Path, names: lis
     assert len(set(greys)) > 1
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_the_pipe_of_a_raspberry_pi(tmp_path: Path, names: list[str], rpicam: Path) -> None:
     before = time.time_ns() // 1000
     with running("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05") as process:
@@ -62,7 +62,7 @@ def test_the_pipe_of_a_raspberry_pi(tmp_path: Path, names: list[str], rpicam: Pa
         assert process.wait(PATIENCE) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_its_state_is_told_under_the_stamp_that_is_given(
     tmp_path: Path, cid: int, names: list[str], video: Path
 ) -> None:
@@ -72,7 +72,7 @@ def test_its_state_is_told_under_the_stamp_that_is_given(
     assert (state.code, state.description) == (0, "the camera gives pictures")
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_camera_that_is_lost_ends_it_with_a_sentence(
     tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -83,7 +83,7 @@ def test_a_camera_that_is_lost_ends_it_with_a_sentence(
     assert "rpicam-vid ended with code 1: ERROR: *** Device timeout detected ***" in err and "Traceback" not in err
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
     tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

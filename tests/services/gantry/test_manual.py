@@ -58,7 +58,7 @@ def test_uncalibrated(rig: FakeRig) -> None:
     assert manual(rig, "calibrate")["status"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_check_of_a_good_rig_and_of_one_that_loses_steps(rig: FakeRig) -> None:
     rig.homes_slowly, rig.at = True, [-0.85, -0.65, -2.5]
     result = manual(rig, "check")

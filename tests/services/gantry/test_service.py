@@ -71,7 +71,7 @@ def drive_here(model: Gantry, true: Callable[[], object], **fields: float) -> No
     until(arrived)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_it_starts_where_it_is_told_and_follows_the_vehicle(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig, "--x=-0.5", "--y=0.1", "--yaw=90", "--status-id=4"):
         assert rig.at == pytest.approx([-0.5, 0.1, math.pi / 2], abs=1e-3)
@@ -89,7 +89,7 @@ def test_it_starts_where_it_is_told_and_follows_the_vehicle(cid: int, rig: FakeR
         assert abs(envelope.sample_time - envelope.sent) < 1_000_000
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_stops_the_rig(cid: int, rig: FakeRig, number: signal.Signals) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
@@ -99,7 +99,7 @@ def test_a_signal_stops_the_rig(cid: int, rig: FakeRig, number: signal.Signals) 
         assert rig.last() == "STOP" and not any(rig.velocity)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_the_end_of_the_input_stops_the_rig_and_the_frames_go_on(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig):
         drive(session, lambda: any(rig.velocity), vx=0.3)
@@ -111,7 +111,7 @@ def test_the_end_of_the_input_stops_the_rig_and_the_frames_go_on(cid: int, rig: 
         assert len(rig.commands("RUN")) == runs
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_vehicle_that_falls_silent_is_not_driven_on(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig):
         drive(session, lambda: any(rig.velocity), vx=0.3)
@@ -145,7 +145,7 @@ def test_a_fault_from_before_is_seen_and_not_erased(rig: FakeRig, status: int, w
     assert rig.status == status and not rig.commands("STOP") and not rig.commands("CALIBRATE")
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_watchdog_of_its_own_accord_ends_the_test(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         for _ in range(60):  # longer than it is lenient after it opened the line
@@ -230,7 +230,7 @@ def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: Fa
             model.end_of_input(0)  # nothing more is expected to come
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_the_log_tells_jitter_and_latency(cid: int, rig: FakeRig) -> None:
     with Session(cid) as session, gantry(cid, rig) as process:
         for _ in range(20):
@@ -269,7 +269,7 @@ def test_it_calibrates_only_on_request(rig: FakeRig) -> None:
         assert rig.at == pytest.approx([0, 0, 0], abs=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_signal_on_the_way_to_the_start_stops_the_rig(cid: int, rig: FakeRig) -> None:
     rig.status = 1  # never idle
     process = launch("gantry", rig.path.parent, f"--cid={cid}", f"--serial={rig.path}")

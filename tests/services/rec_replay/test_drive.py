@@ -131,7 +131,7 @@ def psnr(one: bytes, other: bytes) -> float:
     return math.inf if error == 0 else 10 * math.log10(255**2 / error)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize("flags", [("--lossless",), ()], ids=["lossless", "default-quality"])
 def test_a_drive_recorded_and_replayed(cid: int, tmp_path: Path, flags: tuple[str, ...]) -> None:
     path = tmp_path / "drive.rec"
