@@ -27,7 +27,7 @@ help:
 demo:
 	@scripts/setup
 	$(DODO) compile
-	$(DODO) run --level sil --level dil --level hil $(shell scripts/have-rig || echo "'sil-*' 'dil-*' 'hil-camera*'")
+	$(DODO) run 'sil-*' 'dil-*' hil-camera $(shell scripts/have-rig && echo hil-dynamic)
 
 dev:
 	@scripts/setup dev

@@ -93,7 +93,7 @@ def test_ones_own_test_is_never_left_out(newcomer: Path) -> None:
     compose.write_text(compose.read_text().replace("opendlv.proxy.GroundSteeringRequest, ", ""))
     stdout = StringIO()
     assert main(["compile", "--check"], stdout, StringIO()) == 2
-    assert f"{SPEC}:10:3: error[no-producer]: 'vehicle' needs opendlv.proxy.GroundSteeringRequest" in stdout.getvalue()
+    assert f"{SPEC}:11:3: error[no-producer]: 'vehicle' needs opendlv.proxy.GroundSteeringRequest" in stdout.getvalue()
     assert "tests_registry" not in stdout.getvalue()
     assert "sil-closed-straight" in stdout.getvalue().splitlines()[0]
 

@@ -71,9 +71,6 @@ def compiled(folder: Path) -> Path:
     out, own = folder / "generated", folder / "deployment"
     for name in ("maps", "recordings", "truths", *LOCKSTEP):
         shutil.copytree(ROOT / "tests_registry" / name, own / "tests" / name)
-    for name in LOCKSTEP:
-        spec = own / "tests" / name / f"{name}.dodo.yml"
-        spec.write_text(spec.read_text().replace("\nclock: lockstep", "") + "clock: lockstep\n")
     application = ROOT / "examples" / "kiwi" / "docker-compose.yml"
     (own / "dodo.yml").write_text(f"dodo: 1\nregistry: [tests]\napplication: {application}\n")
     command = [sys.executable, "-m", "dodo_dsl", "compile", *LOCKSTEP, "-o", str(out)]

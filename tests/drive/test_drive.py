@@ -43,7 +43,7 @@ def test_they_pass_at_once_on_the_host_and_leave_nothing(tmp_path: Path, monkeyp
     if why := namespaces_refusal():
         pytest.skip(f"no namespaces here: {why}")
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    words = [*BOTH, "--isolation", "host", "--clock", "lockstep", "-j", "2", "--report", str(tmp_path / "report")]
+    words = [*BOTH, "--isolation", "host", "-j", "2", "--report", str(tmp_path / "report")]
     own = ["unshare", "--ipc", *(() if os.getuid() == 0 else ("--user", "--map-root-user"))]
     left = ["sh", "-c", '"$@" && cat /proc/sysvipc/shm /proc/sysvipc/sem', "sh"]
     output = dodo("run", *words, code=0, before=[*own, *left])
@@ -71,7 +71,8 @@ def test_silent_application_fails(tmp_path: Path) -> None:
     application.write_text(yaml.safe_dump({"services": {"silent": service}}))
     (tmp_path / "silent.py").write_text("import time\ntime.sleep(600)\n")
     report = tmp_path / "report"
-    dodo("run", str(spec), "--application", str(application), "--report", str(report), code=1)
+    words = ["run", str(spec), "--clock", "realtime", "--application", str(application)]
+    dodo(*words, "--report", str(report), code=1)
     test = results(report)["sil-short"]
     assert test["outcome"] == "failed"
     assert "sent no GroundSteeringRequest" in str(test["reason"])

@@ -32,7 +32,7 @@ pytestmark = pytest.mark.slow
 def test_the_example_passes_in_lockstep(tmp_path: Path) -> None:
     """Closed and open loop, perception, and recordings: each picture is answered."""
     names = ("sil-closed-straight", "sil-closed-kiwi-track", "sil-open-*", "sil-perception*clutter-60", "dil-*")
-    dodo("run", *names, "--clock", "lockstep", "-j", "2", "--report", str(tmp_path), code=0)
+    dodo("run", *names, "-j", "2", "--report", str(tmp_path), code=0)
     tests = results(tmp_path)
     closed, opened = {"sil-closed-straight", "sil-closed-kiwi-track"}, {"sil-open-straight", "sil-open-left-curve"}
     assert set(tests) >= {*closed, *opened, "dil-static-rig", "dil-kiwi-track"}
@@ -51,7 +51,7 @@ def test_wrong_applications_fail_for_the_right_reason(
 ) -> None:
     application = kiwi(tmp_path / "app", edit, **flags)
     report = tmp_path / "report"
-    words = ("--clock", "lockstep", "--application", str(application), "--report", str(report))
+    words = ("--application", str(application), "--report", str(report))
     out = dodo("run", *reasons, *words, code=1)
     tests = results(report)
     assert set(tests) == set(reasons)

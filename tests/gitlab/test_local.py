@@ -30,9 +30,6 @@ def repository(tmp_path: Path) -> Path:
     skipped = shutil.ignore_patterns("__pycache__")
     for name in ("maps", *TESTS):
         shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name, ignore=skipped)
-        spec = tmp_path / "tests" / name / f"{name}.dodo.yml"
-        if name != "maps" and "clock:" not in spec.read_text():
-            spec.write_text(spec.read_text() + "clock: lockstep\n")
     shutil.copytree(ROOT / "examples/kiwi", tmp_path / "kiwi", ignore=skipped)
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\n")
     run(tmp_path, sys.executable, "-m", "dodo_dsl", "new", "--deployment")
