@@ -92,17 +92,21 @@ def load(
 
 
 def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Checked:
-    """The same without shipped tests that need what the application does not send, but for the files ``named``."""
+    """The same without shipped tests that need what the application does not send, but for the files ``named``.
+
+    Warnings about shipped tests go, too: whoever reads them did not write these.
+    """
     first = {test.spec.path: test.spec for test in reversed(checked.tests)}
-    left_out = {
+    shipped = {
         path
         for path, spec in first.items()
-        if path not in named
-        and any(d.rule in UNSATISFIED for d in checked.by_rules[path])
-        and package_data.is_shipped(spec.location.root, checked.deployment.root)
+        if path not in named and package_data.is_shipped(spec.location.root, checked.deployment.root)
     }
+    left_out = {path for path in shipped if any(d.rule in UNSATISFIED for d in checked.by_rules[path])}
     kept = {d for path in first.keys() - left_out for d in checked.by_rules[path]}
     gone = {d for path in left_out for d in checked.by_rules[path]} - kept
+    files = {str(path) for path in shipped}
+    gone |= {d for d in checked.diagnostics if d.severity == "warning" and d.span.file in files}
     return replace(
         checked,
         tests=tuple(test for test in checked.tests if test.spec.path not in left_out),
