@@ -11,6 +11,7 @@ from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.clock import Clock
+from services.base.lateness import Lateness
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
@@ -24,7 +25,8 @@ class Loop:
     """Runs a service on a session by a clock; ``sender_stamp`` is that of outputs without one.
 
     ``name`` is the source in its EndOfInput. A line ``{"dodo": "lost", "messages": N}`` on stdout reports how
-    many messages were lost so far, once a second at most. Raises what the model raises, and SessionError.
+    many messages were lost so far, once a second at most, and in real time ``{"dodo": "late", "updates": N, "late": M,
+    "worst_s": S}`` how many updates ended late since the test began. Raises what the model raises, and SessionError.
     """
 
     name: str
@@ -35,12 +37,14 @@ class Loop:
     _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
     _reported: int = 0
     _report_after: int = 0
+    _lateness: Lateness = field(init=False)
 
     def __post_init__(self) -> None:
         ids = self.session.messages.id
         for (name, stamp), handler in self.service.inputs.items():
             self._handlers.setdefault(ids(name), []).append((stamp, handler))
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
+        self._lateness = Lateness(self.service.period, self.service.late_after)
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Until the service is done, or ``stopped`` by a signal."""
@@ -53,14 +57,15 @@ class Loop:
             if service.period is not None:
                 for output in service.update(now):
                     self._send(output, now)
+                self._lateness.add(now, self.clock.now())
             if now >= self._report_after:
-                self._report_losses(now)
+                self._report(now)
             if service.finished and not self.clock.has_new_picture:
                 break
         if service.finished and service.verdict is None:
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close(stopped)
-        self._report_losses(self.clock.now())
+        self._report(self.clock.now())
         if self.session.lost:
             _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
         if self.session.garbage:
@@ -91,6 +96,7 @@ class Loop:
             self.service.observe(envelope)
         if envelope.data_type == self._begin:
             self.service.begin(envelope.sample_time)
+            self._lateness.begin()
         elif envelope.data_type == self._end:
             self.service.end_of_input(self.clock.now())
         for stamp, handler in self._handlers.get(envelope.data_type, ()):
@@ -102,10 +108,13 @@ class Loop:
                     return
                 handler(message, envelope.sample_time)
 
-    def _report_losses(self, now: int) -> None:
+    def _report(self, now: int) -> None:
         if self.session.lost > self._reported:
             self._reported, self._report_after = self.session.lost, now + REPORT_PERIOD
             print(json.dumps({"dodo": "lost", "messages": self._reported}), flush=True)
+        if (late := self._lateness.news()) is not None:
+            self._report_after = now + REPORT_PERIOD
+            print(json.dumps({"dodo": "late", **late}), flush=True)
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         if isinstance(output, Envelope):

@@ -44,6 +44,8 @@ class Service:
     observe: Callable[[Envelope], None] | None = None
     verdict: Verdict | None = None
     finished: bool = False
+    late_after: float | None = None
+    """Microseconds after which an update that ends counts as late; None for half a period, and 10 ms at least."""
     drive: Callable[[Callable[[], bool]], None] | None = None
     """Runs instead of the loop, for the clock service. Takes a function that says whether to stop."""
 

@@ -137,8 +137,15 @@ def build(context: Context) -> Service:
     status = context.messages.type(STATUS)
     memories = _memories(context, recording, part)
     service = Replay(player, stream, memories, status, flags["sample-times"] == "test", settle, context.clock.expect)
+    service.late_after = _half_period(part)
     context.resources.callback(service.close)
     return service
+
+
+def _half_period(part: Part) -> float | None:
+    """Half of the mean time between pictures in microseconds; None where there are no two."""
+    due = part.due[part.shown]
+    return float(due[-1] - due[0]) / (len(due) - 1) / 2 if len(due) > 1 else None
 
 
 def _part(context: Context, recording: Recording) -> Part:
