@@ -9,6 +9,7 @@ import jinja2
 from dodo_dsl import __version__, package_data
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.junit import check_line
+from dodo_dsl.report.machine_line import machine_line
 
 
 class ReportPicture(NamedTuple):
@@ -46,5 +47,11 @@ def render(outcomes: Sequence[Outcome], files: ReportFiles) -> str:
     )
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
     return environment.get_template("report.html.j2").render(
-        outcomes=outcomes, files=files, meanings=MEANINGS, counts=counts, version=__version__, check_line=check_line
+        outcomes=outcomes,
+        files=files,
+        meanings=MEANINGS,
+        counts=counts,
+        version=__version__,
+        check_line=check_line,
+        machine_line=machine_line,
     )

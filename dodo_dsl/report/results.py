@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import package_data
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import MachineLoad, Outcome, Wait
 
 FILE_NAME = "results.json"
 VERSION = 1
@@ -41,8 +41,14 @@ def _written(text: str) -> str:
 
 
 def _rounded(test: dict[str, Any]) -> dict[str, Any]:
-    """Rounds durations to milliseconds, which is more than the precision of the measurement."""
-    return {k: round(v, 3) if k.endswith("_s") and v is not None else v for k, v in test.items()}
+    """Rounds durations and shares to 0.001, which is more than the precision of the measurement."""
+    return {name: _rounded_value(name, value) for name, value in test.items()}
+
+
+def _rounded_value(name: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return _rounded(value)
+    return round(value, 3) if name.endswith(("_s", "_share")) and value is not None else value
 
 
 def load(path: Path) -> list[Outcome]:
@@ -75,4 +81,11 @@ def _validate(document: Any) -> None:
 
 def _outcome(test: dict[str, Any]) -> Outcome:
     values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in test.items()}
-    return Outcome(**values)
+    return Outcome(**{**values, "machine": _load(test.get("machine"))})
+
+
+def _load(machine: dict[str, Any] | None) -> MachineLoad | None:
+    if machine is None:
+        return None
+    waits = {key: Wait(**machine[key]) for key in ("application", "services") if machine.get(key)}
+    return MachineLoad(**{**machine, **waits})

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Noted, Overrun
+from dodo_dsl.run.load.meter import LoadMeter, add_up
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Late, Noted, Overrun
 from dodo_dsl.run.run_state import Ended, RunState
 
 READY_PATIENCE_S = READY_S
@@ -20,23 +21,31 @@ BEGIN_PATIENCE_S = 2.0
 class Engine:
     """Drives one backend through one Plan. ``say`` is called with each phase, for live progress.
 
+    ``begun`` is called when set-up is over and the test begins.
+
     All times are of the running event loop's clock, in s.
     """
 
     plan: Plan
     backend: Backend
     say: Callable[[str], None]
+    begun: Callable[[], None] = lambda: None
     state: RunState = field(init=False)
     _now: Callable[[], float] = field(init=False)
+    _meter: LoadMeter = field(init=False)
     _begin_sent: float = 0.0
 
     async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
         self._now = asyncio.get_running_loop().time
         self.state = RunState(self.plan, self._now)
+        self._meter = LoadMeter(self.backend.load)
         kept: list[str] = []
         try:
             await self._set_up()
+            self.begun()
+            if self.plan.clock == "realtime":
+                self._meter.begin()
             await self._execute()
         except Ended:
             pass
@@ -55,7 +64,7 @@ class Engine:
 
     async def _close(self, keep: bool) -> list[str]:
         """Teardown to its end, however often the run is interrupted meanwhile; its errors do not change the verdict."""
-        closing = asyncio.ensure_future(self.backend.close(keep))
+        closing = asyncio.ensure_future(self._wind_up(keep))
         while not closing.done():
             try:
                 await asyncio.wait([closing])
@@ -66,10 +75,18 @@ class Engine:
         self.state.notes.append(f"not all of the test was taken down: {type(error).__name__}: {error}")
         return []
 
+    async def _wind_up(self, keep: bool) -> list[str]:
+        try:
+            await self._meter.end()
+            self.state.load = add_up(self._meter.snapshots, self.state.is_application)
+        except Exception as error:  # noqa: BLE001  (whatever it is, the test has to be taken down)
+            self.state.notes.append(f"the load of the machine was not measured: {type(error).__name__}: {error}")
+        return await self.backend.close(keep)
+
     async def _collect_losses(self) -> None:
-        """Losses and notes that were reported during teardown; other events no longer count then."""
+        """Losses, lateness and notes that were reported during teardown; other events no longer count then."""
         while (event := await self._next(0.0)) is not None:
-            if isinstance(event, Overrun | Noted):
+            if isinstance(event, Overrun | Late | Noted):
                 self.state.take(event)
 
     async def _set_up(self) -> None:

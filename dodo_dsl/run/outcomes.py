@@ -23,6 +23,8 @@ class Finding:
     result: Result
     reason: str
     service: str = ""
+    is_timed: bool = False
+    """Whether a machine that is too busy may be the reason for it: a verdict, not the end of a program."""
 
 
 @dataclass
@@ -75,7 +77,7 @@ def decide(facts: Facts) -> Finding:
 def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
     if len(verdicts) > 1:
         return [Finding("error", f"evaluator '{evaluator}' gave {len(verdicts)} verdicts, expected one", evaluator)]
-    return [Finding("passed" if v.passed else "failed", v.reason, evaluator) for v in verdicts]
+    return [Finding("passed" if v.passed else "failed", v.reason, evaluator, is_timed=True) for v in verdicts]
 
 
 def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:

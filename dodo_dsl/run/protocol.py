@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from dodo_dsl.run.load.snapshot import Snapshot
+
 
 @dataclass(frozen=True)
 class Ready:
@@ -45,6 +47,16 @@ class Overrun:
 
 
 @dataclass(frozen=True)
+class Late:
+    """Up to now ``late`` of the ``updates`` of a service were late, one of them by ``worst_s``."""
+
+    service: str
+    updates: int
+    late: int
+    worst_s: float
+
+
+@dataclass(frozen=True)
 class Noted:
     """A note on the test beside its outcome."""
 
@@ -80,7 +92,7 @@ class Stopped:
     reason: str
 
 
-Event = Ready | VerdictEvent | Malformed | Overrun | Noted | Exited | Unstartable | Lost | Time | Stopped
+Event = Ready | VerdictEvent | Malformed | Overrun | Late | Noted | Exited | Unstartable | Lost | Time | Stopped
 
 
 class Backend(Protocol):
@@ -99,6 +111,10 @@ class Backend(Protocol):
 
     async def begin(self) -> None:
         """Announces on the test's bus that everything is ready; may be repeated."""
+        ...
+
+    async def load(self) -> Snapshot | None:
+        """What the test's services have used so far; None where that cannot be measured."""
         ...
 
     async def close(self, keep: bool) -> list[str]:

@@ -4,14 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dodo_dsl.outcome import Outcome, Result
+from dodo_dsl.outcome import MachineLoad, Outcome, Result
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.run.load.judgement import consider
 from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended, lost_messages, outcome_of
 from dodo_dsl.run.protocol import (
     Backend,
     Event,
     Exited,
+    Late,
     Lost,
     Malformed,
     Noted,
@@ -39,6 +41,8 @@ class RunState:
     exits: dict[str, int] = field(default_factory=dict)
     ready: set[str] = field(default_factory=set)
     lost: dict[str, int] = field(default_factory=dict)
+    late: dict[str, Late] = field(default_factory=dict)
+    load: MachineLoad | None = None
     notes: list[str] = field(default_factory=list)
     began: float | None = None
     finished: float | None = None
@@ -81,6 +85,8 @@ class RunState:
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Overrun(service, messages):
                 self.lost[service] = messages
+            case Late(service):
+                self.late[service] = event
             case Noted(text):
                 self.notes.append(text)
             case Unstartable(service, why):
@@ -128,7 +134,8 @@ class RunState:
 
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
-        plan, finding = self.plan, decide(self.facts)
+        plan, judged = self.plan, consider(decide(self.facts), self._load())
+        finding = judged.finding
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
@@ -140,6 +147,25 @@ class RunState:
             checks=tuple(check for verdict in verdicts for check in verdict.checks),
             last_lines=tuple(backend.tail(finding.service)) if finding.result != "passed" else (),
             notes=(*self.notes, *losses),
+            machine=judged.load,
+        )
+
+    def is_application(self, service: str) -> bool:
+        """Whether a service is the application's, or was started by it."""
+        return self.layer_of.get(service, "application") == "application"
+
+    def _load(self) -> MachineLoad | None:
+        """What was measured of the machine, with the lateness of DoDo's services; None in lockstep."""
+        if self.began is None or self.finished is None or self.plan.clock != "realtime":
+            return None
+        pictured = pictured_by(self.plan)
+        shares = {name: late.late / late.updates for name, late in self.late.items()}
+        load = self.load or MachineLoad(self.finished - self.began)
+        return replace(
+            load,
+            late_pictures_share=max((share for name, share in shares.items() if name in pictured), default=0.0),
+            late_updates_share=max((share for name, share in shares.items() if name not in pictured), default=0.0),
+            lateness_s=max((late.worst_s for late in self.late.values()), default=0.0),
         )
 
     def _service_rows(self) -> list[dict[str, Any]]:
@@ -148,3 +174,9 @@ class RunState:
             {"name": name, "layer": layer, "uses": uses.get(name), "exit_code": self.exits.get(name)}
             for name, layer in sorted(self.layer_of.items(), key=lambda item: (LAYERS.index(item[1]), item[0]))
         ]
+
+
+def pictured_by(plan: Plan) -> list[str]:
+    """Services that show pictures to the application: those of the environment with shared memory."""
+    kinds = ("memory", "memories")
+    return [s.name for s in plan.layer("environment") if any(flag.kind in kinds for flag in s.flags)]

@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.run.protocol import Event, Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
+from dodo_dsl.run.protocol import Event, Late, Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
 
 _OUTCOMES = ("passed", "failed")
 _STOPS = ("unanswered", "stuck", "timedout")
@@ -29,11 +29,21 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return Ready(service)
     if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
         return Overrun(service, message["messages"])
+    if kind == "late":
+        return _late(service, message)
     if kind == "verdict" and is_evaluator:
         if problem := _problem(message):
             return Malformed(service, problem)
         return VerdictEvent(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
     return _clock_event(kind, message) if service == CLOCK else None
+
+
+def _late(service: str, message: dict[str, Any]) -> Late | None:
+    """How late a service is, where the numbers can be."""
+    updates, late, worst = message.get("updates"), message.get("late"), message.get("worst_s", 0.0)
+    if type(updates) is not int or type(late) is not int or not 0 < late <= updates < 1 << 63:
+        return None
+    return Late(service, updates, late, float(worst)) if _is_number(worst) and worst >= 0 else None
 
 
 def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:

@@ -1,10 +1,12 @@
 """``results.json`` is read only when it is one."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.outcome import MachineLoad, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.report_folder import forget
 from tests.report.test_report_folder import OUTCOME
@@ -17,7 +19,16 @@ def test_other_files_are_not_results(tmp_path: Path, text: str) -> None:
         results.load(tmp_path / "results.json")
 
 
-STRANGE = [{"slug": 3}, {"slug": ["a"]}, {"outcome": "maybe"}, {"checks": 3}, {"reason": "\ud800"}, {"more": 1}]
+STRANGE = [
+    {"slug": 3},
+    {"slug": ["a"]},
+    {"outcome": "maybe"},
+    {"checks": 3},
+    {"reason": "\ud800"},
+    {"more": 1},
+    {"machine": 3},
+    {"machine": {}},
+]
 
 
 @pytest.mark.parametrize("change", STRANGE, ids=str)
@@ -28,6 +39,20 @@ def test_results_of_a_strange_shape_are_refused_and_stop_no_run(tmp_path: Path, 
     with pytest.raises(results.ResultsError):
         results.load(tmp_path / "results.json")
     forget(tmp_path, ["test"])
+
+
+LOAD = MachineLoad(
+    7.5, 2, Wait(1.0, 2.0, 1.9, "app"), Wait(1.5, 0.5, 0.4, "camera"), 0.61, 7.5, 0.05, 0.02, 0.06, undecided=True
+)
+
+
+@pytest.mark.parametrize("load", [None, LOAD, MachineLoad(7.5)], ids=["lockstep", "measured", "not measured"])
+def test_the_load_of_the_machine_is_kept_in_milliseconds(tmp_path: Path, load: MachineLoad | None) -> None:
+    (tmp_path / "results.json").write_text(results.to_json([replace(OUTCOME, machine=load)]))
+    assert results.load(tmp_path / "results.json")[0].machine == load
+    rough = replace(LOAD, others_share=0.61049, application=Wait(1.00049, 2.0, 1.9, "app"))
+    (tmp_path / "results.json").write_text(results.to_json([replace(OUTCOME, machine=rough)]))
+    assert results.load(tmp_path / "results.json")[0].machine == LOAD
 
 
 def test_results_that_cannot_be_read_stop_no_run(tmp_path: Path) -> None:

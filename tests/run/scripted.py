@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
+from dodo_dsl.run.load.snapshot import Snapshot, Times
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, VerdictEvent
 
 T = TypeVar("T")
@@ -86,6 +87,8 @@ class ScriptedBackend:
     tails: Mapping[str, list[str]] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
     name: str = "process"
+    loads: Callable[[float], Snapshot | None] = lambda _: None
+    """What was used at a time of the loop."""
 
     def __post_init__(self) -> None:
         self.cid = self.plan.cid + 1
@@ -107,6 +110,9 @@ class ScriptedBackend:
 
     async def begin(self) -> None:
         await self._call("begin")
+
+    async def load(self) -> Snapshot | None:
+        return self.loads(asyncio.get_running_loop().time())
 
     async def close(self, keep: bool) -> list[str]:
         await self._call("close")
@@ -135,6 +141,22 @@ class ScriptedBackend:
 def drives(seconds: float = 5.0, verdict: VerdictEvent = PASSED) -> dict[str, Events]:
     """The stages of a test that ends with a verdict."""
     return {**READY, "begin": [(seconds, verdict), (seconds, Exited("track", 0))]}
+
+
+def load(others: float, **services: tuple[float, float]) -> Callable[[float], Snapshot]:
+    """Snapshots of two cores of which others take a share; services run and wait for shares of the time."""
+
+    def at(now: float) -> Snapshot:
+        busy = 2 * others + sum(ran for ran, _ in services.values())
+        return Snapshot(
+            now, 2, busy * now, {n: Times(ran * now, waited * now) for n, (ran, waited) in services.items()}
+        )
+
+    return at
+
+
+BUSY = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))
+"""A machine on which the application waits for three tenths of the time, as others have taken its cores."""
 
 
 @dataclass

@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.outcome import MachineLoad, Outcome
+from dodo_dsl.plan.model import LAYERS, Flag, Plan
 from dodo_dsl.run.engine import BEGIN_PATIENCE_S, LAST_TIME_PATIENCE_S, READY_PATIENCE_S, Engine
+from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
     Exited,
+    Late,
     Lost,
     Malformed,
     Noted,
@@ -23,7 +25,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
-from tests.run.scripted import FAILED, PASSED, READY, Events, ScriptedBackend, drives, plan, run
+from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
 
 ENDED = Exited("track", 0)
 
@@ -51,6 +53,68 @@ def test_layers_start_in_order_and_times_are_measured() -> None:
         ("track", "evaluation", 0),
         ("app", "application", None),
     ]
+
+
+def on(loads: Callable[[float], Snapshot | None], *events: tuple[float, Event], tested: Plan | None = None) -> Outcome:
+    """The outcome of a test on a machine that is loaded."""
+    return outcome(ScriptedBackend(tested or plan(), {**READY, "begin": events}, loads=loads))
+
+
+def test_a_failure_on_a_busy_machine_is_an_error_and_a_pass_stays_one() -> None:
+    failed = on(BUSY, (5.0, FAILED), (5.0, ENDED))
+    assert (failed.outcome, failed.reason) == (
+        "error",
+        "the machine was too busy to judge: app waited 1.5 s of 5.0 s for a processor, others took 90 % of it; "
+        "it found: hit wall left; run it with --clock lockstep, or fewer tests at once (-j 1)",
+    )
+    passed = on(BUSY, (5.0, PASSED), (5.0, ENDED))
+    assert (passed.outcome, passed.reason) == ("passed", "it drove")
+    for found in (failed, passed):
+        assert found.machine is not None
+        assert (found.machine.duration_s, found.machine.undecided) == (5.0, found is failed)
+
+
+def test_a_busy_machine_excuses_no_crash() -> None:
+    found = on(BUSY, (2.0, FAILED), (2.0, Exited("app", 3)))
+    assert found.outcome == "error", "the verdict was there before"
+    found = on(BUSY, (2.0, Exited("app", 3)))
+    assert (found.outcome, found.machine is not None and found.machine.undecided) == ("failed", False)
+
+
+def test_pictures_that_come_late() -> None:
+    """Those of the camera, and the updates of others; rarely is no harm."""
+    flags = (Flag("name.argb", "video0.argb", "memory"),)
+    camera, judge = plan().services
+    seeing = plan(services=(replace(camera, flags=flags), judge))
+    calm = load(0.85, app=(0.1, 0.01))
+    ending = ((5.0, FAILED), (5.0, ENDED))
+    late = on(calm, (1.0, Late("camera", 10, 1, 0.2)), (4.0, Late("camera", 40, 20, 0.3)), *ending, tested=seeing)
+    assert "judge: 50 % of the pictures came late, by up to 0.30 s, others took 85 % of the processor" in late.reason
+    assert late.outcome == "error"
+    assert late.machine is not None
+    assert (late.machine.late_pictures_share, late.machine.late_updates_share, late.machine.lateness_s) == (0.5, 0, 0.3)
+    other = on(calm, (4.0, Late("track", 40, 20, 0.3)), (4.5, Late("camera", 40, 1, 0.4)), *ending, tested=seeing)
+    assert "50 % of the updates of one of DoDo's services came late, by up to 0.40 s" in other.reason
+    assert other.outcome == "error"
+    rarely = on(calm, (4.0, Late("track", 40, 4, 0.3)), *ending, tested=seeing)
+    assert (rarely.outcome, rarely.machine and rarely.machine.lateness_s) == ("failed", 0.3)
+
+
+def test_what_is_not_measured() -> None:
+    found = on(lambda _: None, (5.0, FAILED), (5.0, ENDED))
+    assert (found.outcome, found.machine) == ("failed", MachineLoad(5.0))
+    stepped = on(BUSY, (5.0, FAILED), (5.0, ENDED), (5.0, Time(5.0, last=True)), tested=plan(lockstep=9.0))
+    assert (stepped.outcome, stepped.machine) == ("failed", None), "lockstep waits for a busy machine"
+
+
+def test_a_meter_that_breaks_costs_no_verdict() -> None:
+    def broken(_: float) -> None:
+        raise ValueError("odd")
+
+    backend = ScriptedBackend(plan(), drives(5.0), loads=broken)
+    found = outcome(backend)
+    assert (found.outcome, found.notes) == ("passed", ("the load of the machine was not measured: ValueError: odd",))
+    assert backend.calls[-1] == "close"
 
 
 def test_a_kept_test_is_explained() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.run.protocol import Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
+from dodo_dsl.run.protocol import Late, Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
 from dodo_dsl.run.service_protocol import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
@@ -29,6 +29,13 @@ def test_losses_are_taken_from_every_service() -> None:
     assert read_line("recorder", False, b'{"dodo": "lost", "messages": 12}\n') == Overrun("recorder", 12)
     for count in (b"0", b"-1", b"true", b"1.5", b'"12"', b"null", b"1" * 30):
         assert read_line("track", True, b'{"dodo": "lost", "messages": ' + count + b"}") is None
+
+
+def test_lateness_is_taken_from_every_service() -> None:
+    text = b'{"dodo": "late", "updates": 12, "late": 3, "worst_s": 0.25}\n'
+    assert read_line("camera", False, text) == Late("camera", 12, 3, 0.25)
+    for change in ({"late": 13}, {"late": 0}, {"updates": "12"}, {"worst_s": -1}, {"worst_s": None}, {"late": 1.5}):
+        assert read_line("camera", False, json.dumps({**json.loads(text), **change}).encode()) is None
 
 
 MALFORMED = {

@@ -16,8 +16,10 @@ from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.events import Watch
+from dodo_dsl.run.docker.processes import ContainerProcesses
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.docker.teardown import take_down, writers
+from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 
@@ -49,6 +51,7 @@ class DockerBackend:
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._compose = Compose(plan, folder, report, project, say)
         self._containers: dict[str, Any] = {}
+        self._processes = ContainerProcesses({})
         self._outputs: dict[str, ServiceOutput] = {}
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
@@ -65,6 +68,7 @@ class DockerBackend:
 
         try:
             self._containers = await asyncio.to_thread(self._find_containers)
+            self._processes = ContainerProcesses(self._containers)
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
             if SANDBOX in self._containers:
                 await asyncio.to_thread(self._containers[SANDBOX].start)
@@ -140,6 +144,9 @@ class DockerBackend:
 
     async def begin(self) -> None:
         await announce_begin(self.cid, self.plan.seed, self._containers.get(SANDBOX))
+
+    async def load(self) -> Snapshot | None:
+        return await asyncio.to_thread(self._processes.load)
 
     async def close(self, keep: bool) -> list[str]:
         self._watch.ignores = True

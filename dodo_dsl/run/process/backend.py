@@ -9,6 +9,8 @@ from typing import Any
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import begin_frame
+from dodo_dsl.run.load import snapshot
+from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes
 from dodo_dsl.run.process.environment import EnvironmentProblem
 from dodo_dsl.run.process.fork_server_client import ForkServer
@@ -16,6 +18,8 @@ from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
+
+LOAD_PATIENCE_S = 2.0
 
 
 class ProcessBackend:
@@ -34,6 +38,7 @@ class ProcessBackend:
         self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._outputs: dict[str, ServiceOutput] = {}
+        self._asked: asyncio.Future[Snapshot | None] | None = None
         self._sandbox = SandboxClient(
             isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
         )
@@ -44,6 +49,9 @@ class ProcessBackend:
     def _take(self, message: dict[str, Any]) -> None:
         if "unstartable" in message:
             self._events.put_nowait(Unstartable(message["unstartable"], message["why"]))
+        elif "load" in message:
+            if self._asked is not None and not self._asked.done():
+                self._asked.set_result(snapshot.from_json(message["load"]))
         elif "exited" in message:
             task = asyncio.ensure_future(self._exited(message["exited"], message["code"]))
             task.add_done_callback(lambda t: t.exception())
@@ -94,6 +102,16 @@ class ProcessBackend:
 
     async def begin(self) -> None:
         self._sandbox.send({"do": "send", "cid": self.slot.cid, "data": begin_frame(self.plan.seed).hex()})
+
+    async def load(self) -> Snapshot | None:
+        """What the sandbox sees of its processes; None when it does not answer."""
+        if self._asked is None or self._asked.done():
+            self._asked = asyncio.get_running_loop().create_future()
+            self._sandbox.send({"do": "load"})
+        try:
+            return await asyncio.wait_for(asyncio.shield(self._asked), LOAD_PATIENCE_S)
+        except TimeoutError:
+            return None
 
     async def close(self, keep: bool) -> list[str]:
         if keep and (pid := self._sandbox.pid):

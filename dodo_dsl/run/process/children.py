@@ -23,14 +23,16 @@ class Children:
     def __init__(self, on_exit: Callable[[str, int], None]) -> None:
         self._on_exit = on_exit
         self._running: dict[str, subprocess.Popen[bytes] | ForkedModule] = {}
+        self.names: dict[int, str] = {}
+        """All that were ever started, by process id."""
 
     def fork(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> None:
         """Forks this process for a Python module; raises OSError."""
-        self._running[name] = ForkedModule(words, environment, folder, output)
+        self._add(name, ForkedModule(words, environment, folder, output))
 
     def start(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> None:
         """Starts a program; raises OSError, SubprocessError and ValueError."""
-        self._running[name] = subprocess.Popen(
+        child = subprocess.Popen(
             words,
             env=environment,
             cwd=folder,
@@ -40,6 +42,11 @@ class Children:
             start_new_session=True,
             preexec_fn=functools.partial(namespaces.end_with, os.getpid()),  # noqa: PLW1509  (it has one thread)
         )
+        self._add(name, child)
+
+    def _add(self, name: str, child: "subprocess.Popen[bytes] | ForkedModule") -> None:
+        self._running[name] = child
+        self.names[child.pid] = name
 
     def reap(self) -> None:
         """Collects ended processes, adopted orphans among them."""

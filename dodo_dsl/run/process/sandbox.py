@@ -7,8 +7,10 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
     runner to sandbox   {"do": "start", "id", "argv", "env", "cwd", "fork"} with the output's descriptor,
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
                         is a Python module for which a fork of the sandbox will do; {"do": "close"};
-                        {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs
-    sandbox to runner   {"up": pid} or {"down": why}; {"unstartable": id, "why"}; {"exited": id, "code"}
+                        {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs;
+                        {"do": "load"}
+    sandbox to runner   {"up": pid} or {"down": why}; {"unstartable": id, "why"}; {"exited": id, "code"};
+                        {"load": snapshot or null}
 """
 
 import contextlib
@@ -19,9 +21,12 @@ import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv.bus.address import group
+from dodo_dsl.run.load import snapshot
+from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
 
@@ -38,6 +43,7 @@ class Sandbox:
         self.isolation = isolation
         self.forks = forks
         self.children = Children(lambda name, code: self.send(exited=name, code=code))
+        self.times = ThreadTimes()
         self.keep = False
         self.ended = False
         self.pumps: dict[int, int] = {}
@@ -112,6 +118,12 @@ class Sandbox:
     def _do_send(self, _descriptors: list[int], cid: int, data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
             sender.sendto(bytes.fromhex(data), group(cid))
+
+    def _do_load(self, _descriptors: list[int]) -> None:
+        """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
+        is_ours = Path("/proc/self").readlink().name == str(os.getpid())
+        taken = snapshot.take(self.times, {**self.children.names, os.getpid(): ""}) if is_ours else None
+        self.send(load=snapshot.to_json(taken))
 
     def _do_keep(self, descriptors: list[int]) -> None:
         """Stays when the runner ends, and writes the services' output into their logs in its place."""

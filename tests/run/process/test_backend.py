@@ -53,6 +53,21 @@ DECISIONS = {
 }
 
 
+def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
+    """The application's part is that of a process which it has started, and which has ended before the test does."""
+    work = "import time\nwhile time.process_time() < 0.5: pass"
+    application = f"import subprocess\nsubprocess.run([sys.executable, '-c', {work!r}])\n" + STARTED + WAIT
+    judge = READY + AFTER_START + "time.sleep(0.5)\n" + PASS
+    (outcome,) = bench.run(bench.plan(application=application, judge=judge))
+    load = outcome.machine
+    assert load is not None
+    if load.application is None or load.services is None:
+        pytest.skip("this kernel does not measure")
+    assert (outcome.outcome, load.cores) == ("passed", len(os.sched_getaffinity(0)))
+    assert (load.application.longest, load.services.longest in ("camera", "judge")) == ("app", True)
+    assert load.application.ran_s > 0.2 > load.services.ran_s > 0.0
+
+
 def test_what_processes_do_decides(host: Bench) -> None:
     """Exits, signals and lines of output reach the engine; all tests at once."""
     plans = [host.plan(**parts, slug=slug) for slug, (parts, _, _) in DECISIONS.items()]

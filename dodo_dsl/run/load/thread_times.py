@@ -1,0 +1,116 @@
+"""Processor time and run delay of processes, from ``/proc``: by thread, added up by service."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+_PARENT, _SESSION, _START = 1, 3, 19
+"""Fields of ``/proc/PID/stat`` (proc_pid_stat(5)) behind the program's name."""
+_PER_SECOND = 1e9
+_Key = tuple[str, int, int, int]
+"""A thread: its service, its process, when that was started, and its own number."""
+
+
+class _Process(NamedTuple):
+    parent: int
+    session: int
+    start: int
+    """Ticks since the machine started, which tells a process from a later one with its number."""
+
+
+class _Nanoseconds(NamedTuple):
+    ran: int
+    waited: int
+
+
+class ThreadTimes:
+    """Adds up, from call to call, what the threads of services ran, and how long each service waited.
+
+    A service waits as long as the thread of it that ran the most between two calls, as that does its work: threads that
+    wait side by side do not make its wait longer, and those that only look for something to do are no loss.
+    """
+
+    def __init__(self, proc: Path = Path("/proc")) -> None:
+        self._proc = proc
+        self._threads: dict[_Key, _Nanoseconds] = {}
+        self._sums: dict[str, _Nanoseconds] = {}
+        self._owners: dict[tuple[int, int], str] = {}
+        """The service of each process that was seen, by process and start: its parents may have ended since."""
+
+    def add_up(self, services: Mapping[int, str]) -> dict[str, tuple[float, float]] | None:
+        """Seconds on a processor, and ready without one, by service; None where the kernel does not measure them.
+
+        ``services`` are process ids and names. What their processes have started belongs to them, too. A name ``''``
+        is for what descends from a process and belongs to none of the others; the process itself does not count.
+        """
+        processes = self._processes()
+        self._owners = {
+            (pid, process.start): owner
+            for pid, process in processes.items()
+            if (owner := self._owner(pid, processes, services)) is not None
+        }
+        found: dict[_Key, _Nanoseconds] = {}
+        for (pid, start), owner in self._owners.items():
+            if owner == services.get(pid) == "":
+                continue
+            for thread in self._thread_ids(pid):
+                times = self._read(pid, thread)
+                if times is None:
+                    return None
+                found[owner, pid, start, thread] = times
+        self._add(found)
+        totals = {name: self._sums.get(name, _Nanoseconds(0, 0)) for name in {*services.values(), *self._sums} if name}
+        totals |= self._sums
+        return {name: (ran / _PER_SECOND, waited / _PER_SECOND) for name, (ran, waited) in totals.items()}
+
+    def _add(self, found: Mapping[_Key, _Nanoseconds]) -> None:
+        ran: dict[str, int] = defaultdict(int)
+        busiest: dict[str, _Nanoseconds] = defaultdict(lambda: _Nanoseconds(0, 0))
+        for key, now in found.items():
+            before = self._threads.get(key, _Nanoseconds(0, 0))
+            if now.ran < before.ran or now.waited < before.waited:  # another thread with its number
+                before = _Nanoseconds(0, 0)
+            spent = _Nanoseconds(now.ran - before.ran, now.waited - before.waited)
+            ran[key[0]] += spent.ran
+            busiest[key[0]] = max(busiest[key[0]], spent)
+        for name, nanoseconds in ran.items():
+            total = self._sums.get(name, _Nanoseconds(0, 0))
+            self._sums[name] = _Nanoseconds(total.ran + nanoseconds, total.waited + busiest[name].waited)
+        self._threads = dict(found)
+
+    def _processes(self) -> dict[int, _Process]:
+        found = {}
+        for entry in self._proc.iterdir():
+            if entry.name.isdigit():
+                try:
+                    words = (entry / "stat").read_text(errors="replace").rpartition(")")[2].split()
+                except OSError:  # it has ended meanwhile
+                    continue
+                found[int(entry.name)] = _Process(int(words[_PARENT]), int(words[_SESSION]), int(words[_START]))
+        return found
+
+    def _owner(self, pid: int, processes: Mapping[int, _Process], services: Mapping[int, str]) -> str | None:
+        """The service that a process belongs to: as when it was first seen, by its ancestors, or by its session."""
+        key = pid, processes[pid].start
+        if key in self._owners:
+            return self._owners[key]
+        ancestor, owner = pid, None
+        while ancestor in processes and owner is None:
+            owner, ancestor = services.get(ancestor), processes[ancestor].parent
+        return services.get(processes[pid].session, "") if owner == "" else owner
+
+    def _thread_ids(self, pid: int) -> list[int]:
+        try:
+            return [int(entry.name) for entry in (self._proc / str(pid) / "task").iterdir()]
+        except OSError:  # it has ended meanwhile
+            return []
+
+    def _read(self, pid: int, thread: int) -> _Nanoseconds | None:
+        """The times of a thread, none for one that has ended; None where the kernel does not measure them."""
+        folder = self._proc / str(pid) / "task" / str(thread)
+        try:
+            words = (folder / "schedstat").read_text().split()
+        except OSError:
+            return None if (folder / "stat").exists() else _Nanoseconds(0, 0)
+        return _Nanoseconds(int(words[0]), int(words[1]))

@@ -1,0 +1,54 @@
+"""The processes of containers: found by the engine's answers, and only on the machine that runs them."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from docker.errors import APIError
+
+from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.run.docker.processes import ContainerProcesses
+from dodo_dsl.run.load.snapshot import Times
+from tests.run.load.test_thread_times import Proc
+
+
+class Container:
+    """A container as the engine's client shows it."""
+
+    def __init__(self, number: str, pid: int, problem: Exception | None = None) -> None:
+        self.id, self.attrs, self.problem = number, {"State": {"Pid": pid}}, problem
+
+    def reload(self) -> None:
+        if self.problem:
+            raise self.problem
+
+
+@pytest.fixture
+def proc(tmp_path: Path) -> Proc:
+    """Process 10 belongs to container c0ffee, 11 to no container."""
+    found = Proc(tmp_path)
+    (tmp_path / "stat").write_text("".join(f"cpu{core} 1 1 1 1 1 1 1 1 0 0\n" for core in range(1024)))
+    for pid, group in ((10, "0::/../c0ffee"), (11, "0::/")):
+        found.put(pid, 1, {pid: (100, 10)})
+        (tmp_path / str(pid) / "cgroup").write_text(f"{group}\n")
+    return found
+
+
+def services(proc: Proc, **containers: Any) -> dict[str, Times] | None:
+    found = ContainerProcesses(containers, proc.root).load()
+    return None if found is None else dict(found.services)
+
+
+def test_what_containers_on_this_machine_used(proc: Proc) -> None:
+    used = {"app": Times(pytest.approx(0.1), pytest.approx(0.01))}
+    assert services(proc, app=Container("c0ffee", 10), **{SANDBOX: Container("c0ffee", 11)}) == used
+    assert services(proc, app=Container("c0ffee", 10), ended=Container("beef", 0)) == used
+
+
+def test_containers_on_another_machine_are_not_measured(proc: Proc) -> None:
+    """A process here may have the number of one there."""
+    assert services(proc, app=Container("c0ffee", 11)) is None
+    assert services(proc, app=Container("c0ffee", 12)) is None
+    assert services(proc, app=Container("c0ffee", 10), camera=Container("beef", 12)) is None, "or counts as others"
+    assert services(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
+    assert services(proc) is None

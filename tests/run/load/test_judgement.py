@@ -1,0 +1,89 @@
+"""When a failure is an error: the machine was too busy, and it was not the application that kept it so."""
+
+from dataclasses import replace
+
+import pytest
+
+from dodo_dsl.outcome import MachineLoad, Wait
+from dodo_dsl.run.load.judgement import consider
+from dodo_dsl.run.outcomes import Finding
+
+CALM = MachineLoad(
+    7.5, 2, Wait(1.0, 0.9, 0.7, "perception"), Wait(1.5, 0.5, 0.4, "camera"), 0.61, 7.5, 0.05, 0.05, 0.06
+)
+CROWDED = replace(CALM, application=Wait(1.0, 2.0, 1.9, "perception"))
+FAILED = Finding("failed", "only 43 frames had an answer (at least 50)", "judge", is_timed=True)
+
+
+def test_a_failure_on_a_busy_machine_is_an_error() -> None:
+    judged = consider(FAILED, CROWDED)
+    assert judged.finding == Finding(
+        "error",
+        "the machine was too busy to judge: perception waited 1.9 s of 7.5 s for a processor, others took 71 % of it; "
+        "it found: only 43 frames had an answer (at least 50); "
+        "run it with --clock lockstep, or fewer tests at once (-j 1)",
+        "judge",
+        is_timed=True,
+    )
+    assert judged.load == replace(CROWDED, undecided=True)
+
+
+@pytest.mark.parametrize(
+    ("load", "why"),
+    [
+        (replace(CALM, late_pictures_share=0.2), "20 % of the pictures came late, by up to 0.06 s"),
+        (
+            replace(CALM, late_updates_share=0.2),
+            "20 % of the updates of one of DoDo's services came late, by up to 0.06 s",
+        ),
+    ],
+    ids=["pictures", "updates"],
+)
+def test_what_hinders_dodo_is_no_fault_of_the_application(load: MachineLoad, why: str) -> None:
+    assert consider(FAILED, load).finding.reason.startswith(
+        f"the machine was too busy to judge: {why}, others took 71 %"
+    )
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        None,
+        CALM,
+        replace(CALM, services=Wait(1.5, 2.0, 2.0, "pose")),
+        MachineLoad(7.5, late_pictures_share=0.9),
+        replace(CROWDED, application=Wait(12.0, 7.0, 0.3, "perception")),
+        replace(CALM, late_pictures_share=0.9, crowded_s=0.5),
+        replace(CALM, duration_s=0.5, application=Wait(0.1, 0.2, 0.2, "app"), services=Wait(0.1, 0.2, 0.2, "camera")),
+    ],
+    ids=[
+        "lockstep",
+        "calm",
+        "services that keep to their schedule",
+        "not measured",
+        "its own threads",
+        "late by the application's fault",
+        "over at once",
+    ],
+)
+def test_a_failure_stays_one(load: MachineLoad | None) -> None:
+    judged = consider(FAILED, load)
+    assert (judged.finding, judged.load) == (FAILED, load)
+
+
+@pytest.mark.parametrize(
+    "finding",
+    [
+        replace(FAILED, result="passed"),
+        replace(FAILED, result="error"),
+        Finding("failed", "application service 'app' ended with exit code 3 after 2.0 s", "app"),
+    ],
+    ids=["passed", "error", "crashed"],
+)
+def test_what_does_not_depend_on_time_stays(finding: Finding) -> None:
+    judged = consider(finding, CROWDED)
+    assert (judged.finding, judged.load) == (finding, CROWDED)
+
+
+def test_a_long_reason_is_cut() -> None:
+    assert f"it found: {'x' * 300}...; run it" in consider(replace(FAILED, reason="x" * 2000), CROWDED).finding.reason
