@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from dodo_dsl import atomic
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.state_folder import NoStateFolder, state_path
 
 _MAX_BYTES = 4_000_000
@@ -32,6 +32,8 @@ class PastRun:
     outcome: str
     setup_s: float
     execution_s: float
+    cores: float | None = None
+    """Processor seconds a second of execution, of application and services; None where it was not measured."""
 
 
 def default_path() -> Path:
@@ -58,6 +60,12 @@ class History:
         took = [r.setup_s + r.execution_s for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key]
         return statistics.median(took[-_RECENT:]) if took else None
 
+    def cores(self, spec: str, test: str, backend: str, clock: str) -> float | None:
+        """The most cores that the latest runs used on average; None when that was never measured."""
+        key = (spec, test, backend, clock)
+        runs = [r for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key][-_RECENT:]
+        return max((r.cores for r in runs if r.cores is not None), default=None)
+
     def times(self, tests: Iterable[tuple[str, str]], backend: str) -> dict[str, list[tuple[float, float]]]:
         """Seconds of set-up and execution of all runs of ``tests``, which are pairs of spec and name."""
         found: dict[str, list[tuple[float, float]]] = {}
@@ -71,10 +79,13 @@ class History:
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
         """Adds pairs of a test's name and its outcome; errors are left out, as they say nothing about its time."""
         self.runs += [
-            PastRun(int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s)
+            PastRun(
+                int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s,
+                _cores_used(o.machine),
+            )
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
-        ]
+        ]  # fmt: skip
 
     def save(self) -> None:
         """Appends to the file what was added since it was read."""
@@ -92,6 +103,12 @@ class History:
         atomic.write_text(self.path, "".join(lines[len(lines) // 2 :]))
 
 
+def _cores_used(load: MachineLoad | None) -> float | None:
+    if load is None or load.application is None or load.services is None:
+        return None
+    return round((load.application.ran_s + load.services.ran_s) / load.duration_s, 3)
+
+
 def _read(path: Path) -> Iterator[PastRun]:
     """The valid lines; one that a killed run left unfinished is skipped."""
     try:
@@ -102,6 +119,6 @@ def _read(path: Path) -> Iterator[PastRun]:
         with contextlib.suppress(ValueError, TypeError, RecursionError):
             run = PastRun(**json.loads(line))
             texts = (run.spec, run.test, run.level, run.backend, run.clock, run.outcome)
-            times = (run.setup_s, run.execution_s)
+            times = (run.setup_s, run.execution_s, run.cores or 0.0)
             if all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):
                 yield run

@@ -2,6 +2,7 @@
 
 import asyncio
 from dataclasses import replace
+from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -25,6 +26,17 @@ def test_larger_pictures_need_more_cores() -> None:
     endless = replace(empty, services=(camera(width="nan", height="240", freq="inf"),))
     assert cores_needed(endless) == cores_needed(empty)
     assert cores_needed(replace(empty, rig="kiwi")) == 2.0
+
+
+def test_what_earlier_runs_used_counts_more_than_pictures() -> None:
+    large = replace(plan(), services=(camera(width="1280", height="720", freq="30"),))
+    assert cores_needed(large, 0.4) == 0.6
+    assert cores_needed(large, 0.0) == 0.1
+    assert cores_needed(replace(large, clock="lockstep"), 0.4) == 1.0
+    assert cores_needed(replace(large, rig="kiwi"), 0.4) == 2.0
+    used = schedule(None, lambda _: 1.0, lambda j: 0.4 if j.test == "large" else None)
+    assert used.need(Job(large, Path(), Path(), "large")) == 0.6
+    assert used.need(Job(large, Path(), Path(), "small")) == cores_needed(large)
 
 
 @given(
@@ -98,6 +110,30 @@ def test_running_jobs_have_less_to_go() -> None:
 def test_a_number_of_jobs_counts_instead_of_cores() -> None:
     assert (schedule(3, lambda _: 1.0).capacity, schedule(3, lambda _: 1.0).need(job("a"))) == (3, 1.0)
     assert schedule(None, lambda _: 1.0).capacity >= 1
+
+
+def test_cores_that_set_up_needs_no_more_are_given_back() -> None:
+    begins: list[tuple[str, float]] = []
+
+    async def use(pool: CorePool, name: str) -> None:
+        async with pool.take(1.0) as share:
+            await asyncio.sleep(2)
+            begins.append((name, asyncio.get_running_loop().time()))
+            share.shrink(0.4)
+            share.shrink(0.4)
+            await asyncio.sleep(10)
+
+    async def scene() -> float:
+        pool = CorePool(2.0)
+        await asyncio.gather(*(use(pool, name) for name in "abcd"))
+        async with asyncio.timeout(0), pool.take(2.0):
+            return asyncio.get_running_loop().time()
+
+    with asyncio.Runner(loop_factory=JumpingLoop) as runner:
+        assert runner.run(scene()) == 24.0
+    assert begins == [("a", 2.0), ("b", 2.0), ("c", 4.0), ("d", 14.0)], (
+        "d waits, as its set-up would disturb the others"
+    )
 
 
 def test_first_come_first_served() -> None:

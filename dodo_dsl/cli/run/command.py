@@ -12,7 +12,7 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run import progress, summary
-from dodo_dsl.cli.run.forecast import at_once, expectation, forecast
+from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
 from dodo_dsl.diagnostics import printable
@@ -125,7 +125,7 @@ def _runner(
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or default_backend(plans)
-    order = schedule(options.jobs, expectation(backend))
+    order = schedule(options.jobs, expectation(backend), usage(backend))
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{forecast(order, jobs, backend)}\n")
     shown = progress.choose(stdout, [p.slug for p in plans])
