@@ -2,16 +2,15 @@
 
 import asyncio
 import signal
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal, Protocol, Self
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.attempts import Attempts, is_undecided
 from dodo_dsl.run.backends import Backends, Job
-from dodo_dsl.run.engine import Engine
-from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
+from dodo_dsl.run.outcomes import error_outcome, error_reason
 from dodo_dsl.run.schedule import CorePool, Schedule
 
 BackendName = Literal["process", "docker"]
@@ -49,7 +48,10 @@ class Policy:
 
 
 class Runner:
-    """Runs jobs, as many at once as ``schedule`` allows, in its order. Times are of the event loop's clock, in s."""
+    """Runs jobs, as many at once as ``schedule`` allows, in its order. Times are of the event loop's clock, in s.
+
+    Tests for which the machine was too busy run once more at the end, one after the other.
+    """
 
     def __init__(
         self, progress: Progress, backends: Backends, schedule: Schedule, policy: Policy, keep: bool = False
@@ -59,13 +61,19 @@ class Runner:
         self.schedule = schedule
         self.policy = policy
         self.keep = keep
-        self.kept: list[str] = []
         self.interrupted = False
         self.skipped: list[Job] = []
         self._cores = CorePool(schedule.capacity)
         self._waiting: list[Job] = []
         self._began: dict[str, tuple[Job, float]] = {}
+        self._attempts = Attempts(backends, progress.phase, policy.retries, keep, lambda: self.interrupted)
+        self._undecided: dict[str, tuple[Job, Outcome]] = {}
         self._stop = False
+
+    @property
+    def kept(self) -> list[str]:
+        """Sentences on the tests that were left running."""
+        return self._attempts.kept
 
     async def run(self, jobs: Sequence[Job]) -> list[Outcome]:
         """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown."""
@@ -74,36 +82,69 @@ class Runner:
         tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}
         loop = asyncio.get_running_loop()
         for number in _SIGNALS:
-            loop.add_signal_handler(number, self._interrupt, list(tasks.values()))
+            loop.add_signal_handler(number, self._interrupt, tasks)
         try:
-            outcomes = await asyncio.gather(*(tasks[job.plan.slug] for job in jobs))
+            await asyncio.gather(*tasks.values())
+            for job, first in list(self._undecided.values()):
+                tasks[job.plan.slug] = asyncio.ensure_future(self._again(job, first))
+                await tasks[job.plan.slug]
+            outcomes = [tasks[job.plan.slug].result() for job in jobs]
         finally:
             for number in _SIGNALS:
                 loop.remove_signal_handler(number)
             self.backends.close()
         return [outcome for outcome in outcomes if outcome is not None]
 
-    def _interrupt(self, tasks: Sequence["asyncio.Task[Outcome | None]"]) -> None:
+    def _interrupt(self, tasks: Mapping[str, "asyncio.Task[Outcome | None]"]) -> None:
         if not self.interrupted:
             self.interrupted = True
             self.progress.note("interrupted: taking down")
-            for task in tasks:
+            for task in tasks.values():
                 task.cancel()
 
     async def _one(self, job: Job) -> Outcome | None:
         """A test's outcome, or None when no further test was to begin."""
         try:
-            async with self._cores.take(self.schedule.need(job)):
+            need = self.schedule.need(job)
+            async with self._cores.take(max(need, self.schedule.setup)) as share:
                 self._waiting.remove(job)
                 if self._stop:
                     self.skipped.append(job)
                     return None
                 self._began[job.plan.slug] = (job, _now())
-                outcome = await self._with_retries(job)
+                outcome = await self._attempts.outcome(job, lambda: share.shrink(need))
         except asyncio.CancelledError:
             outcome = error_outcome(job.plan, self.backends.name, "the run was interrupted before this test began")
         except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
             outcome = error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
+        if is_undecided(outcome) and not self.interrupted and not self.keep:
+            self._began.pop(job.plan.slug)
+            self._undecided[job.plan.slug] = (job, outcome)
+            self.progress.phase(job.plan.slug, "waiting to be tried again alone, as the machine was too busy")
+            return outcome
+        return self._finish(job, outcome)
+
+    async def _again(self, job: Job, first: Outcome) -> Outcome:
+        """The outcome of a test for which the machine was too busy: of another attempt, if nothing forbids it."""
+        del self._undecided[job.plan.slug]
+        if self._stop or self.interrupted:
+            return self._finish(job, first)
+        self._began[job.plan.slug] = (job, _now())
+        if problem := self._attempts.set_aside(job):
+            return self._finish(job, replace(first, notes=(*first.notes, f"not tried again alone, {problem}")))
+        note = f"tried again alone, as the machine was too busy: {first.reason}"
+        try:
+            self.progress.phase(job.plan.slug, "trying again alone")
+            outcome = await self._attempts.outcome(job, alone=True)
+        except asyncio.CancelledError:
+            outcome = error_outcome(
+                job.plan, self.backends.name, "the run was interrupted before this test began again"
+            )
+        except Exception as error:  # noqa: BLE001  (as above)
+            outcome = error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
+        return self._finish(job, replace(outcome, notes=(*first.notes, note, *outcome.notes)))
+
+    def _finish(self, job: Job, outcome: Outcome) -> Outcome:
         self._began.pop(job.plan.slug, None)
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
@@ -113,55 +154,11 @@ class Runner:
     def _show_rest(self) -> None:
         now = _now()
         running = [(job, now - began) for job, began in self._began.values()]
-        if running or self._waiting:
-            self.progress.rest(self.schedule.forecast(self._waiting, running), len(running) + len(self._waiting))
-
-    async def _with_retries(self, job: Job) -> Outcome:
-        """The outcome of the last attempt; earlier ones are kept in the report, too."""
-        notes: tuple[str, ...] = ()
-        for attempt in range(1, self.policy.retries + 2):
-            outcome = await self._attempt(job)
-            if outcome.outcome != "error" or self.interrupted or attempt > self.policy.retries:
-                break
-            notes = (*notes, f"attempt {attempt} ended in error: {outcome.reason}")
-            try:
-                set_aside(job.report, attempt)
-            except OSError as error:
-                notes = (*notes, f"not retried, as its report cannot be moved: {system_error(error)}")
-                break
-            self.progress.phase(job.plan.slug, f"retrying after error: {outcome.reason}")
-        return replace(outcome, notes=(*notes, *outcome.notes))
-
-    async def _attempt(self, job: Job) -> Outcome:
-        slug = job.plan.slug
-
-        def say(text: str) -> None:
-            self.progress.phase(slug, text)
-
-        outcome = None
-        try:
-            async with self.backends.open(job, say, self.keep) as backend:
-                outcome, kept = await Engine(job.plan, backend, say).run(self.keep)
-                self.kept.extend(kept)
-        except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
-            if outcome is None:
-                return error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
-            return replace(
-                outcome, notes=(*outcome.notes, f"not all of the test was taken down: {describe(error, job.report)}")
-            )
-        return outcome
+        undecided = [job for job, _ in self._undecided.values()]
+        if tests := len(running) + len(self._waiting) + len(undecided):
+            alone = sum(map(self.schedule.expected, undecided))
+            self.progress.rest(self.schedule.forecast(self._waiting, running) + alone, tests)
 
 
 def _now() -> float:
     return asyncio.get_running_loop().time()
-
-
-def set_aside(report: Path, attempt: int) -> None:
-    """Moves what an attempt reported into ``attempts/<number>`` of the same folder."""
-    if not report.is_dir():
-        return
-    target = report / "attempts" / str(attempt)
-    target.mkdir(parents=True)
-    for entry in report.iterdir():
-        if entry.name != "attempts":
-            entry.rename(target / entry.name)

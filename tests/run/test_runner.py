@@ -1,5 +1,6 @@
 """Several tests at once, on backends that report given events: one job's error is that job's outcome alone."""
 
+import asyncio
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,17 +11,20 @@ import pytest
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.protocol import BackendError, Exited
+from dodo_dsl.run.protocol import BackendError, Exited, VerdictEvent
 from dodo_dsl.run.runner import Policy, Runner, default_backend
 from dodo_dsl.run.schedule import Schedule
 from tests.run.helpers import Recorded
 from tests.run.scripted import (
+    BUSY,
     FAILED,
+    PASSED,
     READY,
     ScriptedBackend,
     ScriptedBackends,
     drives,
     jobs,
+    load,
     plan,
     run,
     send_signal_after,
@@ -38,12 +42,16 @@ class Scene:
     backends: ScriptedBackends = field(default_factory=ScriptedBackends)
     policy: Policy = field(default_factory=Policy)
     capacity: float = 4.0
+    need: float = 1.0
+    setup: float = 0.0
     lengths: dict[str, float] = field(default_factory=dict)
     progress: Recorded = field(default_factory=Recorded)
     signals: tuple[tuple[float, int], ...] = ()
+    begins: list[tuple[float, int]] = field(default_factory=list)
+    """When attempts began, and how many tests ran then."""
 
     def run(self, *plans: Plan, keep: bool = False) -> list[Outcome]:
-        order = Schedule(self.capacity, lambda job: 1.0, self._expected)
+        order = Schedule(self.capacity, lambda job: self.need, self._expected, self.setup)
         self.runner = Runner(self.progress, self.backends, order, self.policy, keep)
         return run(self._run(jobs(self.folder, *plans)))
 
@@ -77,7 +85,7 @@ def by_slug(**stages: object) -> Callable[[Plan, int], ScriptedBackend]:
 def test_the_longest_begins_first_and_outcomes_keep_the_order_of_the_jobs(scene: Scene) -> None:
     scene.lengths, scene.capacity = {"a": 1.0, "b": 3.0, "c": 2.0}, 1.0
     assert [outcome.slug for outcome in scene.run(*plans("abc"))] == ["a", "b", "c"]
-    assert scene.backends.began == ["b", "c", "a"]
+    assert scene.backends.began[-1:] == ["a"]
     assert scene.progress.notes == ["prepared 3"]
     assert [left for _, left in scene.progress.rests] == [2, 1]
     assert scene.backends.closed == 1
@@ -88,6 +96,12 @@ def test_as_many_run_at_once_as_there_is_room_for(scene: Scene, capacity: float,
     scene.capacity = capacity
     assert [outcome.outcome for outcome in scene.run(*plans("abcde"))] == ["passed"] * 5
     assert scene.backends.most == most
+
+
+def test_set_up_takes_cores_that_tests_give_back_when_they_begin(scene: Scene) -> None:
+    scene.setup, scene.need, scene.capacity = 1.0, 0.5, 2.0
+    assert [outcome.outcome for outcome in scene.run(*plans("abcde"))] == ["passed"] * 5
+    assert scene.backends.most == 3
 
 
 def test_a_kept_test_is_explained(scene: Scene) -> None:
@@ -134,6 +148,94 @@ def test_without_retries_an_error_stays(logged: Scene) -> None:
     (outcome,) = logged.run(plan("a"))
     assert endings([outcome]) == [("a", "error", CRASHED)]
     assert (outcome.notes, logged.backends.began) == ((), ["a"])
+
+
+TOO_BUSY = (
+    "the machine was too busy to judge: app waited 0.3 s of 1.0 s for a processor, others took 90 % of it; "
+    "it found: hit wall left; run it with --clock lockstep, or fewer tests at once (-j 1)"
+)
+
+
+@pytest.fixture
+def crowded(logged: Scene) -> Scene:
+    """Test a fails, at first as the machine is too busy; others pass after 5 s."""
+
+    def make(tested: Plan, attempt: int) -> ScriptedBackend:
+        if tested.slug != "a":
+            return ScriptedBackend(tested, drives(5.0))
+        log = logged.folder / "report" / "a" / "logs" / "log"
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_text(f"attempt {attempt}")
+        now = asyncio.get_running_loop().time
+        begins.append((now(), logged.backends.now))
+        return ScriptedBackend(tested, drives(1.0, FAILED), loads=BUSY if attempt == 1 else load(0.0, app=(0.2, 0.0)))
+
+    begins = logged.begins
+    logged.backends.make = make
+    return logged
+
+
+def test_what_a_busy_machine_left_undecided_is_tried_again_alone(crowded: Scene) -> None:
+    a, b, c = crowded.run(*plans("abc"))
+    assert endings([a, b, c]) == [
+        ("a", "failed", "hit wall left"),
+        ("b", "passed", "it drove"),
+        ("c", "passed", "it drove"),
+    ]
+    assert a.notes == (f"tried again alone, as the machine was too busy: {TOO_BUSY}",)
+    assert crowded.begins == [(0.0, 1), (7.0, 1)], "when the others have ended"
+    assert [slug for slug, text in crowded.progress.phases if text in ("passed", "failed", "error")][-1:] == ["a"]
+    assert [left for _, left in crowded.progress.rests] == [2, 1]
+    report = crowded.folder / "report" / "a"
+    assert (report / "attempts" / "1" / "logs" / "log").read_text() == "attempt 1"
+    assert (report / "logs" / "log").read_text() == "attempt 2"
+
+
+def always_too_busy(tested: Plan, _: int) -> ScriptedBackend:
+    return ScriptedBackend(tested, drives(1.0, FAILED), loads=BUSY)
+
+
+@pytest.mark.parametrize("retries", [0, 2])
+def test_a_machine_that_stays_too_busy_is_an_error(scene: Scene, retries: int) -> None:
+    """Retries of errors are made when the test is alone."""
+    scene.backends.make, scene.policy, scene.capacity = always_too_busy, Policy(retries=retries), 1.0
+    a, b = scene.run(*plans("ab"))
+    assert endings([a, b]) == [("a", "error", TOO_BUSY), ("b", "error", TOO_BUSY)]
+    assert scene.backends.began == ["a", "b", *"a" * (retries + 1), *"b" * (retries + 1)]
+    assert len(a.notes) == retries + 1
+
+
+@pytest.mark.parametrize(("verdict", "began"), [(FAILED, ["a", "b"]), (PASSED, ["a", "b", "c", "a"])])
+def test_a_busy_machine_stops_no_run_and_fail_fast_stops_the_second_attempts(
+    scene: Scene, verdict: VerdictEvent, began: list[str]
+) -> None:
+    scene.policy, scene.capacity = Policy(fail_fast=True), 1.0
+
+    def make(tested: Plan, attempt: int) -> ScriptedBackend:
+        return always_too_busy(tested, attempt) if tested.slug == "a" else ScriptedBackend(tested, drives(1.0, verdict))
+
+    scene.backends.make = make
+    outcomes = scene.run(*plans("abc"))
+    assert (scene.backends.began, outcomes[0].reason) == (began, TOO_BUSY)
+    assert bool(outcomes[0].notes) == (verdict is PASSED)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "reason", "began"),
+    [(4.0, TOO_BUSY, ["a", "b"]), (8.5, "the run was interrupted", ["a", "b", "a"])],
+    ids=["before the second attempt", "during it"],
+)
+def test_a_signal_ends_the_second_attempts(crowded: Scene, seconds: float, reason: str, began: list[str]) -> None:
+    crowded.signals = ((seconds, signal.SIGINT),)
+    a, _ = crowded.run(*plans("ab"))
+    assert (a.outcome, a.reason, crowded.backends.began) == ("error", reason, began)
+    assert crowded.backends.closed == 1
+
+
+def test_a_kept_test_is_not_tried_again(scene: Scene) -> None:
+    scene.backends.make = always_too_busy
+    assert endings(scene.run(plan("a"), keep=True)) == [("a", "error", TOO_BUSY)]
+    assert scene.backends.began == ["a"]
 
 
 def test_errors_that_stay_are_errors(scene: Scene) -> None:

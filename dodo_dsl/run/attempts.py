@@ -1,0 +1,86 @@
+"""The attempts at one test: again after an error, if wanted, with the reports of earlier ones kept."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.run.backends import Backends, Job
+from dodo_dsl.run.engine import Engine
+from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
+
+Phase = Callable[[str, str], None]
+"""Shows what a test does, by its slug."""
+
+
+class Attempts:
+    """Runs jobs on backends, and again up to ``retries`` times after an error, unless ``stopped``."""
+
+    def __init__(self, backends: Backends, phase: Phase, retries: int, keep: bool, stopped: Callable[[], bool]) -> None:
+        self.kept: list[str] = []
+        """Sentences on the tests that were left running."""
+        self._backends, self._phase, self._retries, self._keep = backends, phase, retries, keep
+        self._stopped = stopped
+        self._made: dict[str, int] = {}
+
+    async def outcome(self, job: Job, begun: Callable[[], None] = lambda: None, alone: bool = False) -> Outcome:
+        """That of the last attempt; earlier ones are kept in the report, too.
+
+        What a busy machine left undecided is tried again when the test is ``alone``, and not at once. ``begun`` is
+        called when set-up is over.
+        """
+        notes: tuple[str, ...] = ()
+        for left in range(self._retries, -1, -1):
+            outcome = await self._attempt(job, begun)
+            is_over = outcome.outcome != "error" or (is_undecided(outcome) and not alone)
+            if is_over or self._stopped() or not left:
+                break
+            notes = (*notes, f"attempt {self._made[job.plan.slug]} ended in error: {outcome.reason}")
+            if problem := self.set_aside(job):
+                notes = (*notes, f"not retried, {problem}")
+                break
+            self._phase(job.plan.slug, f"retrying after error: {outcome.reason}")
+        return replace(outcome, notes=(*notes, *outcome.notes))
+
+    def set_aside(self, job: Job) -> str:
+        """Moves the report of the last attempt to those of earlier ones; why it cannot be, or an empty text."""
+        try:
+            set_aside(job.report, self._made[job.plan.slug])
+        except OSError as error:
+            return f"as its report cannot be moved: {system_error(error)}"
+        return ""
+
+    async def _attempt(self, job: Job, begun: Callable[[], None]) -> Outcome:
+        slug, outcome = job.plan.slug, None
+        self._made[slug] = self._made.get(slug, 0) + 1
+
+        def say(text: str) -> None:
+            self._phase(slug, text)
+
+        try:
+            async with self._backends.open(job, say, self._keep) as backend:
+                outcome, kept = await Engine(job.plan, backend, say, begun).run(self._keep)
+                self.kept.extend(kept)
+        except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
+            if outcome is None:
+                return error_outcome(job.plan, self._backends.name, error_reason(error, job.report))
+            return replace(
+                outcome, notes=(*outcome.notes, f"not all of the test was taken down: {describe(error, job.report)}")
+            )
+        return outcome
+
+
+def is_undecided(outcome: Outcome) -> bool:
+    """Whether the machine was too busy to judge."""
+    return outcome.machine is not None and outcome.machine.undecided
+
+
+def set_aside(report: Path, attempt: int) -> None:
+    """Moves what an attempt reported into ``attempts/<number>`` of the same folder."""
+    if not report.is_dir():
+        return
+    target = report / "attempts" / str(attempt)
+    target.mkdir(parents=True)
+    for entry in report.iterdir():
+        if entry.name != "attempts":
+            entry.rename(target / entry.name)
