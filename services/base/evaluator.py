@@ -49,6 +49,11 @@ class Evaluator(Service, ABC):
         """Time zero; 0 while it is not known."""
         return self._zero or 0
 
+    @property
+    def arrival(self) -> int | None:
+        """When the message that is handled arrived, in us; None while no time is known."""
+        return self.now if self.arrived is None else self.arrived
+
     def begin(self, now: int) -> None:
         if not self._has_begun:
             self._has_begun, self._zero = True, now

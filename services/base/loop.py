@@ -94,6 +94,7 @@ class Loop:
         """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored."""
         if not self.clock.relays and self.service.observe is not None:
             self.service.observe(envelope)
+        self.service.arrived = self.clock.now() if self.clock.relays else envelope.received
         if envelope.data_type == self._begin:
             self.service.begin(envelope.sample_time)
             self._lateness.begin()

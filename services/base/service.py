@@ -46,6 +46,8 @@ class Service:
     finished: bool = False
     late_after: float | None = None
     """Microseconds after which an update that ends counts as late; None for half a period, and 10 ms at least."""
+    arrived: int | None = None
+    """When the message that is handled, or was last, arrived, in microseconds of test time."""
     drive: Callable[[Callable[[], bool]], None] | None = None
     """Runs instead of the loop, for the clock service. Takes a function that says whether to stop."""
 

@@ -1,20 +1,28 @@
-"""How far a signal is from its target: equations 4.6 to 4.9 of the thesis, and the checks made of them."""
+"""How far a signal is from its target: equations 4.6 to 4.9 of the thesis, the same over time, and the checks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from services.base import Check
+from services.continuous_signal.coverage import Coverage, cover, holds
 from services.continuous_signal.target import MICROSECONDS, Target, Times, Values
+
+_DIGITS = 12
 
 
 @dataclass(frozen=True)
 class SignalLimits:
     """Limits of a signal, in its own unit; None for no limit.
 
-    `start` and `until` are the window of time that is judged, in microseconds, both included; at least `samples`
-    have to be judged.
+    `start` and `until` are the window of time that is judged, both included; at least `samples` have to be judged.
+    A sample holds until the next one and at most for `hold`: of the judged time a share of `coverage` has to be
+    held, and no time without a sample may be longer than `gap`. A sample whose time is more than `delay` from its
+    arrival is late. Until the first sample nothing has to be held if that comes within `start_up` of the target's time.
+    All times in microseconds.
     """
 
     mean: float | None = None
@@ -25,6 +33,11 @@ class SignalLimits:
     samples: int = 1
     start: int = 0
     until: int | None = None
+    coverage: float | None = None
+    gap: int | None = None
+    hold: int = MICROSECONDS // 2
+    delay: int | None = None
+    start_up: int = 0
 
 
 @dataclass(frozen=True)
@@ -40,7 +53,9 @@ class WorstSample:
 class SignalMeasures:
     """The distances d of `samples` samples; `received` counts all in the window, `outside` those without a target.
 
-    `broken` holds the times (s) of those in the window that are not finite. Without a sample all else is None.
+    `broken` holds the times (s) of those in the window that are not finite. `mean`, `std` and `distance` are over
+    samples, `mean_over_time`, `std_over_time` and `share` over the time that these hold. Without a sample all else
+    is None.
     """
 
     received: int
@@ -52,37 +67,59 @@ class SignalMeasures:
     distance: float | None = None
     share: float | None = None
     worst: WorstSample | None = None
+    mean_over_time: float | None = None
+    std_over_time: float | None = None
+    coverage: Coverage | None = None
 
     def checks(self, limits: SignalLimits) -> tuple[Check, ...]:
         """Each measure with its limit; one that has no value does not keep a limit."""
         share = () if limits.band is None else (_check("share", self.share, "min", limits.share),)
+        held, gap = (self.coverage.share, self.coverage.gap) if self.coverage else (None, None)
+        longest = None if limits.gap is None else limits.gap / MICROSECONDS
         return (
             _check("mean", self.mean, "max", limits.mean),
             _check("std", self.std, "max", limits.std),
             _check("distance", self.distance, "max", limits.distance),
+            _check("mean-over-time", self.mean_over_time, "max", limits.mean),
+            _check("std-over-time", self.std_over_time, "max", limits.std),
             *share,
             _check("samples", self.samples, "min", limits.samples),
+            _check("gap", gap, "max", longest, "s"),
+            _check("coverage", held, "min", limits.coverage),
             Check("outside", self.outside),
             _check("broken", len(self.broken), "max", 0),
         )
 
 
-def measure(target: Target, times: Times, values: Values, limits: SignalLimits) -> SignalMeasures:
-    """The measures of samples in any order, their times in microseconds on the target's own scale."""
+def measure(
+    target: Target, times: Times, values: Values, limits: SignalLimits, judged: tuple[int, int] | None = None
+) -> SignalMeasures:
+    """The measures of samples in any order, their times in microseconds on the target's own scale.
+
+    ``judged`` is the part of the target's time that they have to cover; by default all of it.
+    """
     inside = times >= limits.start
     if limits.until is not None:
         inside &= times <= limits.until
-    times, values = times[inside], values[inside]
+    order = np.argsort(times[inside], kind="stable")
+    times, values = times[inside][order], values[inside][order]
     finite = np.isfinite(values)
-    broken = tuple((np.sort(times[~finite]) / MICROSECONDS).tolist())
+    broken = tuple((times[~finite] / MICROSECONDS).tolist())
     expected = target.at(times)
     known = finite & ~np.isnan(expected)
     samples, outside = int(known.sum()), int((finite & ~known).sum())
+    begin, end = judged or judged_time(target, limits)
+    if samples and times[known][0] <= limits.start_up:
+        begin = max(begin, int(times[known][0]))
+    coverage = _coverage(times[known], begin, end, limits.hold)
     if not samples:
-        return SignalMeasures(len(times), 0, outside, broken)
+        return SignalMeasures(len(times), 0, outside, broken, coverage=coverage)
     times, values, expected = times[known], values[known], expected[known]
     distances: Values = np.abs(values - expected)
     at = int(np.argmax(distances))
+    weights = holds(times, max(end, int(times[-1])), limits.hold)
+    weights = weights if weights.any() else np.ones(samples)
+    mean = _average(distances, weights)
     return SignalMeasures(
         received=len(known),
         samples=samples,
@@ -91,14 +128,32 @@ def measure(target: Target, times: Times, values: Values, limits: SignalLimits) 
         mean=float(distances.mean()),
         std=float(distances.std()),
         distance=float(distances[at]),
-        share=None if limits.band is None else float((distances <= limits.band).mean()),
+        share=None if limits.band is None else _average(distances <= limits.band, weights),
         worst=WorstSample(float(times[at]) / MICROSECONDS, float(values[at]), float(expected[at])),
+        mean_over_time=mean,
+        std_over_time=round(float(np.sqrt(np.average((distances - mean) ** 2, weights=weights))), _DIGITS),
+        coverage=coverage,
     )
 
 
-def _check(name: str, value: float | None, side: str, limit: float | None) -> Check:
+def judged_time(target: Target, limits: SignalLimits) -> tuple[int, int]:
+    """The part of the target's time that is in the window, in microseconds; empty where it ends before it begins."""
+    begin, end = int(target.times[0]), int(target.times[-1])
+    return max(begin, limits.start), end if limits.until is None else min(end, limits.until)
+
+
+def _average(values: NDArray[Any], weights: Values) -> float:
+    """Rounded, so that a value that equals its limit keeps it."""
+    return round(float(np.average(values, weights=weights)), _DIGITS)
+
+
+def _coverage(times: Times, begin: int, end: int, hold: int) -> Coverage | None:
+    return cover(times[(times >= begin) & (times <= end)], begin, end, hold) if begin < end else None
+
+
+def _check(name: str, value: float | None, side: str, limit: float | None, unit: str = "") -> Check:
     if limit is None:
-        return Check(name, value)
+        return Check(name, value, {}, unit)
     ok = value is not None and (value <= limit if side == "max" else value >= limit)
     bounds: Mapping[str, float] = {side: limit}
-    return Check(name, value, bounds, "", ok)
+    return Check(name, value, bounds, unit, ok)

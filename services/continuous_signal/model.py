@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
-from services.continuous_signal.measures import SignalLimits, measure
+from services.continuous_signal.late import LateSamples
+from services.continuous_signal.measures import SignalLimits, judged_time, measure
 from services.continuous_signal.reason import verdict
-from services.continuous_signal.target import Target, Times, Values, in_order
+from services.continuous_signal.target import MICROSECONDS, Target, Times, Values, in_order
 
 MOST_SAMPLES = 10_000_000
 
@@ -36,8 +37,8 @@ class Samples:
 class SignalEvaluator(Evaluator):
     """Consumes a signal, and the target where that is ``None``.
 
-    Samples count from the begin of the test, or else from the target's own start. They may come in any order and are
-    kept until the verdict, which comes at MOST_SAMPLES of them at the latest.
+    Samples count from the begin of the test, or else from the target's own start. They may come in any order, but not
+    late, and are kept until the verdict, which comes at MOST_SAMPLES of them at the latest.
     """
 
     def __init__(
@@ -48,10 +49,11 @@ class SignalEvaluator(Evaluator):
         self._signal, self._target, self._limits = signal, target, limits
         self._from_begin = from_begin or target is None
         self._samples, self._targets = Samples(), Samples()
+        self._late = LateSamples(limits.delay, self._from_begin)
 
     def take(self, value: float, time: int) -> None:
         """A sample of the signal; a value that is not finite is a fault of the application."""
-        if self.verdict is None:
+        if self.verdict is None and not self._late.take(time, self.arrival):
             self._samples.add(time, value)
 
     def take_target(self, value: float, time: int) -> None:
@@ -72,6 +74,33 @@ class SignalEvaluator(Evaluator):
         target = self._target or in_order(*self._targets.since(begin))
         if not len(target.times):
             raise UnjudgeableError(f"no sample of the target came {span.within}")
-        times, values = self._samples.since(begin if self._from_begin else target.start)
-        measures = measure(target, times, values, self._limits)
-        return verdict(self._signal, target, measures, self._limits, span.within)
+        start = begin if self._from_begin else target.start
+        times, values = self._samples.since(start)
+        judged = self._judged(target, span.is_complete)
+        measures = measure(target, times, values, self._limits, judged)
+        return verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
+
+    def _judged(self, target: Target, is_complete: bool) -> tuple[int, int]:
+        """What samples have to cover of the target's time (us): of what was observed of it, all in the window.
+
+        Raises UnjudgeableError when that is nothing.
+        """
+        first, end = judged_time(target, self._limits)
+        observed = self._observed(target, is_complete)
+        if first >= min(end, observed):
+            spans = f"the target is from {target.span[0]:.2f} s to {target.span[1]:.2f} s"
+            until = "" if self._limits.until is None else f" until {self._limits.until / MICROSECONDS:.2f} s"
+            window = f"judged is from {self._limits.start / MICROSECONDS:.2f} s{until}"
+            ended = f", and the test ended after {observed / MICROSECONDS:.2f} s" if observed < end else ""
+            raise UnjudgeableError(f"there is no time to judge: {spans}, {window}{ended}")
+        return first, min(end, observed)
+
+    def _observed(self, target: Target, is_complete: bool) -> int:
+        """Until when the target's time was observed, in us; with sample times of their own by the newest sample."""
+        now = self.now or self.zero
+        if self._from_begin:
+            return min(now - self.zero, round(self._max_time * MICROSECONDS))
+        newest = self._late.newest
+        if is_complete or newest is None:
+            return int(target.times[-1])
+        return newest.time - target.start + (now - newest.arrival)

@@ -83,4 +83,9 @@ def _limits(flags: Flags) -> SignalLimits:
         samples=flags["min-samples"],
         start=round(flags["from"] * MICROSECONDS),
         until=None if until is None else round(until * MICROSECONDS),
+        coverage=flags["min-coverage"],
+        gap=round(flags["max-gap"] * MICROSECONDS),
+        hold=round(flags["hold"] * MICROSECONDS),
+        start_up=round(flags["start-up"] * MICROSECONDS),
+        delay=round(flags["max-delay"] * MICROSECONDS),
     )

@@ -1,21 +1,24 @@
 import numpy as np
 import pytest
 
+from services.continuous_signal.late import LateFacts
 from services.continuous_signal.measures import SignalLimits, SignalMeasures, WorstSample
 from services.continuous_signal.reason import verdict
 from services.continuous_signal.target import Target
 
 TARGET = Target(np.array([0, 10_000_000]), np.array([0.0, 1.0]))
-GOOD = SignalMeasures(12, 12, 0, (), mean=0.01, std=0.02, distance=0.3, share=0.9, worst=WorstSample(12.3, 0.1, 0.4))
+GOOD = SignalMeasures(
+    12, 12, 0, (), mean=0.01, std=0.02, distance=0.3, share=0.9, worst=WorstSample(12.3, 0.1, 0.4), mean_over_time=0.01
+)
 LIMITS = SignalLimits(mean=0.05, band=0.1, share=0.8, samples=10)
 
 
 def reason(measures: SignalMeasures, limits: SignalLimits = LIMITS) -> str:
-    return verdict("speed", TARGET, measures, limits, "within 9.00 s").reason
+    return verdict("speed", TARGET, measures, limits, "within 9.00 s", LateFacts()).reason
 
 
 def test_a_pass_names_the_kept_limits() -> None:
-    passed = verdict("speed", TARGET, GOOD, LIMITS, "")
+    passed = verdict("speed", TARGET, GOOD, LIMITS, "", LateFacts())
     assert (passed.outcome, passed.silent) == ("passed", False)
     assert passed.reason == (
         "speed kept to its target over 12 samples: mean 0.01 (at most 0.05), share 0.9 (at least 0.8); "
@@ -26,10 +29,17 @@ def test_a_pass_names_the_kept_limits() -> None:
 def test_all_broken_limits_are_named() -> None:
     bad = SignalMeasures(12, 9, 3, (4.5,), mean=0.0500001, std=0.0, distance=0.3, share=0.5)
     assert reason(bad) == (
-        "the mean distance is 0.0500001 (at most 0.05); the share of samples within 0.1 of the target is 0.5 "
+        "the mean distance is 0.0500001 (at most 0.05); the share of time within 0.1 of the target is 0.5 "
         "(at least 0.8); only 9 samples came (at least 10), and 3 outside the target's time; "
         "1 samples are not finite numbers, the first at 4.50 s"
     )
+
+
+def test_over_time_is_told_only_where_it_says_more() -> None:
+    both = SignalMeasures(12, 12, 0, (), mean=0.06, share=0.9, mean_over_time=0.07)
+    assert reason(both) == "the mean distance is 0.06 (at most 0.05)"
+    one = SignalMeasures(12, 12, 0, (), mean=0.05, share=0.9, mean_over_time=0.07)
+    assert reason(one) == "the mean distance over time is 0.07 (at most 0.05)"
 
 
 @pytest.mark.parametrize(
@@ -42,5 +52,5 @@ def test_all_broken_limits_are_named() -> None:
     ],
 )
 def test_without_samples_the_reason_is_why(measures: SignalMeasures, text: str) -> None:
-    failed = verdict("speed", TARGET, measures, LIMITS, "within 9.00 s")
+    failed = verdict("speed", TARGET, measures, LIMITS, "within 9.00 s", LateFacts())
     assert (failed.outcome, failed.reason, failed.silent) == ("failed", text, measures.received == 0)

@@ -19,6 +19,7 @@ from tests.services.process import PATIENCE, ROOT, running, send
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
 START = 1_700_000_000_000_000
+SPARSE = ("--min-coverage=0", "--max-gap=100", "--max-delay=100")
 FLAGS = (f"--message={STEERING}", "--field=groundSteering", "--max-mean=0.05")
 
 
@@ -42,7 +43,7 @@ def steering(value: float) -> Any:
 
 
 def test_a_table_is_met_from_the_begin_of_the_test(table: Path) -> None:
-    judge = service(f"--target={table}", "--sender=3", "--min-samples=1")
+    judge = service(f"--target={table}", "--sender=3", "--min-samples=1", *SPARSE)
     assert set(judge.inputs) == {(STEERING, 3)}
     judge.begin(START)
     judge.inputs[STEERING, 3](steering(0.5), START + 5_000_000)
@@ -52,7 +53,7 @@ def test_a_table_is_met_from_the_begin_of_the_test(table: Path) -> None:
 
 def test_a_recording_is_met_at_its_sample_times(tmp_path: Path) -> None:
     path = recording(tmp_path, (102_000_000, 3, 0.25), (104_000_000, 3, 0.75))
-    judge = service(f"--target={path}", "--sender=3", "--min-samples=1", "--align=sample-time", "--from=2.5")
+    judge = service(f"--target={path}", "--sender=3", "--min-samples=1", "--align=sample-time", "--from=2.5", *SPARSE)
     judge.begin(START)
     judge.inputs[STEERING, 3](steering(9.0), 102_400_000)
     judge.inputs[STEERING, 3](steering(0.5), 103_000_000)
@@ -62,7 +63,7 @@ def test_a_recording_is_met_at_its_sample_times(tmp_path: Path) -> None:
 
 
 def test_a_live_target_has_its_own_message(table: Path) -> None:
-    judge = service("--target-sender=9", "--min-samples=1")
+    judge = service("--target-sender=9", "--min-samples=1", *SPARSE)
     assert set(judge.inputs) == {(STEERING, 0), (STEERING, 9)}
     judge.begin(START)
     judge.inputs[STEERING, 9](steering(0.5), START)
@@ -100,8 +101,9 @@ def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
 
 
 def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
-    start = time.time_ns() // 1000
-    words = (f"--cid={cid}", *FLAGS, f"--target={table}", "--band=0.05", "--min-share=0.5")
+    start = time.time_ns() // 1000 - 10_100_000
+    limits = ("--band=0.05", "--min-share=0.5", "--max-delay=60")
+    words = (f"--cid={cid}", *FLAGS, f"--target={table}", *limits)
     with Session(cid) as session, running("continuous_signal", tmp_path, *words) as process:
         send(session, "dodo.TestBegin", sample_time=start)
         for step in range(101):
@@ -119,6 +121,21 @@ def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
         "name": "mean", "value": pytest.approx(expected, abs=1e-6), "limit": {"max": 0.05}, "unit": "", "ok": True
     }  # fmt: skip
     assert checks["samples"]["value"] == 101
+
+
+def test_by_default_silence_and_times_far_from_the_arrival_fail(table: Path) -> None:
+    judge = service(f"--target={table}")
+    judge.begin(START)
+    for step in range(50):
+        judge.arrived = START + step * 100_000
+        judge.inputs[STEERING, 0](steering(step / 100), START + step * 100_000)
+    for step in range(50, 100):
+        judge.arrived = START + 9_900_000
+        judge.inputs[STEERING, 0](steering(step / 100), START + step * 100_000 - 2_000_000)
+    judge.end_of_input(START + 10_000_000)
+    assert judge.verdict is not None and judge.verdict.outcome == "failed"
+    assert judge.verdict.reason.startswith("nothing came between 4.90 s and 10.00 s (at most 1 s); the samples cover ")
+    assert "left out: 50 samples whose time is not that of the arrival" in judge.verdict.reason
 
 
 def test_a_silent_application_fails_when_the_time_is_over(table: Path) -> None:
