@@ -61,7 +61,8 @@ class Detections:
 class DetectedFrame:
     """A frame with at least one message, the first at ``since`` (microseconds of test time).
 
-    ``has_truth``: its truth is known to be complete, even if empty; ``answered``: the application sent something.
+    ``has_truth``: its truth is known to be complete, even if empty; ``answered``: when the application first sent
+    something, in s of the test.
     """
 
     key: FrameKey
@@ -69,7 +70,7 @@ class DetectedFrame:
     found: Detections = field(default_factory=Detections)
     true: Detections = field(default_factory=Detections)
     has_truth: bool = False
-    answered: bool = False
+    answered: float | None = None
 
 
 def plain(label: str) -> str:

@@ -5,10 +5,11 @@ from collections.abc import Callable, Sequence
 from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
 from services.object_detection.boxes import Box, LabelledBox
-from services.object_detection.counts import compare
+from services.object_detection.counts import CountsByClass, compare
 from services.object_detection.frames import DetectedFrame, Detections, FrameKey, Value
 from services.object_detection.reason import verdict
 from services.object_detection.score import DetectionLimits, Rules, Score
+from services.object_detection.silence import JudgedFrame, Silence
 from services.object_detection.truth import Truth
 
 
@@ -22,7 +23,7 @@ class DetectionEvaluator(Evaluator):
     def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits) -> None:
         super().__init__(rules.max_time, rules.max_delay)
         self._truth, self._rules, self._limits = truth, rules, limits
-        self._score = Score()
+        self._score, self._silence = Score(), Silence(rules.start_up)
         self._frames: dict[int, DetectedFrame] = {}
         self._judged: set[int] = set()
         self._passed_over: set[int] = set()
@@ -32,7 +33,7 @@ class DetectionEvaluator(Evaluator):
 
     def forget(self, now: int) -> None:
         self.now = max(now, self.now or 0)
-        self._score = Score()
+        self._score, self._silence = Score(), Silence(self._rules.start_up)
         self._passed_over |= self._judged
         self._judged.clear()
         for frame in self._frames.values():
@@ -51,9 +52,10 @@ class DetectionEvaluator(Evaluator):
     def announce(self, key: FrameKey, by_application: bool) -> None:
         """There is such a frame; if the application says so, it has answered it."""
         frame = self._frame(key)
-        if frame is not None:
-            frame.answered |= by_application
-            frame.has_truth |= not by_application
+        if frame is not None and by_application:
+            self._answer(frame)
+        elif frame is not None:
+            frame.has_truth = True
 
     def advance(self, now: int) -> None:
         self._settle(lambda frame: now - frame.since >= self._rules.max_delay * MICROSECONDS)
@@ -70,15 +72,43 @@ class DetectionEvaluator(Evaluator):
         for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
             if self._truth and (span.is_complete or key < self._last):
                 counts = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
-                self._score.add(counts, f"of picture {key}", False)
+                self._count(counts, JudgedFrame(key, f"of picture {key}", None))
+        if self._truth is None or span.is_complete:
+            self._require_truth(span.within)
+        end = self.elapsed(self.now if self._ended is None else self._ended) if self.now is not None else 0.0
+        self._score.unanswered = self._silence.unanswered()
+        self._score.gap = self._silence.gap(self._rules.start, min(end, self._max_time))
         return verdict(self._score, self._limits, span.within)
+
+    def _require_truth(self, within: str) -> None:
+        """Raises UnjudgeableError when there was nothing to find in any frame, or nothing of a class that counts."""
+        if not self._score.frames:
+            return
+        counts = dict(self._score.counts)
+        there = {label for label, each in counts.items() if each.hits + each.missed}
+        missing = [label for label in self._rules.labels if label not in there]
+        if missing and self._truth is None:
+            raise UnjudgeableError(f"no true box of class '{missing[0]}' came {within}")
+        if not there:
+            raise UnjudgeableError(f"none of {self._score.frames} frames has a true box {within}")
+
+    def _answer(self, frame: DetectedFrame) -> None:
+        if frame.answered is None and self.now is not None:
+            frame.answered = self.elapsed(self.now)
+            self._silence.answers.append(frame.answered)
+
+    def _count(self, counts: CountsByClass, frame: JudgedFrame) -> None:
+        total = counts.total()
+        self._score.add(counts, frame.place, frame.answered is not None)
+        self._silence.frames.append(frame._replace(expects=bool(total.hits + total.missed)))
 
     def _take(self, key: FrameKey, number: int, value: Value, side: Callable[[DetectedFrame], Detections]) -> None:
         frame = self._frame(key)
         if frame is not None:
             detections = side(frame)
             detections.add(number, value)
-            frame.answered |= detections is frame.found
+            if detections is frame.found:
+                self._answer(frame)
         elif key.time in self._judged and isinstance(value, Box):
             self._score.late += 1
 
@@ -110,7 +140,8 @@ class DetectionEvaluator(Evaluator):
             self._score.without_truth += 1
             return
         counts = compare(frame.found.labelled(), true, self._rules.iou, self._rules.labels)
-        self._score.add(counts, f"at {self.elapsed(frame.since):.2f} s", frame.answered)
+        order = frame.key.number if self._truth and self._truth.frames == "number" else frame.key.time
+        self._count(counts, JudgedFrame(order, f"at {self.elapsed(frame.since):.2f} s", frame.answered))
 
     def _true(self, frame: DetectedFrame) -> Sequence[LabelledBox] | None:
         """The true boxes of a frame; each picture of a file holds for one frame, unless there is one for all."""

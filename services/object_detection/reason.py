@@ -30,7 +30,13 @@ def _silence(score: Score, during: str) -> str:
 def _fault(check: Check, score: Score) -> str:
     bound = _bound(check)
     if check.name == "answered":
+        if score.frames > score.answered:
+            return f"answered {score.answered} of {_count(score.frames, 'frame')} ({bound})"
         return f"only {_count(score.answered, 'frame')} had an answer ({bound})"
+    if check.name == "unanswered":
+        return _unanswered(check, score)
+    if check.name == "gap" and score.gap:
+        return f"no answer came between {score.gap.begin:.2f} s and {score.gap.end:.2f} s ({bound} s)"
     measure, _, label = check.name.partition("-")
     name = f"{'F1' if measure == 'f1' else measure}{f' of {label}' if label else ''}"
     if check.value is None:
@@ -39,6 +45,16 @@ def _fault(check: Check, score: Score) -> str:
     wrong = {"precision": _count(counts.false, "false detection"), "recall": f"{counts.missed} missed"}
     both = f"{wrong['precision']} and {wrong['recall']}"
     return f"{name} is {_number(check)} ({bound}), with {wrong.get(measure, both)} beside {counts.hits} found"
+
+
+def _unanswered(check: Check, score: Score) -> str:
+    """How many, and where the longest run is."""
+    count, frames, longest = score.unanswered.silent, score.unanswered.frames, score.unanswered.longest
+    said = f"{count} of {_count(frames, 'frame')} had no answer, a share of {_number(check)} ({_bound(check)})"
+    first, last = (frame.place.partition(" ")[2] for frame in (longest[0], longest[-1]))
+    if len(longest) == 1:
+        return f"{said}, such as the one {longest[0].place}"
+    return f"{said}, the longest run is {len(longest)} frames, from {first} to {last}"
 
 
 def _nothing(measure: str) -> str:
@@ -65,13 +81,15 @@ def _aside(score: Score) -> str:
 
 
 def _bound(check: Check) -> str:
-    return f"at least {check.limit['min']:.4g}"
+    side, limit = next(iter(check.limit.items()))
+    return f"at {'most' if side == 'max' else 'least'} {limit:.4g}"
 
 
 def _number(check: Check) -> str:
     """In full where rounding would hide that it broke its limit."""
     short = f"{check.value:.4g}"
-    return str(check.value) if not check.ok and short == f"{check.limit['min']:.4g}" else short
+    bound = f"{next(iter(check.limit.values())):.4g}"
+    return str(check.value) if not check.ok and short == bound else short
 
 
 def _count(count: int, what: str) -> str:

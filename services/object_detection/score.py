@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from services.base import Check
 from services.object_detection.counts import Counts, CountsByClass
+from services.object_detection.silence import Gap, Unanswered
 
 MEASURES = ("precision", "recall", "f1")
 
@@ -13,7 +14,8 @@ MEASURES = ("precision", "recall", "f1")
 class Rules:
     """How frames are judged: overlap needed, classes that count (all when empty), and times in seconds.
 
-    Frames from before ``start`` do not count. A frame is judged ``max_delay`` after its first message.
+    Frames from before ``start`` do not count. A frame is judged ``max_delay`` after its first message. The first
+    answer may come within ``start_up``.
     """
 
     iou: float
@@ -21,17 +23,23 @@ class Rules:
     max_delay: float
     max_time: float
     start: float = 0.0
+    start_up: float = 0.0
 
 
 @dataclass(frozen=True)
 class DetectionLimits:
-    """The least required values, None for no limit; ``each_class`` applies them to every class, too."""
+    """The least required values, None for no limit; ``each_class`` applies them to every class, too.
+
+    At most a share of ``unanswered`` frames, and ``gap`` s without an answer; None for no limit.
+    """
 
     precision: float | None = None
     recall: float | None = None
     f1: float | None = None
     frames: int = 1
     each_class: bool = False
+    unanswered: float | None = None
+    gap: float | None = None
 
     def of(self, measure: str) -> float | None:
         """The limit of one of MEASURES."""
@@ -56,7 +64,8 @@ class WorstFrame:
 class Score:
     """Counts of the judged frames, and what was left out.
 
-    The application sent something on ``answered`` of the ``frames``. Left out were frames ``without_truth``, and
+    The application sent something on ``answered`` of the ``frames``, and left some ``unanswered`` of those that expect
+    an answer; its longest silence is the ``gap``. Left out were frames ``without_truth``, and
     detections that were ``late`` or ``repeated`` a detectionId.
     """
 
@@ -67,6 +76,8 @@ class Score:
     late: int = 0
     repeated: int = 0
     worst: WorstFrame | None = None
+    unanswered: Unanswered = field(default_factory=lambda: Unanswered(0, 0))
+    gap: Gap | None = None
 
     def add(self, frame: CountsByClass, place: str, answered: bool) -> None:
         """Add a frame's counts; ``place`` names it in sentences."""
@@ -93,6 +104,8 @@ class Score:
             *(_check(name, getattr(total, name), limits.of(name)) for name in MEASURES),
             *(Check(name, value) for name, value in counts.items()),
             _check("answered", self.answered, limits.frames),
+            _at_most("unanswered", self.unanswered.share, limits.unanswered),
+            _at_most("gap", self.gap.end - self.gap.begin if self.gap else None, limits.gap, "s"),
             *(Check(name, value) for name, value in left_out.items()),
             *self._classes(limits),
         )
@@ -108,3 +121,10 @@ def _check(name: str, value: float | None, least: float | None) -> Check:
     if least is None:
         return Check(name, value)
     return Check(name, value, {"min": least}, "", value is not None and value >= least)
+
+
+def _at_most(name: str, value: float | None, most: float | None, unit: str = "") -> Check:
+    """A share of no frames keeps its limit, as no answer was expected."""
+    if most is None:
+        return Check(name, value, {}, unit)
+    return Check(name, value, {"max": most}, unit, value is None or value <= most)

@@ -78,11 +78,13 @@ def _truth(flags: Flags) -> Truth | None:
 def _rules(flags: Flags) -> Rules:
     if flags["from"] + flags["max-delay"] >= flags["max-time"]:
         raise ValueError("no frame would be judged: --max-time must be longer than --from and --max-delay together")
-    return Rules(flags["iou"], flags["classes"], flags["max-delay"], flags["max-time"], flags["from"])
+    times = (flags[name] for name in ("max-delay", "max-time", "from", "start-up"))
+    return Rules(flags["iou"], flags["classes"], *times)
 
 
 def _limits(flags: Flags) -> DetectionLimits:
     precision, recall, f1 = (flags[f"min-{name}"] for name in MEASURES)
     if precision is recall is f1 is None:
         raise ValueError("there is no limit: give one or more of --min-precision, --min-recall, --min-f1")
-    return DetectionLimits(precision, recall, f1, flags["min-frames"], flags["each-class"])
+    silence = flags["max-unanswered"], flags["max-gap"]
+    return DetectionLimits(precision, recall, f1, flags["min-frames"], flags["each-class"], *silence)

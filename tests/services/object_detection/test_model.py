@@ -70,7 +70,8 @@ def test_what_is_found_passes() -> None:
     )
     assert values(verdict) == {
         "precision": 0.75, "recall": 0.75, "f1": 0.75, "true-positives": 3, "false-positives": 1, "false-negatives": 1,
-        "mean-iou": pytest.approx(1.0), "frames": 2, "answered": 2, "without-truth": 0, "late": 0, "repeated": 0,
+        "mean-iou": pytest.approx(1.0), "frames": 2, "answered": 2, "unanswered": 0.0, "gap": 9.5,
+        "without-truth": 0, "late": 0, "repeated": 0,
         "precision-yellow": 1.0, "recall-yellow": 0.5, "f1-yellow": 2 / 3,
         "precision-blue": 1.0, "recall-blue": 1.0, "f1-blue": 1.0,
         "precision-red": 0.0, "recall-red": None, "f1-red": 0.0,
@@ -106,15 +107,82 @@ def test_a_limit_is_kept_by_what_equals_it(limit: float, outcome: str) -> None:
     assert decided(it).outcome == outcome
 
 
-def test_a_share_without_a_whole_keeps_no_limit() -> None:
-    it = judge(truth=None, limits=DetectionLimits(0.0, 0.0, 0.0), labels=["yellow"])
-    it.announce(FrameKey(2 * SECOND, 1), by_application=True)
-    reveal(it, 2, LabelledBox("red", FAR))
-    assert decided(it).reason == (
-        "precision has no value (at least 0), as nothing was detected; recall has no value (at least 0), "
-        "as there was nothing to detect; F1 has no value (at least 0), as there was nothing"
+def test_nothing_to_find_is_the_fault_of_the_test() -> None:
+    it = judge(truth=None, limits=DetectionLimits(0.0, 0.0, 0.0), labels=["yellow", "blue"])
+    reveal(it, 2, YELLOW)
+    detect(it, 2, YELLOW)
+    with pytest.raises(UnjudgeableError, match=r"^no true box of class 'blue' came before the input ended after 10.00"):
+        decided(it)
+    it = judge(truth=Truth("number", {1: (), 2: (YELLOW,)}), labels=["blue"])
+    detect(it, 1, YELLOW)
+    with pytest.raises(UnjudgeableError, match=r"^none of 2 frames has a true box before the input ended"):
+        decided(it)
+
+
+def live(silent: range, frames: int = 30, limits: DetectionLimits | None = None, start_up: float = 0.0) -> Verdict:
+    """The verdict when an application answers all frames, of 10 Hz, but some."""
+    it = judge(truth=None, limits=limits or DetectionLimits(recall=0.5, unanswered=0.1, gap=1.0), start_up=start_up)
+    for number in range(frames):
+        at(it, number / 10)
+        reveal(it, number / 10, YELLOW)
+        if number not in silent:
+            detect(it, number / 10, YELLOW)
+    return decided(it, frames / 10)
+
+
+def test_frames_without_an_answer_are_named_by_their_longest_run() -> None:
+    assert live(range(5, 8)).outcome == "passed"
+    verdict = live(range(5, 9))
+    assert (verdict.outcome, values(verdict)["unanswered"]) == ("failed", 4 / 30)
+    assert verdict.reason.startswith(
+        "4 of 30 frames had no answer, a share of 0.1333 (at most 0.1), the longest run is 4 frames, "
+        "from 0.50 s to 0.80 s; worst was the frame at "
     )
-    assert [check.value for check in decided(it).checks[:3]] == [None] * 3
+
+
+def test_silence_is_a_gap_with_its_times() -> None:
+    verdict = live(range(10, 25))
+    assert "no answer came between 0.90 s and 2.50 s (at most 1 s)" in verdict.reason
+    assert "15 of 30 frames had no answer" in verdict.reason
+
+
+def test_silence_fails_where_frames_are_not_known() -> None:
+    """One truth for all frames, and an application that stops."""
+    it = judge(limits=DetectionLimits(recall=0.9, frames=10, gap=2.0))
+    for number in range(50):
+        at(it, number / 10)
+        detect(it, number / 10, YELLOW, BLUE)
+    assert decided(it, 20).reason == "no answer came between 4.90 s and 20.00 s (at most 2 s)"
+
+
+@pytest.mark.parametrize(("first", "outcome"), [(15, "passed"), (16, "failed")])
+def test_the_application_may_start_slowly(first: int, outcome: str) -> None:
+    verdict = live(range(first), start_up=1.5, limits=DetectionLimits(recall=0.1, unanswered=0.1, gap=1.0))
+    assert verdict.outcome == outcome
+    assert values(verdict)["answered"] == 30 - first, "recall counts them all the same"
+
+
+def test_an_empty_frame_needs_no_answer() -> None:
+    it = judge(truth=None, limits=DetectionLimits(recall=0.9, unanswered=0.0))
+    reveal(it, 1, YELLOW)
+    detect(it, 1, YELLOW)
+    it.announce(FrameKey(2 * SECOND, 2), by_application=False)
+    assert decided(it).outcome == "passed"
+
+
+def test_how_much_was_answered_is_said() -> None:
+    verdict = live(range(3, 30), limits=DetectionLimits(recall=0.01, frames=10))
+    assert verdict.reason.startswith("answered 3 of 30 frames (at least 10)")
+
+
+def test_pictures_of_a_film_without_an_answer_count_in_their_order() -> None:
+    it = judge(FILM, limits=DetectionLimits(recall=0.1, unanswered=0.5))
+    detect(it, 1, YELLOW, BLUE)
+    detect(it, 5, YELLOW, BLUE)
+    assert decided(it).reason.startswith(
+        "3 of 5 frames had no answer, a share of 0.6 (at most 0.5), the longest run is 3 frames, "
+        "from picture 2000000 to picture 4000000"
+    )
 
 
 def test_a_silent_application_fails() -> None:
