@@ -113,8 +113,8 @@ def _ports(kind: Kind, written: Sequence[str], values: Mapping[str, str], stamp:
         filled = _PARAMETER.sub(lambda m: values[m["name"]], text.removesuffix("?"))
         if kind == "memory":
             yield Port(kind, filled.removeprefix("/"), None, optional)
-        elif filled:
-            yield message(filled, stamp, optional)
+        else:  # a list has commas
+            yield from (message(each, stamp, optional) for each in filled.split(",") if each)
 
 
 def message(text: str, stamp: int | None, optional: bool = False) -> Port:

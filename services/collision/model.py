@@ -9,10 +9,10 @@ from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.collision.gates import Gates
 from services.collision.geometry import VehicleBox, VehiclePose, between, outline, swept
 from services.collision.measures import DriveMeasures
+from services.collision.requests import Requests
 from services.collision.track import Track, fault_of_start, nearest, place, touched
 
 PERIOD = 10_000  # us
-REQUESTS = ("GroundSteeringRequest", "PedalPositionRequest")
 
 
 class TrackEvaluator(Evaluator):
@@ -24,28 +24,32 @@ class TrackEvaluator(Evaluator):
 
     period = PERIOD
 
-    def __init__(self, track: Track, box: VehicleBox) -> None:
+    def __init__(self, track: Track, box: VehicleBox, requests: Requests | None = None) -> None:
         super().__init__(track.max_time)
         self.track = track
         self.box = box
         self._measures = DriveMeasures()
         self._gates = Gates(track.gates)
         self._early = False
-        self._requests: set[str] = set()
+        self._requests = requests or Requests()
         self._last: tuple[int, VehiclePose] | None = None
 
     def forget(self, now: int) -> None:
         self._measures = DriveMeasures()
+        self._requests.forget(now)
 
     def request(self, name: str) -> None:
-        """The application sent one of REQUESTS; it counts from the last update, not by its own clock."""
-        self._requests.add(name)
+        """The application sent one of its requests; it counts by its arrival, not by its own clock."""
+        self._requests.take(name, self.arrival)
         if self.now is not None:
             self.begin(self.now)
 
     def advance(self, now: int) -> None:
-        if self._requests:
+        if not self._requests.is_silent:
             self.begin(now)
+        fault = self._requests.fault(now, self.zero)
+        if fault is not None and not self.is_overdue(now):
+            self.verdict = self._verdict("failed", fault)
 
     def look(self, pose: VehiclePose, time: int) -> None:
         """Judge the path from the last pose to this one; a pose that is not newer than the last is ignored.
@@ -76,7 +80,16 @@ class TrackEvaluator(Evaluator):
             self.verdict = self._verdict("failed", f"{close}, expected at least {self.track.min_margin:g} m")
         elif goal is not None:
             self._measures.time_to_goal = self.elapsed(time)
-            self.verdict = self._verdict("passed", f"{goal} {when}")
+            self.verdict = self._arrived(f"{goal} {when}", time)
+
+    def _arrived(self, reason: str, time: int) -> Verdict:
+        """The goal was reached: by the application only if it went on with its requests."""
+        fault = self._requests.fault(time, self.zero)
+        if self._requests.is_silent:
+            fault = f"the application sent no {' and no '.join(self._requests.missing)}"
+        if fault is None:
+            return self._verdict("passed", reason)
+        return self._verdict("failed", f"{fault}, although the vehicle {reason}", self._requests.is_silent)
 
     def _approach(self, area: shapely.Geometry) -> tuple[float, str]:
         near = nearest(self.track.walls, area)
@@ -99,11 +112,13 @@ class TrackEvaluator(Evaluator):
     def decide(self, span: JudgedTime) -> Verdict:
         if self._last is None:
             raise UnjudgeableError(f"no opendlv.sim.Frame of the vehicle came {span.within}")
-        silent = [name for name in REQUESTS if name not in self._requests]
-        aside = f"; the application sent no {silent[0]}" if silent else ""
-        if len(silent) == len(REQUESTS):
-            reason = f"the application sent no {' and no '.join(silent)} {span.within}"
+        missing, fault = self._requests.missing, self._requests.fault(self.now or self.zero, self.zero)
+        if self._requests.is_silent:
+            reason = f"the application sent no {' and no '.join(missing)} {span.within}"
             return self._verdict("failed", reason, silent=True)
+        if fault is not None:
+            return self._verdict("failed", fault)
+        aside = f"; the application sent no {' and no '.join(missing)}" if missing else ""
         if self.track.goal or self.track.gates:
             return self._verdict("failed", f"{self._missed(self._last[1], span.within)}{aside}")
         return self._verdict("passed", f"stayed clear of {' and '.join(self.track.walls)} {span.throughout}{aside}")
@@ -121,4 +136,6 @@ class TrackEvaluator(Evaluator):
         goal = (measures.goal_check(track.max_time),) if track.goal or track.gates else ()
         gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
         walls = (measures.wall_check(track.min_margin),) if track.walls else ()
-        return Verdict(outcome, reason, (*goal, *gates, *walls, *measures.drive_checks()), silent)
+        return Verdict(
+            outcome, reason, (*goal, *gates, *walls, *measures.drive_checks(), *self._requests.checks()), silent
+        )

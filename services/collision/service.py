@@ -8,8 +8,9 @@ from typing import Any
 
 from services.base import Context, Flags, Handler, UnjudgeableError
 from services.collision.geometry import VehicleBox, VehiclePose, heading_of
-from services.collision.model import REQUESTS, TrackEvaluator
+from services.collision.model import TrackEvaluator
 from services.collision.obstacles import load, pick
+from services.collision.requests import Requests
 from services.collision.track import Track
 
 SILENCE, GAPS = 2.0, 3.0
@@ -17,20 +18,23 @@ SILENCE, GAPS = 2.0, 3.0
 
 
 class Collision(TrackEvaluator):
-    """Takes the vehicle's frames under the sender stamp ``frame-id`` and the application's requests of any."""
+    """Takes the vehicle's frames under the sender stamp ``frame-id`` and the application's ``requests``."""
 
     def __init__(self, context: Context, wall: Callable[[], float] = time.monotonic) -> None:
         """``wall`` in s: on a rig it is an error when the vehicle vanishes."""
         flags = context.flags
-        super().__init__(track(flags), VehicleBox(flags["length"], flags["width"]))
+        requests = [_port(text, context) for text in flags["requests"]]
+        names = list(dict.fromkeys(name for name, _ in requests))
+        box = VehicleBox(flags["length"], flags["width"])
+        super().__init__(track(flags), box, Requests(names, flags["max-silence"]))
         self._log = context.log
         self._on_rig, self._wall = context.on_rig, wall
         self._seen: float | None = None
         self._gap: float | None = None
         self.rejected = 0
         self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
-        for name in REQUESTS:
-            self.inputs[f"opendlv.proxy.{name}", None] = self._request(name)
+        for name, stamp in requests:
+            self.inputs[name, stamp] = self._request(name)
 
     def advance(self, now: int) -> None:
         super().advance(now)
@@ -59,6 +63,15 @@ class Collision(TrackEvaluator):
         self.look(VehiclePose(frame.x, frame.y, heading), sample_time)
 
 
+def _port(text: str, context: Context) -> tuple[str, int | None]:
+    """A message and its sender stamp, None for any; raises ValueError for an unknown one."""
+    name, _, stamp = text.partition("/")
+    context.messages.id(name)
+    if stamp and not stamp.isdecimal():
+        raise ValueError(f"--requests: '{text}' has no whole number as its sender stamp")
+    return name, int(stamp) if stamp else None
+
+
 def track(flags: Flags) -> Track:
     """The obstacles that the flags name, from the map; raises MapError, and ValueError for flags that make no track."""
     path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
@@ -71,6 +84,8 @@ def track(flags: Flags) -> Track:
             raise ValueError(f"{name} of --gates is one of the --walls too")
     if flags["min-margin"] and not walls:
         raise ValueError("--min-margin needs --walls")
+    if not flags["requests"]:
+        raise ValueError("--requests is empty: a drive is the application's only if it sends something")
     obstacles = load(path)
     picked = pick(obstacles, gates, "gates", path)
     return Track(

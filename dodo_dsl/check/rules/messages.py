@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.source import MAX_PROBLEMS, Scalar, Sequence
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
@@ -12,6 +13,10 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
             argument = service.arguments.get(name)
             if argument and argument.parameter.type == "message" and argument.value:
                 yield from _known(context, argument.value.text, entry.value.span)
+            if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.manifest.messages.inputs):
+                for item in entry.value.items[:MAX_PROBLEMS]:
+                    if isinstance(item, Scalar):
+                        yield from _known(context, item.text.partition("/")[0], item.span)
     declared = context.application.declared.values() if context.application else ()
     for own in declared:
         for name, span in (*own.inputs, *own.outputs, *own.answers) if own else ():

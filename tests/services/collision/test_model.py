@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from services.base import UnjudgeableError, Verdict
 from services.collision.geometry import VehicleBox, VehiclePose
-from services.collision.model import REQUESTS, TrackEvaluator
+from services.collision.model import TrackEvaluator
+from services.collision.requests import REQUESTS, Requests
 from services.collision.track import Track
 
 SECOND = 1_000_000
@@ -336,7 +337,66 @@ def test_time_zero_is_the_first_update_when_neither_comes() -> None:
     it.update(BEGIN)
     it.look(VehiclePose(0, 0, 0), BEGIN + 2 * SECOND)
     it.look(VehiclePose(3, 0, 0), BEGIN + 4 * SECOND)
-    assert decided(it).reason == "reached finish after 4.00 s"
+    assert decided(it).reason.endswith("although the vehicle reached finish after 4.00 s")
+
+
+def test_a_goal_that_the_application_did_not_drive_to_is_no_pass() -> None:
+    it = judge(requests=[])
+    drive(it, (0, 0, 0, 0), (4, 3, 0, 0))
+    assert (decided(it).outcome, decided(it).silent, decided(it).reason) == (
+        "failed",
+        True,
+        "the application sent no GroundSteeringRequest and no PedalPositionRequest, "
+        "although the vehicle reached finish after 4.00 s",
+    )
+
+
+def hanging(track: Track = LANE) -> TrackEvaluator:
+    """A judge whose application sends requests until 1.5 s, and then no more."""
+    it = TrackEvaluator(track, VehicleBox(0.36, 0.16), Requests(max_silence=2.0))
+    it.begin(BEGIN)
+    for number in range(16):
+        it.update(BEGIN + number * SECOND // 10)
+        it.request(REQUESTS[number % 2])
+    drive(it, (1.5, 0, 0, 0))
+    return it
+
+
+def test_an_application_that_hangs_fails_even_if_its_vehicle_rolls_on() -> None:
+    it = hanging()
+    it.update(BEGIN + 3_500_000)
+    assert it.verdict is None
+    it.update(BEGIN + 3_510_000)
+    assert (decided(it).outcome, decided(it).reason) == (
+        "failed",
+        "no request came between 1.50 s and 3.51 s (at most 2 s)",
+    )
+    assert values(it)["silence"] == pytest.approx(2.01) and not oks(it)["silence"]
+
+
+def test_a_goal_reached_in_silence_is_no_pass() -> None:
+    it = hanging()
+    drive(it, (3.6, 3, 0, 0))
+    assert decided(it).reason == (
+        "no request came between 1.50 s and 3.60 s (at most 2 s), although the vehicle reached finish after 3.60 s"
+    )
+    it = hanging()
+    drive(it, (3.4, 3, 0, 0))
+    assert decided(it).outcome == "passed" and values(it)["silence"] == pytest.approx(1.9) and oks(it)["silence"]
+
+
+def test_staying_clear_in_silence_is_no_pass() -> None:
+    it = hanging(Track(LANE.walls, {}, 20.0))
+    it.end_of_input(BEGIN + 4 * SECOND)
+    assert decided(it).reason == "no request came between 1.50 s and 4.00 s (at most 2 s)"
+
+
+def test_requests_count_by_their_arrival() -> None:
+    it = hanging()
+    it.arrived = BEGIN + 3_400_000
+    it.request(REQUESTS[0])
+    it.update(BEGIN + 5_400_000)
+    assert it.verdict is None
 
 
 def test_the_begin_forgets_what_was_before() -> None:

@@ -12,6 +12,7 @@ import pytest
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Check, Context, Flags, UnjudgeableError
+from services.collision.requests import REQUESTS
 from services.collision.service import Collision
 from tests.services.built import built, hand, refusal
 from tests.services.process import PATIENCE, running, send
@@ -35,7 +36,7 @@ def lane(tmp_path: Path) -> Iterator[Path]:
 
 def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool = False, **changes: Any) -> Collision:
     flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
-    none: dict[str, Any] = {"gates": [], "min-margin": 0.0}
+    none: dict[str, Any] = {"gates": [], "min-margin": 0.0, "requests": list(REQUESTS), "max-silence": 60.0}
     return Collision(
         Context(
             "collision",
@@ -137,6 +138,8 @@ def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
         ({"gates": ["finish", "left"]}, "left of --gates is one of the --walls too"),
         ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
         ({"walls": [], "min-margin": 0.1}, "--min-margin needs --walls"),
+        ({"requests": []}, "--requests is empty: a drive is the application's only if it sends something"),
+        ({"requests": ["opendlv.proxy.PedalPositionRequest/x"]}, "Request/x' has no whole number as its sender stamp"),
         ({"goal": "finnish"}, "has no obstacle 'finnish'; did you mean 'finish'?"),
     ],
 )
@@ -175,12 +178,26 @@ def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
 def test_gates_and_margin_come_from_the_flags(lane: Path) -> None:
     with built("collision", f"--map-path={lane}", "--gates=finish", "--walls=left,right", "--min-margin=0.05") as judge:
         judge.begin(START)
+        hand(judge, REQUESTS[0], START)
         hand(judge, FRAME, START + 10_000, 0, qw=1.0)
         hand(judge, FRAME, START + 2_010_000, 0, x=3.1, qw=1.0)
     assert (judge.verdict.outcome, judge.verdict.reason) == ("passed", "crossed the last gate, finish, after 2.01 s")
     checks = {check.name: check for check in judge.verdict.checks}
     assert checks["gates"] == Check("gates", 1, {"min": 1}, "", True)
     assert checks["wall-margin"].limit == {"min": 0.05}
+
+
+def test_requests_may_be_others(lane: Path) -> None:
+    mine = ("opendlv.proxy.TorqueRequest", 3)
+    flags = (f"--map-path={lane}", "--goal=finish", f"--requests={mine[0]}/3", "--max-silence=0.5")
+    with built("collision", *flags) as judge:
+        assert set(judge.inputs) == {(FRAME, 0), mine}
+        judge.begin(START)
+        judge.update(START)
+        hand(judge, mine[0], START, mine[1])
+        hand(judge, FRAME, START, 0, qw=1.0)
+        judge.update(START + 510_000)
+    assert judge.verdict.reason == "no request came between 0.00 s and 0.51 s (at most 0.5 s)"
 
 
 def test_the_end_of_the_input_of_a_silent_application(lane: Path) -> None:
