@@ -64,6 +64,13 @@ class Noted:
 
 
 @dataclass(frozen=True)
+class InputEnded:
+    """A source is at its end: an application may end, too."""
+
+    service: str
+
+
+@dataclass(frozen=True)
 class Unstartable:
     service: str
     why: str
@@ -92,7 +99,20 @@ class Stopped:
     reason: str
 
 
-Event = Ready | VerdictEvent | Malformed | Overrun | Late | Noted | Exited | Unstartable | Lost | Time | Stopped
+Event = (
+    Ready
+    | VerdictEvent
+    | Malformed
+    | Overrun
+    | Late
+    | Noted
+    | InputEnded
+    | Exited
+    | Unstartable
+    | Lost
+    | Time
+    | Stopped
+)
 
 
 class Backend(Protocol):

@@ -14,6 +14,7 @@ from dodo_dsl.run.protocol import (
     Event,
     Exited,
     Late,
+    InputEnded,
     Lost,
     Malformed,
     Noted,
@@ -47,6 +48,7 @@ class RunState:
     began: float | None = None
     finished: float | None = None
     setup_s: float | None = None
+    input_ended: bool = False
     time: Time | None = None
 
     def __post_init__(self) -> None:
@@ -89,6 +91,8 @@ class RunState:
                 self.late[service] = event
             case Noted(text):
                 self.notes.append(text)
+            case InputEnded():
+                self.input_ended = True
             case Unstartable(service, why):
                 self.end("error", f"service '{service}' could not be started: {why}", service)
             case Lost(why):
@@ -111,7 +115,8 @@ class RunState:
         layer, when = self.layer_of.get(service, "application"), self._when()
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}"
         if layer == "application":
-            if not self._all_verdicts_given():
+            is_done = code == 0 and self.input_ended
+            if not is_done and not self._all_verdicts_given():
                 self.end("failed", f"application service '{service}' {ended}, before the test was decided", service)
         elif code != 0:
             self.end("error", f"service '{service}' of layer {layer} {ended}", service)

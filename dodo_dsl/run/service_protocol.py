@@ -5,7 +5,18 @@ import math
 from typing import Any
 
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.run.protocol import Event, Late, Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
+from dodo_dsl.run.protocol import (
+    Event,
+    InputEnded,
+    Late,
+    Malformed,
+    Noted,
+    Overrun,
+    Ready,
+    Stopped,
+    Time,
+    VerdictEvent,
+)
 
 _OUTCOMES = ("passed", "failed")
 _STOPS = ("unanswered", "stuck", "timedout")
@@ -27,6 +38,10 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
     kind = message.get("dodo")
     if kind == "ready":
         return Ready(service)
+    if kind == "end-of-input":
+        return InputEnded(service)
+    if kind == "note" and _is_text(message.get("text")):
+        return Noted(f"service '{service}': {message['text']}")
     if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
         return Overrun(service, message["messages"])
     if kind == "late":

@@ -90,6 +90,7 @@ class RealTimeClock:
 
     relays = False
     has_new_picture = False
+    _has_memory = False
 
     def __init__(self) -> None:
         self._offset = time.time_ns() // 1000 - time.monotonic_ns() // 1000
@@ -115,10 +116,13 @@ class RealTimeClock:
         """Nothing to do: time goes on evenly."""
 
     def memory(self, name: str, size: int) -> SharedMemory:
+        self._has_memory = True
         return SharedMemory.create(name, size)
 
     def close(self, stopped: Callable[[], bool]) -> None:
-        """Nothing to do: nobody waits."""
+        """Wait until ``stopped`` where there are pictures: an application must not lose them while it is judged."""
+        while self._has_memory and not stopped():
+            time.sleep(_SLICE)
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
         """Deliver messages until the instant, and then those that are there already."""

@@ -3,7 +3,7 @@
 import json
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from google.protobuf.message import Message
 
@@ -11,8 +11,10 @@ from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.clock import Clock
+from services.base.evaluator import UnjudgeableError
 from services.base.lateness import Lateness
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
+from services.base.stamps import HeardStamps, with_strangers
 
 TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
 REPORT_PERIOD = 1_000_000
@@ -24,9 +26,11 @@ _log = logging.getLogger(__name__)
 class Loop:
     """Runs a service on a session by a clock; ``sender_stamp`` is that of outputs without one.
 
-    ``name`` is the source in its EndOfInput. A line ``{"dodo": "lost", "messages": N}`` on stdout reports how
-    many messages were lost so far, once a second at most, and in real time ``{"dodo": "late", "updates": N, "late": M,
-    "worst_s": S}`` how many updates ended late since the test began. Raises what the model raises, and SessionError.
+    ``name`` is the source in its EndOfInput. Lines on stdout report, once a second at most, how many messages were
+    lost so far (``{"dodo": "lost", "messages": N}``) and in real time how many updates ended late since the test began
+    (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``), that a source is at its end (``{"dodo":
+    "end-of-input"}``), and messages that came under other sender stamps only (``{"dodo": "note", "text": "..."}``),
+    unless a verdict does. Raises what the model raises, and SessionError.
     """
 
     name: str
@@ -35,6 +39,8 @@ class Loop:
     clock: Clock
     sender_stamp: int
     _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
+    _stamps: HeardStamps = field(init=False)
+    _has_begun: bool = False
     _reported: int = 0
     _report_after: int = 0
     _lateness: Lateness = field(init=False)
@@ -44,10 +50,30 @@ class Loop:
         for (name, stamp), handler in self.service.inputs.items():
             self._handlers.setdefault(ids(name), []).append((stamp, handler))
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
+        self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)
 
     def run(self, stopped: Callable[[], bool]) -> None:
-        """Until the service is done, or ``stopped`` by a signal."""
+        """Until the service is done, or ``stopped`` by a signal.
+
+        The memories of a source stay until it is stopped, as the application may read them until all have judged.
+        """
+        try:
+            self._run(stopped)
+        except UnjudgeableError as error:
+            raise UnjudgeableError(with_strangers(str(error), self._stamps.strangers())) from None
+        if self.service.finished and self.service.verdict is None:
+            print(json.dumps({"dodo": "end-of-input"}), flush=True)
+            self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
+        self.clock.close(stopped if self._has_begun else lambda: True)
+        self._tell_strangers()
+        self._report(self.clock.now())
+        if self.session.lost:
+            _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
+        if self.session.garbage:
+            _log.debug("%d datagrams held no message", self.session.garbage)
+
+    def _run(self, stopped: Callable[[], bool]) -> None:
         service = self.service
 
         def over() -> bool:
@@ -61,15 +87,7 @@ class Loop:
             if now >= self._report_after:
                 self._report(now)
             if service.finished and not self.clock.has_new_picture:
-                break
-        if service.finished and service.verdict is None:
-            self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
-        self.clock.close(stopped)
-        self._report(self.clock.now())
-        if self.session.lost:
-            _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
-        if self.session.garbage:
-            _log.debug("%d datagrams held no message", self.session.garbage)
+                return
 
     def receive(self, timeout: float) -> Envelope | None:
         """For the clock: the next envelope within ``timeout`` seconds."""
@@ -95,7 +113,10 @@ class Loop:
         if not self.clock.relays and self.service.observe is not None:
             self.service.observe(envelope)
         self.service.arrived = self.clock.now() if self.clock.relays else envelope.received
+        if envelope.data_type in self._handlers:
+            self._stamps.take(envelope)
         if envelope.data_type == self._begin:
+            self._has_begun = True
             self.service.begin(envelope.sample_time)
             self._lateness.begin()
         elif envelope.data_type == self._end:
@@ -108,6 +129,15 @@ class Loop:
                     _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
                     return
                 handler(message, envelope.sample_time)
+
+    def _tell_strangers(self) -> None:
+        """In the reason of a failed verdict, as they may explain it, else as notes."""
+        strangers, verdict = self._stamps.strangers(), self.service.verdict
+        if strangers and verdict is not None and verdict.outcome == "failed":
+            self.service.verdict = replace(verdict, reason=with_strangers(verdict.reason, strangers), silent=False)
+            return
+        for text in strangers:
+            print(json.dumps({"dodo": "note", "text": text}), flush=True)
 
     def _report(self, now: int) -> None:
         if self.session.lost > self._reported:

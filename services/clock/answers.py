@@ -1,5 +1,6 @@
 """Which of the application's messages answer a frame."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -24,13 +25,15 @@ class Answers:
     """Collects the application's messages that answer a frame.
 
     ``required`` have to come once each, unless ``done`` comes; ``relayed`` are others that services of the test
-    consume, all of which are passed on. ``surplus`` counts answers beyond the one that counts.
+    consume, all of which are passed on; so are those under other sender stamps, which services only count. ``surplus``
+    counts answers beyond the one that counts.
     """
 
     required: tuple[MessageFilter, ...]
     relayed: tuple[MessageFilter, ...] = ()
     done: MessageFilter | None = None
     surplus: int = 0
+    _strangers: Counter[tuple[int, int]] = field(default_factory=Counter)
     _times: set[int] = field(default_factory=set)
     _all_times: set[int] = field(default_factory=set)
     _chosen: dict[MessageFilter, Envelope] = field(default_factory=dict)
@@ -69,7 +72,11 @@ class Answers:
                 else:
                     self._chosen[each] = known
                 return
-        if any(each.matches(envelope) for each in self.relayed):
+        is_stranger = not any(each.matches(envelope) for each in self.filters)
+        if is_stranger and any(each.data_type == envelope.data_type for each in self.filters):
+            self._strangers[envelope.data_type, envelope.sender_stamp] += 1
+        consumed = (*self.required, *self.relayed)
+        if any(each.data_type == envelope.data_type if is_stranger else each.matches(envelope) for each in consumed):
             self._others.append(known)
 
     @property
@@ -95,6 +102,16 @@ class Answers:
         if self.done is not None:
             return [] if self._is_done else [self.done.name]
         return [each.name for each in self.required if each not in self._chosen]
+
+    @property
+    def strangers(self) -> dict[int, int]:
+        """How often messages came that the answer lacks, but under another sender stamp, by stamp."""
+        names = self.missing
+        lacking = {each.data_type for each in self.filters if each.name in names}
+        counts: Counter[int] = Counter()
+        for (id_, stamp), count in self._strangers.items():
+            counts[stamp] += count if id_ in lacking else 0
+        return dict(+counts)
 
     def collect(self) -> list[Envelope]:
         """The answer, in an order that does not depend on which sender was faster."""

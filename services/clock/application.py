@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from services.base.lockstep.datagrams import EncodedEnvelope
+from services.base.stamps import others
 from services.clock.answers import Answers
 from services.clock.exchange import StepCommand, StepResult
 from services.clock.participants import SLICE_S, ApplicationSilent, IsStopped, Patience, ServiceLink
@@ -101,7 +102,9 @@ class SteppedApplication:
     @property
     def _missing(self) -> str:
         if self.answers.is_expected:
-            return " and ".join(name.rpartition(".")[2] for name in self.answers.missing) + " missing"
+            missing = " and ".join(name.rpartition(".")[2] for name in self.answers.missing) + " missing"
+            strangers = self.answers.strangers
+            return f"{missing}, but {others(strangers)} came" if strangers else missing
         return f"no reader waited for the next picture of '{min(self._reading)}'"
 
     def _sentence(self, what: str) -> str:

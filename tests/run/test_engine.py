@@ -15,6 +15,7 @@ from dodo_dsl.run.protocol import (
     Event,
     Exited,
     Late,
+    InputEnded,
     Lost,
     Malformed,
     Noted,
@@ -149,6 +150,21 @@ CASES: dict[str, tuple[list[tuple[float, Event]], str, str]] = {
         [(1.0, PASSED), (1.5, Exited("app", 3)), (2.0, ENDED)],
         "passed",
         "it drove",
+    ),
+    "application ends after the input": (
+        [(1.0, InputEnded("camera")), (1.1, Exited("app", 0)), (2.0, PASSED), (2.0, ENDED)],
+        "passed",
+        "it drove",
+    ),
+    "application ends after the input and was not good": (
+        [(1.0, InputEnded("camera")), (1.1, Exited("app", 0)), (2.0, FAILED), (2.0, ENDED)],
+        "failed",
+        "hit wall left",
+    ),
+    "application crashes after the input": (
+        [(1.0, InputEnded("camera")), (1.1, Exited("app", 3)), (2.0, PASSED), (2.0, ENDED)],
+        "failed",
+        "application service 'app' ended with exit code 3 after 1.1 s, before the test was decided",
     ),
     "camera crashes": (
         [(2.0, Exited("camera", 1))],

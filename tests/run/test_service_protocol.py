@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.run.protocol import Late, Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
+from dodo_dsl.run.protocol import InputEnded, Malformed, Noted, Overrun, Ready, Stopped, Time, VerdictEvent
 from dodo_dsl.run.service_protocol import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
@@ -36,6 +37,13 @@ def test_lateness_is_taken_from_every_service() -> None:
     assert read_line("camera", False, text) == Late("camera", 12, 3, 0.25)
     for change in ({"late": 13}, {"late": 0}, {"updates": "12"}, {"worst_s": -1}, {"worst_s": None}, {"late": 1.5}):
         assert read_line("camera", False, json.dumps({**json.loads(text), **change}).encode()) is None
+
+
+def test_notes_and_the_end_of_the_input_are_taken_from_every_service() -> None:
+    assert read_line("camera", False, b'{"dodo": "end-of-input"}\n') == InputEnded("camera")
+    assert read_line("pose", False, b'{"dodo": "note", "text": "so"}') == Noted("service 'pose': so")
+    for text in (b'""', b"3", b"null", b'"' + b"x" * 3000 + b'"', b'"\\ud800"'):
+        assert read_line("pose", False, b'{"dodo": "note", "text": ' + text + b"}") is None
 
 
 MALFORMED = {

@@ -94,11 +94,40 @@ def test_a_source_that_runs_out_ends_the_judge(start: Start, cid: int) -> None:
         voltages = [MESSAGES.decode(VOLTAGE, heard(session, VOLTAGE).payload).voltage for _ in range(3)]
         assert voltages == [1.0, 2.0, 3.0]
         assert MESSAGES.decode(2901, heard(session, 2901).payload).source == "beacons"
-    assert source.end() == (0, '{"dodo": "ready"}\n', "")
+    assert source.end() == (0, '{"dodo": "ready"}\n{"dodo": "end-of-input"}\n', "")
     assert judge.line()["checks"] == [{"name": "distance", "value": None, "limit": {}, "unit": "", "ok": True}]
     code, out, err = judge.end()
     assert (code, out) == (0, "")
     assert "DEBUG: the end has come" in err
+
+
+def test_the_memory_of_a_source_stays_until_it_is_stopped(start: Start, cid: int) -> None:
+    name = f"dodo-test-{uuid.uuid4().hex}"
+    with Session(cid) as session:
+        source = start("--role=source", f"--name={name}", "--freq=1")
+        assert source.line() == READY
+        session.send(BEGIN())
+        assert source.line() == {"dodo": "end-of-input"}
+        assert heard(session, 2901)
+        with SharedMemory.attach(name):
+            assert source.process.poll() is None
+        source.stop()
+        assert source.end() == (0, "", "")
+        assert not Path("/tmp", name).exists()
+
+
+def test_messages_under_another_stamp_are_noted(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        service = start("--role=echo")
+        assert service.line() == READY
+        for _ in range(3):
+            session.send(DISTANCE(distance=1.0), 1, 99)
+        session.send(BEGIN(), 77)
+        while MESSAGES.decode(ANGLE, heard(session, ANGLE).payload).angle != 77:
+            pass
+    service.stop()
+    text = "no opendlv.proxy.DistanceReading/2 came, but 3 with sender stamp 99"
+    assert service.line() == {"dodo": "note", "text": text}
 
 
 @pytest.mark.parametrize("flags", [[], ["--verbose"]])

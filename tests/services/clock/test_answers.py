@@ -101,6 +101,19 @@ def test_others_are_handed_on_all_of_them_in_an_order_of_their_own() -> None:
     assert answers.collect() == []
 
 
+def test_answers_under_another_stamp_are_no_answers_but_are_told_and_handed_on() -> None:
+    answers = Answers((MessageFilter("steer/0", STEER, 0), MessageFilter("pedal/3", PEDAL, 3)))
+    show(answers, FRAME)
+    for envelope in (said(STEER, FRAME, stamp=99), said(STEER, FRAME, stamp=99), said(PEDAL, FRAME, stamp=3)):
+        answers.take(envelope)
+    assert (answers.missing, answers.strangers, answers.surplus) == (["steer/0"], {99: 2}, 0)
+    assert [(e.data_type, e.sender_stamp) for e in answers.collect()] == [(STEER, 99), (STEER, 99), (PEDAL, 3)]
+    show(answers, NEXT)
+    answers.take(said(STEER, NEXT))
+    answers.take(said(PEDAL, NEXT, stamp=3))
+    assert answers.is_complete and answers.strangers == {}
+
+
 def test_one_who_answers_twice_drives_as_one_who_answers_once() -> None:
     once = answering(said(STEER, FRAME, b"a"), said(PEDAL, FRAME, b"b"))
     twice = answering(*(said(kind, FRAME, data) for kind, data in ((STEER, b"a"), (STEER, b"x"), (PEDAL, b"b"))))

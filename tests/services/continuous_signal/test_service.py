@@ -123,6 +123,23 @@ def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
     assert checks["samples"]["value"] == 101
 
 
+def test_another_sender_stamp_is_part_of_the_reason(table: Path, cid: int, tmp_path: Path) -> None:
+    start = time.time_ns() // 1000
+    with (
+        Session(cid) as session,
+        running("continuous_signal", tmp_path, f"--cid={cid}", *FLAGS, f"--target={table}") as it,
+    ):
+        send(session, "dodo.TestBegin", sample_time=start)
+        for step in range(3):
+            send(session, STEERING, sender_stamp=99, sample_time=start + step)
+        send(session, "dodo.EndOfInput", source="recording")
+        code, output, _ = finished(it)
+    verdict = json.loads(output)
+    assert (code, verdict["outcome"]) == (0, "failed")
+    assert verdict["reason"].startswith(f"no sample of groundSteering of {STEERING}/0 came before the input ended")
+    assert verdict["reason"].endswith(f"; no {STEERING}/0 came, but 3 with sender stamp 99")
+
+
 def test_by_default_silence_and_times_far_from_the_arrival_fail(table: Path) -> None:
     judge = service(f"--target={table}")
     judge.begin(START)

@@ -83,7 +83,7 @@ def test_a_clock_driven_by_messages(
         end = session.receive(10.0)
     assert seen == [-10, 1, -20, 2, -30, 3]
     assert end is not None and (end.data_type, end.sample_time) == (2901, 3)
-    assert capsys.readouterr().out == '{"dodo": "ready"}\n'
+    assert capsys.readouterr().out == '{"dodo": "ready"}\n{"dodo": "end-of-input"}\n'
 
 
 def _step(time: int) -> Any:

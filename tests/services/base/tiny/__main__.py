@@ -53,17 +53,21 @@ class Judge(Service):
 
 
 class Source(Service):
-    """Sends three voltages and is at its end."""
+    """Sends three voltages and is at its end; with a memory not before the test has begun."""
 
     period = 10_000
 
     def __init__(self, context: Context) -> None:
         self.type = context.messages.type("opendlv.proxy.VoltageReading")
-        self.count = 0
+        self.count, self.begun = 0, False
+        self.awaits_begin = bool(context.flags["name"])
+
+    def begin(self, now: int) -> None:
+        self.begun = True
 
     def update(self, now: int) -> Iterable[Any]:
         self.count += 1
-        self.finished = self.count == 3
+        self.finished = self.count >= 3 and (self.begun or not self.awaits_begin)
         return [self.type(voltage=self.count)]
 
 
