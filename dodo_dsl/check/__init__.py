@@ -11,6 +11,7 @@ from dodo_dsl.check.rules import (
     clocks,
     layers,
     levels,
+    limits,
     messages,
     names,
     parameters,
@@ -34,6 +35,7 @@ RULES: tuple[Rule, ...] = (
     parameters.check,
     messages.check,
     references.check,
+    limits.check,
     producers.check,
 )
 

@@ -20,7 +20,7 @@ class Parameter:
     ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names a path parameter and a list of
     its JSON file (``map-path.obstacles``), whose entries' names are the allowed values; ``within_timeout`` marks a
     duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
-    service is ready.
+    service is ready; ``not_empty`` names lists of a JSON file that must not be empty.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     rig: str = ""
     among: str = ""
+    not_empty: tuple[str, ...] = ()
     within_timeout: bool = False
     setup_times: int = 0
     example: Value = None
@@ -50,7 +51,10 @@ class Ports:
 
 @dataclass(frozen=True)
 class Manifest:
-    """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None."""
+    """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None.
+
+    A test gives at least one parameter of each group in ``one_of``.
+    """
 
     folder: Path
     name: str
@@ -63,6 +67,7 @@ class Manifest:
     memory: Ports = Ports()
     devices: tuple[str, ...] = ()
     example: tuple[str, ...] | None = None
+    one_of: tuple[tuple[str, ...], ...] = ()
 
 
 def _ports(raw: dict[str, list[str]] | None) -> Ports:
@@ -88,7 +93,8 @@ def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
             within_timeout=p.get("within-timeout", False),
             setup_times=p.get("setup-times", 0),
             choices=tuple(p.get("choices", ())),
-            **{k: v for k, v in p.items() if k not in ("within-timeout", "setup-times", "choices")},
+            not_empty=tuple(p.get("not-empty", ())),
+            **{k: v for k, v in p.items() if k not in ("within-timeout", "setup-times", "choices", "not-empty")},
         )
         for name, p in (raw.get("parameters") or {}).items()
     }
@@ -104,6 +110,7 @@ def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
         memory=_ports(raw.get("memory")),
         devices=tuple(raw.get("devices") or ()),
         example=tuple(raw["example"]) if "example" in raw else None,
+        one_of=tuple(tuple(names) for names in raw.get("one-of", ())),
     )
     return manifest, found
 

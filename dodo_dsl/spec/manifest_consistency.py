@@ -31,6 +31,11 @@ def problems(node: Mapping) -> Iterator[Diagnostic]:
         written = node.get(key)
         if written is not None:
             yield from _ports(written, types)
+    groups = node.get("one-of")
+    for scalar in walk(groups) if groups is not None else ():
+        if isinstance(scalar, Scalar) and scalar.text not in types:
+            message = f"'one-of' names the unknown parameter '{scalar.text}'"
+            yield Diagnostic(scalar.span, RULE, message, did_you_mean(scalar.text, types))
     for name, entry in entries.items():
         if name in RESERVED:
             message = f"'--{name}' is a flag of every service, so it cannot name a parameter"
@@ -62,6 +67,8 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
             yield _misplaced(node, key, f"'{name}' is not a duration", "add 'unit: s'")
     if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
         yield _misplaced(node, "minimum", f"the minimum of '{name}' is larger than its maximum")
+    if "not-empty" in raw and kind != "path":
+        yield _misplaced(node, "not-empty", f"'not-empty' is for paths, but '{name}' is of type {kind}")
     source = str(raw.get("among", "")).partition(".")[0]
     if source and types.get(source) != "path":
         message = f"'among' begins with '{source}', expected a parameter of type path"

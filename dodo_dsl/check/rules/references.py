@@ -16,6 +16,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 
 _MAP = "map.json"
 _MAX_BYTES = 20 << 20
+_HELP = {"obstacles": "see docs/maps.md"}
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
@@ -35,7 +36,7 @@ def _among(service: ResolvedService, argument: Argument, entry: Entry) -> Iterat
         return
     names = _names(file, key)
     if isinstance(names, str):
-        yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", "see docs/maps.md")
+        yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(key, ""))
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
     for item in items[:MAX_PROBLEMS]:
@@ -51,23 +52,36 @@ def _file(argument: Argument) -> Path | None:
     return path / _MAP if path.is_dir() else path
 
 
-@functools.lru_cache(maxsize=256)
 def _names(file: Path, key: str) -> tuple[str, ...] | str:
     """The names of the entries of a list in a JSON file, or the problem of the file."""
+    found = entries(file, key)
+    return found if isinstance(found, str) else tuple(name for name in found if name)
+
+
+@functools.lru_cache(maxsize=256)
+def entries(file: Path, key: str) -> tuple[str, ...] | str:
+    """The entries of a list in a JSON file by name, empty for those without one, or the problem of the file.
+
+    A class may be written with ``color:`` before its name, as in messages.
+    """
     try:
         if file.exists() and not file.is_file():
             return "not a regular file"
         if file.stat().st_size > _MAX_BYTES:
             return f"larger than {_MAX_BYTES >> 20} MiB"
         document = json.loads(file.read_text(encoding="utf-8"))
-        entries = document.get(key, []) if isinstance(document, dict) else None
-        if not isinstance(entries, list):
+        found = document.get(key, []) if isinstance(document, dict) else None
+        if not isinstance(found, list):
             return f"expected an object with a list '{key}'"
-        return tuple(str(e["name"]) for e in entries if isinstance(e, dict) and "name" in e)
+        return tuple(_plain(e["name"]) if isinstance(e, dict) and "name" in e else "" for e in found)
     except OSError as error:
         return f"cannot be read: {error.strerror}"
     except (ValueError, RecursionError) as error:
         return f"not JSON: {str(error)[:120]}"
+
+
+def _plain(name: object) -> str:
+    return str(name).strip().removeprefix("color:").strip()
 
 
 def _within(context: RuleContext, service: ResolvedService, seconds: str, entry: Entry) -> Iterator[Diagnostic]:
