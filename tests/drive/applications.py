@@ -24,6 +24,17 @@ STOPS = (
     "        if self.seen > 30:\n            return 0.0, 0.0\n        self.steering",
 )
 
+LEAVES = (
+    "perception.py",
+    "        if not memory.wait():\n            continue\n",
+    "        if not memory.wait(0.9 if 'frame' in locals() else None):\n            sys.exit(0)\n",
+)
+STAMPED = (
+    "steering.py",
+    "session.send(steer(groundSteering=angle), envelope.sample_time)",
+    "session.send(steer(groundSteering=angle), envelope.sample_time, 99)",
+)
+
 
 def dodo(*words: str, code: int, before: Sequence[str] = ()) -> str:
     """The output of a command, after the words ``before`` it, that must end with an exit code."""

@@ -1,11 +1,13 @@
 """Every shipped test that runs without hardware: the example application passes it, and wrong ones fail it rightly."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from tests.drive.applications import BLIND, STOPS, SWAPPED, dodo, kiwi, results
+from tests.drive.applications import BLIND, LEAVES, ROOT, STAMPED, STOPS, SWAPPED, dodo, kiwi, results
 
 REVERSED = {"steering": "--reverse"}
 WRONG = [
@@ -22,6 +24,9 @@ WRONG = [
     ("swapped", SWAPPED, {}, {
         "sil-closed-left-curve": "hit wall right",
         "sil-perception--light-1--clutter-60": "precision is 0 ",
+    }),
+    ("stamped", STAMPED, {}, {
+        "sil-open-left-curve": r"no opendlv\.proxy\.GroundSteeringRequest/0 came, but \d+ with sender stamp 99$",
     }),
     ("stops", STOPS, {}, {"sil-closed-straight": "did not reach finish"}),
 ]  # fmt: skip
@@ -59,3 +64,16 @@ def test_wrong_applications_fail_for_the_right_reason(
         assert test["outcome"] == "failed", (wrong, test)
         assert re.search(reasons[slug], test["reason"]), (wrong, test)
         assert test["reason"] in out
+
+
+def test_an_application_may_end_with_its_recording(tmp_path: Path) -> None:
+    """In real time, so that a busy machine may cost it frames: but that it went is no fault of it."""
+    application, report = kiwi(tmp_path / "app", LEAVES), tmp_path / "report"
+    words = ("dil-static-rig", "--clock", "realtime", "--application", str(application), "--report", str(report))
+    subprocess.run(
+        [sys.executable, "-m", "dodo_dsl", "run", *words], check=False, cwd=ROOT, timeout=300, capture_output=True
+    )
+    test = results(report)["dil-static-rig"]
+    assert {s["name"]: s["exit_code"] for s in test["services"]}["perception"] == 0, "it ended by itself"
+    assert test["outcome"] != "error" and test["checks"], "it was judged"
+    assert "before the test was decided" not in test["reason"]
