@@ -13,8 +13,8 @@ from dodo_dsl.run.protocol import (
     Backend,
     Event,
     Exited,
-    Late,
     InputEnded,
+    Late,
     Lost,
     Malformed,
     Noted,
@@ -77,14 +77,29 @@ class RunState:
     def take(self, event: Event) -> None:
         """Remembers an event; raises Ended when the test is over with it."""
         match event:
-            case Ready(service):
-                self.ready.add(service)
             case VerdictEvent(service) if self.began is None:
                 self.end("error", f"evaluator '{service}' gave a verdict before the test began", service)
             case VerdictEvent(service):
                 self.facts.verdicts.setdefault(service, []).append(event)
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
+            case Unstartable(service, why):
+                self.end("error", f"service '{service}' could not be started: {why}", service)
+            case Lost(why):
+                self.end("error", why)
+            case Stopped(kind, reason):
+                self._take_stop(kind, reason)
+            case Exited(service, code, out_of_memory):
+                self.exits[service] = code
+                self._take_exit(service, code, out_of_memory)
+            case _:
+                self._remember(event)
+
+    def _remember(self, event: Event) -> None:
+        """Takes an event that ends no test."""
+        match event:
+            case Ready(service):
+                self.ready.add(service)
             case Overrun(service, messages):
                 self.lost[service] = messages
             case Late(service):
@@ -93,17 +108,8 @@ class RunState:
                 self.notes.append(text)
             case InputEnded():
                 self.input_ended = True
-            case Unstartable(service, why):
-                self.end("error", f"service '{service}' could not be started: {why}", service)
-            case Lost(why):
-                self.end("error", why)
             case Time():
                 self.time = event
-            case Stopped(kind, reason):
-                self._take_stop(kind, reason)
-            case Exited(service, code, out_of_memory):
-                self.exits[service] = code
-                self._take_exit(service, code, out_of_memory)
 
     def _take_stop(self, kind: str, reason: str) -> None:
         if kind == "timedout":

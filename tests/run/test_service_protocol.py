@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.run.protocol import Late, Malformed, Overrun, Ready, Stopped, Time, VerdictEvent
-from dodo_dsl.run.protocol import InputEnded, Malformed, Noted, Overrun, Ready, Stopped, Time, VerdictEvent
+from dodo_dsl.run.protocol import InputEnded, Late, Malformed, Noted, Overrun, Ready, Stopped, Time, VerdictEvent
 from dodo_dsl.run.service_protocol import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
