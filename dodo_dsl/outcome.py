@@ -44,6 +44,39 @@ class MachineLoad:
 
 
 @dataclass(frozen=True)
+class Response:
+    """How long the application took for an answer in lockstep, without the first; times in s.
+
+    The time is the wall time less what the application waited for a processor. ``processor_*`` is the processor time,
+    None where the application's processes cannot be seen from the test's services. ``slow`` counts answers that took
+    longer than the period of the frames, ``over`` those beyond the limit of the test, None without one.
+    """
+
+    answers: int
+    period_s: float
+    median_s: float
+    p95_s: float
+    worst_s: float
+    processor_median_s: float | None
+    processor_p95_s: float | None
+    processor_worst_s: float | None
+    slow: int
+    over: int | None
+    processor: str
+    """The processor by its name, with its clock."""
+
+    def in_words(self) -> str:
+        """The times in a sentence, with the processor that they were measured on."""
+        times = f"{_ms(self.median_s)} (median), {_ms(self.p95_s)} (95 %), {_ms(self.worst_s)} (worst)"
+        share = "" if self.processor_median_s is None else f", {_ms(self.processor_median_s)} of it on the processor"
+        return f"an answer took {times}{share}" + (f", on {self.processor}" if self.processor else "")
+
+
+def _ms(seconds: float) -> str:
+    return f"{seconds * 1000:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
+
+
+@dataclass(frozen=True)
 class Outcome:
     """What became of a test; times in seconds, None where the test did not get so far."""
 
@@ -67,3 +100,4 @@ class Outcome:
     notes: tuple[str, ...] = ()
     description: str = ""
     machine: MachineLoad | None = None
+    response: Response | None = None

@@ -115,7 +115,19 @@ class _Builder:
         services = (*self._automatic(), *(self._service(service) for service in self.test.services))
         self._distinct_names(services)
         evaluators = tuple(s.name for s in services if s.judge)
-        for key in ("name", "level", "kind", "timeout", "clock", "rig", "matrix", "seed", "isolation", "record"):
+        for key in (
+            "name",
+            "level",
+            "kind",
+            "timeout",
+            "clock",
+            "rig",
+            "matrix",
+            "seed",
+            "isolation",
+            "record",
+            "response",
+        ):
             if key in spec.spans:
                 self._place(key, spec.span(key))
         isolated = isolation(spec, rig)

@@ -24,7 +24,7 @@ def lockstep(
         return None
     readers = sum(own.readers for own in declared.values() if own)
     wall = (spec.timeout_s or 0.0) * _WALL_FACTOR + _WALL_SPARE_S if wall_timeout_s is None else wall_timeout_s
-    return Lockstep(readers or 1, wall)
+    return Lockstep(readers or 1, wall, spec.max_response_s, spec.response_over)
 
 
 def clock(test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[str], cid: int) -> PlannedService:
@@ -44,6 +44,7 @@ def clock(test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[st
         "hears": ",".join(other_inputs(wiring)),
         "done": wiring.done,
         "timeout": f"{spec.timeout_s or 0.0:g}",
+        "max-response": "" if spec.max_response_s is None else f"{spec.max_response_s:g}",
         "cid": str(cid),
     }
     flags = tuple(Flag(name, value) for name, value in values.items() if value)

@@ -94,7 +94,11 @@ def _problem(plan: Plan) -> str:
 
 def _is_lockstep(lockstep: Lockstep) -> bool:
     numbers = isinstance(lockstep.readers, int) and isinstance(lockstep.wall_timeout_s, int | float)
-    return numbers and 1 <= lockstep.readers <= 1000 and 0 < lockstep.wall_timeout_s <= 10 * 86_400 + 60
+    limit, over = lockstep.max_response_s, lockstep.response_over
+    limited = limit is None or (isinstance(limit, int | float) and 0 < limit <= 3600)
+    shared = isinstance(over, int | float) and 0 <= over <= 1
+    in_range = numbers and 1 <= lockstep.readers <= 1000 and 0 < lockstep.wall_timeout_s <= 10 * 86_400 + 60
+    return in_range and limited and shared
 
 
 def _is_flag(flag: Flag) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import package_data
-from dodo_dsl.outcome import MachineLoad, Outcome, Wait
+from dodo_dsl.outcome import MachineLoad, Outcome, Response, Wait
 
 FILE_NAME = "results.json"
 VERSION = 1
@@ -81,7 +81,8 @@ def _validate(document: Any) -> None:
 
 def _outcome(test: dict[str, Any]) -> Outcome:
     values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in test.items()}
-    return Outcome(**{**values, "machine": _load(test.get("machine"))})
+    response = Response(**test["response"]) if test.get("response") else None
+    return Outcome(**{**values, "machine": _load(test.get("machine")), "response": response})
 
 
 def _load(machine: dict[str, Any] | None) -> MachineLoad | None:

@@ -5,7 +5,7 @@ import contextlib
 import logging
 import socket
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterable
 
 from google.protobuf.message import Message
 
@@ -18,9 +18,13 @@ ALIVE_S = 1.0
 _log = logging.getLogger(__name__)
 
 
-def begin_frame(seed: int) -> bytes:
-    """``dodo.TestBegin`` as a datagram, with the current time as its sample time."""
-    return _frame(MessageSet.standard().type("dodo.TestBegin")(seed=seed))
+def begin_frame(seed: int, application: Iterable[int] = ()) -> bytes:
+    """``dodo.TestBegin`` as a datagram, with the current time as its sample time.
+
+    ``application`` are the process ids of the application's services, where the test's services see them.
+    """
+    begin = MessageSet.standard().type("dodo.TestBegin")
+    return _frame(begin(seed=seed, application=",".join(map(str, application))))
 
 
 def _frame(message: Message) -> bytes:

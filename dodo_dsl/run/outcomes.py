@@ -59,14 +59,18 @@ def worst(results: Iterable[Result]) -> Result:
     return max(results, key=_RANK.__getitem__, default="error")
 
 
-def decide(facts: Facts) -> Finding:
-    """The finding that decides: the first of the worst kind. Without a single verdict nothing passes."""
+def decide(facts: Facts, others: Sequence[Finding] = ()) -> Finding:
+    """The finding that decides: the first of the worst kind. Without a single verdict nothing passes.
+
+    ``others`` are findings that follow those of the evaluators, of whose kind none passes.
+    """
     findings = [
         *facts.findings,
         *(f for name in facts.evaluators for f in _judged(name, facts.verdicts.get(name, []))),
     ]
     if not findings:
         return Finding("error", "no evaluator gave a verdict")
+    findings.extend(others)
     result = worst(f.result for f in findings)
     deciding = [f for f in findings if f.result == result]
     if result == "passed":

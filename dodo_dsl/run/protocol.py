@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from dodo_dsl.outcome import Response
 from dodo_dsl.run.load.snapshot import Snapshot
 
 
@@ -92,6 +93,13 @@ class Time:
 
 
 @dataclass(frozen=True)
+class Responded:
+    """How long the application took for its answers in lockstep."""
+
+    response: Response
+
+
+@dataclass(frozen=True)
 class Stopped:
     """The clock of a lockstep test gives up: ``kind`` is unanswered, stuck or timedout."""
 
@@ -111,6 +119,7 @@ Event = (
     | Unstartable
     | Lost
     | Time
+    | Responded
     | Stopped
 )
 

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dodo_dsl.outcome import MachineLoad, Outcome, Result
+from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.load.judgement import consider
+from dodo_dsl.run.load.response import judged
 from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended, lost_messages, outcome_of
 from dodo_dsl.run.protocol import (
     Backend,
@@ -20,6 +21,7 @@ from dodo_dsl.run.protocol import (
     Noted,
     Overrun,
     Ready,
+    Responded,
     Stopped,
     Time,
     Unstartable,
@@ -44,6 +46,7 @@ class RunState:
     lost: dict[str, int] = field(default_factory=dict)
     late: dict[str, Late] = field(default_factory=dict)
     load: MachineLoad | None = None
+    response: Response | None = None
     notes: list[str] = field(default_factory=list)
     began: float | None = None
     finished: float | None = None
@@ -110,6 +113,8 @@ class RunState:
                 self.input_ended = True
             case Time():
                 self.time = event
+            case Responded(response):
+                self.response = response
 
     def _take_stop(self, kind: str, reason: str) -> None:
         if kind == "timedout":
@@ -145,8 +150,10 @@ class RunState:
 
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
-        plan, judged = self.plan, consider(decide(self.facts), self._load())
-        finding = judged.finding
+        plan = self.plan
+        answers = judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
+        considered = consider(decide(self.facts, answers.findings), self._load())
+        finding = considered.finding
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
@@ -155,10 +162,11 @@ class RunState:
             execution_s=None if self.finished is None or self.began is None else self.finished - self.began,
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
-            checks=tuple(check for verdict in verdicts for check in verdict.checks),
+            checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks),
             last_lines=tuple(backend.tail(finding.service)) if finding.result != "passed" else (),
-            notes=(*self.notes, *losses),
-            machine=judged.load,
+            notes=(*self.notes, *losses, *answers.notes),
+            machine=considered.load,
+            response=self.response,
         )
 
     def is_application(self, service: str) -> bool:

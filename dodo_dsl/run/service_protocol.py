@@ -1,9 +1,11 @@
 """The protocol of services on standard output: JSON lines with the key ``dodo`` are for the runner, others are log."""
 
+import dataclasses
 import json
 import math
 from typing import Any
 
+from dodo_dsl.outcome import Response
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.run.protocol import (
     Event,
@@ -13,6 +15,7 @@ from dodo_dsl.run.protocol import (
     Noted,
     Overrun,
     Ready,
+    Responded,
     Stopped,
     Time,
     VerdictEvent,
@@ -66,9 +69,24 @@ def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
     seconds, reason = message.get("s"), message.get("reason")
     if kind == "time" and _is_number(seconds):
         return Time(float(seconds or 0.0), message.get("last") is True)
+    if kind == "response":
+        return _response(message)
     if kind in _STOPS and isinstance(reason, str) and _is_text(reason or "none"):
         return Stopped(str(kind), reason)
     return None
+
+
+def _response(message: dict[str, Any]) -> Responded | None:
+    """How long the application took, where all of the numbers can be."""
+    facts: dict[str, Any] = {name: message.get(name) for name in (field.name for field in dataclasses.fields(Response))}
+    counts = [facts["answers"], facts["slow"], facts["over"] or 0]
+    times = [value for name, value in facts.items() if name.endswith("_s")]
+    if not all(type(count) is int and 0 <= count <= counts[0] for count in counts) or counts[0] == 0:
+        return None
+    if not all(_is_number(time, none=True) and (time or 0) >= 0 for time in times) or None in times[:4]:
+        return None
+    name = facts["processor"]
+    return Responded(Response(**{**facts, "processor": name if _is_text(name) else ""}))
 
 
 def _problem(message: dict[str, Any]) -> str:

@@ -18,7 +18,7 @@ LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
 LEVELS = ("sil", "dil", "hil")
 KINDS = ("perception", "open-loop", "closed-loop")
-_MAPPINGS = (*LAYERS, matrix.KEY, "record")
+_MAPPINGS = (*LAYERS, matrix.KEY, "record", "response")
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
 
@@ -39,6 +39,7 @@ class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
     ``isolation`` is None where the spec leaves it to the rig, ``frames_hz`` is 0 where no frames are recorded.
+    ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``is_whole`` is False where services could not be read, so that missing producers are not reported.
     """
 
@@ -53,6 +54,8 @@ class Spec:
     isolation: str | None = None
     seed: int = 0
     frames_hz: float = 0.0
+    max_response_s: float | None = None
+    response_over: float = 0.0
     uses: tuple[Use, ...] = ()
     choice: Choice = field(default_factory=Choice)
     spans: dict[str, Span] = field(default_factory=dict)
@@ -133,12 +136,15 @@ def _number(node: Node | None, unit: str) -> float | None:
         return None
 
 
-def _timeout(node: Node | None) -> tuple[float | None, list[Diagnostic]]:
-    seconds = _number(node, "s")
-    if seconds is not None and node is not None and not 0.1 <= seconds <= 86_400:
+def _within(
+    node: Node | None, key: str, unit: str, bounds: tuple[float, float], expected: str
+) -> tuple[float | None, list[Diagnostic]]:
+    """A quantity in its unit, None when it is not one, with the problem of one that is out of range."""
+    value = _number(node, unit)
+    if value is not None and node is not None and not bounds[0] <= value <= bounds[1]:
         text = node.text if isinstance(node, Scalar) else ""
-        return None, [Diagnostic(node.span, "out-of-range", f"'timeout' is {text}, expected 0.1 s to 24 h")]
-    return seconds, []
+        return None, [Diagnostic(node.span, "out-of-range", f"'{key}' is {text}, expected {expected}")]
+    return value, []
 
 
 def _seed(node: Node | None) -> int:
@@ -146,8 +152,12 @@ def _seed(node: Node | None) -> int:
     return int(value) if isinstance(value, int | float) and math.isfinite(value) else 0
 
 
+def _part(node: Node | None, key: str) -> Node | None:
+    return node.get(key) if isinstance(node, Mapping) else None
+
+
 def _frames(node: Node | None) -> float:
-    return (_number(node.get("frames"), "Hz") if isinstance(node, Mapping) else None) or 0.0
+    return _number(_part(node, "frames"), "Hz") or 0.0
 
 
 def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> tuple[Spec, list[Diagnostic]]:
@@ -156,7 +166,10 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         return value.value if isinstance(value, Scalar) and isinstance(value.value, str) else default
 
     uses = tuple(_uses(node))
-    timeout, found = _timeout(node.get("timeout"))
+    response = node.get("response")
+    timeout, found = _within(node.get("timeout"), "timeout", "s", (0.1, 86_400), "0.1 s to 24 h")
+    longest, more = _within(_part(response, "max"), "max", "s", (0.0001, 3600), "0.1 ms to 1 h")
+    over, most = _within(_part(response, "over"), "over", quantity.SHARE, (0, 1), "0 % to 100 %")
     spec = Spec(
         location,
         name=text("name"),
@@ -169,12 +182,14 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         isolation=text("isolation"),
         seed=_seed(node.get("seed")),
         frames_hz=_frames(node.get("record")),
+        max_response_s=longest,
+        response_over=over or 0.0,
         uses=uses,
         choice=choice,
         spans={key: entry.value.span for key, entry in node.entries.items()},
         is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),
     )
-    return spec, found
+    return spec, [*found, *more, *most]
 
 
 def _has_stranger(node: Mapping) -> bool:

@@ -24,7 +24,8 @@ def build(context: Context) -> Service:
     context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])
-    return ClockService(context.session, channel, roles, answers, period_of(flags["freq"]), timeout, patience)
+    period, limit = period_of(flags["freq"]), flags["max-response"]
+    return ClockService(context.session, channel, roles, answers, period, timeout, patience, limit)
 
 
 if __name__ == "__main__":

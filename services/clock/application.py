@@ -9,6 +9,8 @@ from services.base.stamps import others
 from services.clock.answers import Answers
 from services.clock.exchange import StepCommand, StepResult
 from services.clock.participants import SLICE_S, ApplicationSilent, IsStopped, Patience, ServiceLink
+from services.clock.processor_time import NOTHING, ApplicationProcesses
+from services.clock.response import ResponseTimes
 
 _AGAIN_S = 0.5
 
@@ -16,13 +18,18 @@ _AGAIN_S = 0.5
 class SteppedApplication:
     """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
-    def __init__(self, answers: Answers, patience: Patience, link: ServiceLink, stopped: IsStopped) -> None:
+    def __init__(
+        self, answers: Answers, patience: Patience, link: ServiceLink, stopped: IsStopped, response: ResponseTimes
+    ) -> None:
         self.answers = answers
         self.frames = 0
         self.waited_first, self.waited = 0.0, 0.0
         """Wall time in s for the first answer, and for all others."""
+        self.response = response
+        self.processes = ApplicationProcesses(())
+        """To be set when they are known."""
         self._patience, self._link, self._stopped = patience, link, stopped
-        self._began = 0.0
+        self._began, self._spent = 0.0, NOTHING
         self._first: list[EncodedEnvelope] = []
         self._reading: set[str] = set()
         """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
@@ -41,7 +48,7 @@ class SteppedApplication:
     def show(self, shown: Sequence[StepResult], now: int) -> None:
         """Announce new pictures as soon as readers wait for them; raises ApplicationSilent."""
         self.frames += 1
-        self._began = time.monotonic()
+        self._began, self._spent = time.monotonic(), self.processes.spent()
         again = self._began + _AGAIN_S
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
@@ -71,6 +78,7 @@ class SteppedApplication:
             self.waited_first += spent
         else:
             self.waited += spent
+            self.response.add(spent, self.processes.spent().since(self._spent) if self.processes else None)
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services."""

@@ -5,9 +5,11 @@ import logging
 import time
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
+from services.base.clock import MICROSECONDS
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.lockstep_clock import EPOCH
 from services.base.service import Service
@@ -16,6 +18,8 @@ from services.clock.application import SteppedApplication
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
 from services.clock.participants import Patience, Roles, TestEnded
+from services.clock.processor_time import ApplicationProcesses
+from services.clock.response import ResponseTimes
 
 _REPORT_S = 1.0
 _SLICE = 0.05
@@ -26,7 +30,10 @@ _log = logging.getLogger(__name__)
 
 
 class ClockService(Service):
-    """Drives a test by its Stepper; ``period`` and ``timeout`` in us of test time."""
+    """Drives a test by its Stepper; ``period`` and ``timeout`` in us of test time.
+
+    ``max_response`` is the time in s beyond which answers are counted.
+    """
 
     def __init__(
         self,
@@ -37,11 +44,13 @@ class ClockService(Service):
         period: Fraction | int,
         timeout: int,
         patience: Patience,
+        max_response: float | None = None,
     ) -> None:
         self._session = session
         self._begin_id = session.messages.id("dodo.TestBegin")
         exchange = Exchange(session, channel, answers.take)
-        self._application = SteppedApplication(answers, patience, exchange, self._over)
+        self._response = ResponseTimes(float(period) / MICROSECONDS, max_response)
+        self._application = SteppedApplication(answers, patience, exchange, self._over, self._response)
         self._stepper = Stepper(roles, period, timeout, self._application, exchange, self._over)
         self._reported = 0.0
         self._stopped: Callable[[], bool] = lambda: False
@@ -53,6 +62,7 @@ class ClockService(Service):
         if begin is None:
             return
         self._report_time()
+        self._application.processes = ApplicationProcesses(self._pids(begin))
         kind, reason = "", ""
         try:
             self._stepper.connect()
@@ -61,9 +71,16 @@ class ClockService(Service):
             kind, reason = problem.kind, str(problem)
         spent = sorted(self._stepper.spent.items(), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
+        if facts := self._response.facts():
+            self._report("response", **facts)
         self._report_time(last=True)
         if kind:
             self._report(kind, reason=reason)
+
+    def _pids(self, begin: Envelope) -> list[int]:
+        """The process ids of the application's services; none where the runner gives none."""
+        message: Any = self._session.messages.decode(begin.data_type, begin.payload)
+        return [int(word) for word in message.application.split(",") if word.isdecimal() and len(word) < 10]
 
     def _over(self) -> bool:
         if time.monotonic() - self._reported > _REPORT_S:

@@ -7,8 +7,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl.outcome import Response
 from dodo_dsl.plan.clock_service import CLOCK
-from dodo_dsl.run.protocol import InputEnded, Late, Malformed, Noted, Overrun, Ready, Stopped, Time, VerdictEvent
+from dodo_dsl.run.protocol import (
+    InputEnded,
+    Late,
+    Malformed,
+    Noted,
+    Overrun,
+    Ready,
+    Responded,
+    Stopped,
+    Time,
+    VerdictEvent,
+)
 from dodo_dsl.run.service_protocol import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
@@ -76,7 +88,34 @@ def test_other_verdicts_are_malformed(case: str) -> None:
     assert read_line("camera", False, text) is None
 
 
+RESPONSE = {
+    "answers": 3,
+    "period_s": 0.1,
+    "median_s": 0.01,
+    "p95_s": 0.02,
+    "worst_s": 0.03,
+    "processor_median_s": None,
+    "processor_p95_s": None,
+    "processor_worst_s": None,
+    "slow": 0,
+    "over": 1,
+    "processor": "",
+}
+
+
+def response(**changes: object) -> str:
+    return json.dumps({"dodo": "response", **RESPONSE, **changes})
+
+
 CLOCKED = {
+    response(): Responded(Response(**RESPONSE)),  # type: ignore[arg-type]
+    response(answers=0): None,
+    response(over=4): None,
+    response(slow=-1): None,
+    response(median_s=None): None,
+    response(worst_s=-1): None,
+    response(p95_s="0.1"): None,
+    response(processor=7): Responded(Response(**RESPONSE)),  # type: ignore[arg-type]
     '{"dodo": "time", "s": 1.5}': Time(1.5, False),
     '{"dodo": "time", "s": 2, "last": true}': Time(2.0, True),
     '{"dodo": "time", "s": 2, "last": 1}': Time(2.0, False),

@@ -20,6 +20,7 @@ from dodo_dsl.run.protocol import Event, Exited, Lost, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
+PIDS_PATIENCE_S = 5.0
 
 
 class ProcessBackend:
@@ -38,6 +39,8 @@ class ProcessBackend:
         self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._outputs: dict[str, ServiceOutput] = {}
+        self._pids: dict[str, asyncio.Future[int]] = {}
+        """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._asked: asyncio.Future[Snapshot | None] | None = None
         self._sandbox = SandboxClient(
             isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
@@ -47,7 +50,10 @@ class ProcessBackend:
         await self._sandbox.open(self.slot, self.report)
 
     def _take(self, message: dict[str, Any]) -> None:
-        if "unstartable" in message:
+        if "started" in message:
+            self._pids[message["started"]].set_result(message["pid"])
+        elif "unstartable" in message:
+            self._pids[message["unstartable"]].cancel()
             self._events.put_nowait(Unstartable(message["unstartable"], message["why"]))
         elif "load" in message:
             if self._asked is not None and not self._asked.done():
@@ -89,6 +95,7 @@ class ProcessBackend:
 
         output = ServiceOutput(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
+        self._pids[command.name] = asyncio.get_running_loop().create_future()
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module}
         message = {"do": "start", "id": command.name, **words}
         try:
@@ -101,7 +108,11 @@ class ProcessBackend:
         return await self._events.get()
 
     async def begin(self) -> None:
-        self._sandbox.send({"do": "send", "cid": self.slot.cid, "data": begin_frame(self.plan.seed).hex()})
+        pids = [self._pids[s.name] for s in self.plan.application.services if s.name in self._pids]
+        if pids:
+            await asyncio.wait(pids, timeout=PIDS_PATIENCE_S)
+        application = [pid.result() for pid in pids if pid.done() and not pid.cancelled()]
+        self._sandbox.send({"do": "send", "cid": self.slot.cid, "data": begin_frame(self.plan.seed, application).hex()})
 
     async def load(self) -> Snapshot | None:
         """What the sandbox sees of its processes; None when it does not answer."""

@@ -26,12 +26,12 @@ class Children:
         self.names: dict[int, str] = {}
         """All that were ever started, by process id."""
 
-    def fork(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> None:
-        """Forks this process for a Python module; raises OSError."""
-        self._add(name, ForkedModule(words, environment, folder, output))
+    def fork(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> int:
+        """Forks this process for a Python module, and gives the process id; raises OSError."""
+        return self._add(name, ForkedModule(words, environment, folder, output))
 
-    def start(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> None:
-        """Starts a program; raises OSError, SubprocessError and ValueError."""
+    def start(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> int:
+        """Starts a program, and gives its process id; raises OSError, SubprocessError and ValueError."""
         child = subprocess.Popen(
             words,
             env=environment,
@@ -42,11 +42,12 @@ class Children:
             start_new_session=True,
             preexec_fn=functools.partial(namespaces.end_with, os.getpid()),  # noqa: PLW1509  (it has one thread)
         )
-        self._add(name, child)
+        return self._add(name, child)
 
-    def _add(self, name: str, child: "subprocess.Popen[bytes] | ForkedModule") -> None:
+    def _add(self, name: str, child: "subprocess.Popen[bytes] | ForkedModule") -> int:
         self._running[name] = child
         self.names[child.pid] = name
+        return child.pid
 
     def reap(self) -> None:
         """Collects ended processes, adopted orphans among them."""

@@ -9,8 +9,8 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         is a Python module for which a fork of the sandbox will do; {"do": "close"};
                         {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs;
                         {"do": "load"}
-    sandbox to runner   {"up": pid} or {"down": why}; {"unstartable": id, "why"}; {"exited": id, "code"};
-                        {"load": snapshot or null}
+    sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or {"unstartable": id, "why"};
+                        {"exited": id, "code"}; {"load": snapshot or null}
 """
 
 import contextlib
@@ -110,7 +110,7 @@ class Sandbox:
         environment = {k: v for k, v in {**os.environ, **command["env"]}.items() if v is not None}
         start = self.children.fork if self.forks and command["fork"] else self.children.start
         try:
-            start(name, words, environment, command["cwd"], output)
+            self.send(started=name, pid=start(name, words, environment, command["cwd"], output))
         except (OSError, subprocess.SubprocessError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error)
             self.send(unstartable=name, why=f"{getattr(error, 'filename', None) or words[0]}: {why}")

@@ -21,6 +21,7 @@ from services.clock.application import SteppedApplication
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
 from services.clock.participants import Patience, Roles
+from services.clock.response import ResponseTimes
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
@@ -214,7 +215,7 @@ class Toys:
                 exchange = Exchange(session, channel, answers.take)
                 advance = tuple(name for name in self.cast if name == "mover")
                 roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
-                application = SteppedApplication(answers, self.patience, exchange, stop.is_set)
+                application = SteppedApplication(answers, self.patience, exchange, stop.is_set, ResponseTimes())
                 stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
                 try:
                     stepper.connect()

@@ -1,0 +1,52 @@
+"""What the times of answers mean for a test."""
+
+from dataclasses import replace
+
+import pytest
+
+from dodo_dsl.outcome import Response
+from dodo_dsl.plan.model import Lockstep
+from dodo_dsl.run.load.response import CHECK, judged
+
+FAST = Response(60, 0.1, 0.012, 0.02, 0.03, 0.01, 0.015, 0.02, 0, None, "Some CPU, 2000 MHz")
+PLAIN, LIMITED = Lockstep(1, 60.0), Lockstep(1, 60.0, 0.1, 0.1)
+
+
+def test_a_fast_application_has_nothing_to_say() -> None:
+    found = judged(FAST, PLAIN, ["steering"])
+    assert (found.findings, found.checks, found.notes) == ((), (), ())
+
+
+@pytest.mark.parametrize("lockstep", [PLAIN, LIMITED, None])
+def test_without_figures_nothing_is_judged(lockstep: Lockstep | None) -> None:
+    assert judged(None, lockstep, ["steering"]).checks == ()
+
+
+def test_too_slow_for_real_time_is_a_note() -> None:
+    slow = replace(FAST, median_s=0.5, p95_s=0.52, worst_s=1.25, slow=58)
+    (note,) = judged(slow, PLAIN, ["steering"]).notes
+    assert note == (
+        "too slow for real time: 58 of 60 answers took longer than the frames' period of 100 ms; "
+        "an answer took 500 ms (median), 520 ms (95 %), 1.25 s (worst), 10 ms of it on the processor, "
+        "on Some CPU, 2000 MHz"
+    )
+    assert judged(replace(slow, slow=6), PLAIN, ["steering"]).notes == (), "a tenth is not the rule"
+
+
+@pytest.mark.parametrize(("over", "passes"), [(0, True), (6, True), (7, False)])
+def test_a_limit_is_a_check(over: int, passes: bool) -> None:
+    found = judged(replace(FAST, over=over), LIMITED, ["perception", "steering"])
+    assert found.checks == ({"name": CHECK, "value": over / 60, "limit": {"max": 0.1}, "unit": "", "ok": passes},)
+    assert bool(found.findings) is not passes
+
+
+def test_the_reason_has_the_limit_and_the_times() -> None:
+    (finding,) = judged(replace(FAST, over=8), LIMITED, ["perception", "steering"]).findings
+    assert finding.result == "failed" and finding.service == "perception"
+    assert finding.reason.startswith("8 of 60 answers took longer than 100 ms (at most 10 %): an answer took 12 ms (")
+
+
+def test_where_processes_cannot_be_seen_only_the_time_is_said() -> None:
+    unseen = replace(FAST, over=60, processor_median_s=None, processor="")
+    (finding,) = judged(unseen, LIMITED, []).findings
+    assert finding.reason.endswith("30 ms (worst)")
