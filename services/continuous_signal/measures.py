@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from services.base import Check
 from services.continuous_signal.coverage import Coverage, cover, holds
+from services.continuous_signal.shape import Run, lag, likeness, longest_run
 from services.continuous_signal.target import MICROSECONDS, Target, Times, Values
 
 _DIGITS = 12
@@ -22,7 +23,8 @@ class SignalLimits:
     A sample holds until the next one and at most for `hold`: of the judged time a share of `coverage` has to be
     held, and no time without a sample may be longer than `gap`. A sample whose time is more than `delay` from its
     arrival is late. Until the first sample nothing has to be held if that comes within `start_up` of the target's time.
-    All times in microseconds.
+    All times in microseconds, but for `lag` in seconds, by which the signal may follow its target late. It may keep
+    one value for `repeats` samples.
     """
 
     mean: float | None = None
@@ -38,6 +40,8 @@ class SignalLimits:
     hold: int = MICROSECONDS // 2
     delay: int | None = None
     start_up: int = 0
+    lag: float | None = None
+    repeats: int | None = None
 
 
 @dataclass(frozen=True)
@@ -54,8 +58,9 @@ class SignalMeasures:
     """The distances d of `samples` samples; `received` counts all in the window, `outside` those without a target.
 
     `broken` holds the times (s) of those in the window that are not finite. `mean`, `std` and `distance` are over
-    samples, `mean_over_time`, `std_over_time` and `share` over the time that these hold. Without a sample all else
-    is None.
+    samples, `mean_over_time`, `std_over_time` and `share` over the time that these hold. `repeats` is the
+    longest run of samples with the same value, `likeness` what the signal is of its target, where that is simple.
+    Without a sample all else is None.
     """
 
     received: int
@@ -70,12 +75,18 @@ class SignalMeasures:
     mean_over_time: float | None = None
     std_over_time: float | None = None
     coverage: Coverage | None = None
+    lag: float | None = None
+    repeats: Run | None = None
+    likeness: str = ""
 
     def checks(self, limits: SignalLimits) -> tuple[Check, ...]:
         """Each measure with its limit; one that has no value does not keep a limit."""
         share = () if limits.band is None else (_check("share", self.share, "min", limits.share),)
         held, gap = (self.coverage.share, self.coverage.gap) if self.coverage else (None, None)
         longest = None if limits.gap is None else limits.gap / MICROSECONDS
+        lag = () if limits.lag is None else (_check("lag", self.lag, "max", limits.lag, "s"),)
+        run = self.repeats.samples if self.repeats else None
+        repeats = () if limits.repeats is None else (_check("repeats", run, "max", limits.repeats),)
         return (
             _check("mean", self.mean, "max", limits.mean),
             _check("std", self.std, "max", limits.std),
@@ -83,6 +94,8 @@ class SignalMeasures:
             _check("mean-over-time", self.mean_over_time, "max", limits.mean),
             _check("std-over-time", self.std_over_time, "max", limits.std),
             *share,
+            *lag,
+            *repeats,
             _check("samples", self.samples, "min", limits.samples),
             _check("gap", gap, "max", longest, "s"),
             _check("coverage", held, "min", limits.coverage),
@@ -133,6 +146,9 @@ def measure(
         mean_over_time=mean,
         std_over_time=round(float(np.sqrt(np.average((distances - mean) ** 2, weights=weights))), _DIGITS),
         coverage=coverage,
+        lag=None if limits.lag is None else lag(target, times, values),
+        repeats=None if limits.repeats is None else longest_run(times, values),
+        likeness=likeness(target, times, values),
     )
 
 

@@ -30,7 +30,8 @@ def verdict(
     if faults:
         silent = not measures.received and not late.samples
         aside = _late(late) if measures.samples and late.samples else ""
-        return Verdict("failed", "; ".join(faults) + _worst(measures) + aside, checks, silent=silent)
+        likeness = f"; the signal is {measures.likeness}" if measures.likeness and "repeats" not in broken else ""
+        return Verdict("failed", "; ".join(faults) + likeness + _worst(measures) + aside, checks, silent=silent)
     kept = [f"{check.name} {_number(check.value)} ({_bound(check)})" for check in checks if _is_kept(check)]
     samples = f"{signal} kept to its target over {measures.samples} samples"
     aside = _late(late) if late.samples else ""
@@ -59,6 +60,13 @@ def _fault(check: Check, measures: SignalMeasures, limits: SignalLimits) -> str:
         return f"only {value} samples came ({bound}){aside}"
     if check.name == "broken":
         return f"{value} samples are not finite numbers, the first at {measures.broken[0]:.2f} s"
+    if check.name == "lag":
+        return f"it lags its target by {value} s ({bound} s)"
+    if check.name == "repeats":
+        which = (
+            f", {_number(measures.repeats.value)}, from {measures.repeats.time:.2f} s on" if measures.repeats else ""
+        )
+        return f"{value} samples in a row have the same value{which} ({bound})"
     if check.name == "share":
         return f"the share of time within {_number(limits.band)} of the target is {value} ({bound})"
     if check.name in ("gap", "coverage"):

@@ -81,6 +81,8 @@ def _limits(flags: Flags) -> SignalLimits:
         band=flags["band"],
         share=flags["min-share"],
         samples=flags["min-samples"],
+        lag=flags["max-lag"],
+        repeats=flags["max-repeats"],
         start=round(flags["from"] * MICROSECONDS),
         until=None if until is None else round(until * MICROSECONDS),
         coverage=flags["min-coverage"],

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from services.continuous_signal.late import LateFacts
 from services.continuous_signal.measures import SignalLimits, SignalMeasures, WorstSample
 from services.continuous_signal.reason import verdict
+from services.continuous_signal.shape import Run
 from services.continuous_signal.target import Target
 
 TARGET = Target(np.array([0, 10_000_000]), np.array([0.0, 1.0]))
@@ -54,3 +57,18 @@ def test_over_time_is_told_only_where_it_says_more() -> None:
 def test_without_samples_the_reason_is_why(measures: SignalMeasures, text: str) -> None:
     failed = verdict("speed", TARGET, measures, LIMITS, "within 9.00 s", LateFacts())
     assert (failed.outcome, failed.reason, failed.silent) == ("failed", text, measures.received == 0)
+
+
+def test_a_lag_and_a_value_that_stays_are_named() -> None:
+    bad = replace(GOOD, lag=0.3, repeats=Run(7, 0.05, 2.0), likeness="about 2 times its target")
+    limits = SignalLimits(mean=0.05, lag=0.15, repeats=4)
+    assert reason(bad, limits) == (
+        "it lags its target by 0.3 s (at most 0.15 s); 7 samples in a row have the same value, 0.05, from 2.00 s on "
+        "(at most 4); worst at 12.30 s: 0.1 with a target of 0.4"
+    )
+
+
+def test_a_failure_says_what_the_signal_is_of_its_target() -> None:
+    bad = replace(GOOD, mean=0.06, likeness="about 2 times its target")
+    assert "(at most 0.05); the signal is about 2 times its target; worst" in reason(bad)
+    assert "times its target" not in reason(replace(bad, mean=0.01))
