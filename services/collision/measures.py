@@ -43,6 +43,10 @@ class DriveMeasures:
         """The gates crossed in order; all of them are required."""
         return Check("gates", crossed, {"min": gates}, "", crossed == gates)
 
-    def drive_checks(self) -> tuple[Check, Check]:
-        """Measures without a limit."""
-        return Check("distance", self.distance, {}, "m", True), Check("max-speed", self.max_speed, {}, "m/s", True)
+    def drive_checks(self, max_speed: float | None = None) -> tuple[Check, Check]:
+        """The distance, and the speed with its limit in m/s, if there is one."""
+        speed = {} if max_speed is None else {"max": max_speed}
+        is_kept = max_speed is None or (self.max_speed is not None and self.max_speed <= max_speed)
+        return Check("distance", self.distance, {}, "m", True), Check(
+            "max-speed", self.max_speed, speed, "m/s", is_kept
+        )

@@ -78,6 +78,9 @@ class TrackEvaluator(Evaluator):
         elif margin < self.track.min_margin:
             close = f"came within {margin:.3f} m of wall {near} {when} {place(pose)}"
             self.verdict = self._verdict("failed", f"{close}, expected at least {self.track.min_margin:g} m")
+        elif self.track.max_speed is not None and (speed := self._measures.max_speed or 0.0) > self.track.max_speed:
+            fast = f"drove {speed:.3f} m/s {when} {place(pose)}, expected at most {self.track.max_speed:g} m/s"
+            self.verdict = self._verdict("failed", fast)
         elif goal is not None:
             self._measures.time_to_goal = self.elapsed(time)
             self.verdict = self._arrived(f"{goal} {when}", time)
@@ -136,6 +139,5 @@ class TrackEvaluator(Evaluator):
         goal = (measures.goal_check(track.max_time),) if track.goal or track.gates else ()
         gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
         walls = (measures.wall_check(track.min_margin),) if track.walls else ()
-        return Verdict(
-            outcome, reason, (*goal, *gates, *walls, *measures.drive_checks(), *self._requests.checks()), silent
-        )
+        drive = measures.drive_checks(track.max_speed)
+        return Verdict(outcome, reason, (*goal, *gates, *walls, *drive, *self._requests.checks()), silent)

@@ -94,6 +94,7 @@ def track(flags: Flags) -> Track:
         max_time=flags["max-time"],
         gates=tuple((name, picked[name]) for name in gates),
         min_margin=flags["min-margin"],
+        max_speed=flags["max-speed"],
     )
 
 

@@ -16,7 +16,7 @@ class Track:
     """Walls must not be touched, and the goal be reached; ``gates`` have to be crossed before, in order.
 
     Obstacles by name in m, `max_time` in s. The vehicle keeps ``min_margin`` m away from walls; with 0 it only
-    must not touch them.
+    must not touch them. ``max_speed`` in m/s, None for no limit.
     """
 
     walls: Obstacles
@@ -24,6 +24,7 @@ class Track:
     max_time: float
     gates: tuple[Gate, ...] = ()
     min_margin: float = 0.0
+    max_speed: float | None = None
 
 
 def touched(obstacles: Obstacles, area: shapely.Geometry) -> str | None:

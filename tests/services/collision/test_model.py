@@ -437,3 +437,20 @@ def test_no_vehicle_passes_that_was_seen_on_a_wall(poses: list[tuple[float, floa
         assert "wall" not in touching[: int(values(it)["time-to-goal"] or 0) + 1]
     if decided(it).reason.startswith("did not reach"):
         assert first is None
+
+
+def test_a_vehicle_that_is_too_fast_fails_at_once() -> None:
+    it = judge(replace(LANE, max_speed=0.8))
+    drive(it, (0.0, 0.5, 0, 0), (1.0, 1.3, 0, 0))
+    assert it.verdict is None
+    drive(it, (1.5, 1.8, 0.05, 0))
+    assert decided(it).outcome == "failed"
+    assert decided(it).reason == "drove 1.005 m/s after 1.50 s at x = 1.80 m, y = 0.05 m, expected at most 0.8 m/s"
+    assert oks(it)["max-speed"] is False
+
+
+def test_a_speed_within_its_limit_is_kept() -> None:
+    it = judge(replace(LANE, max_speed=2.0))
+    drive(it, (0.0, 0.5, 0, 0), (2.0, 3.0, 0, 0))
+    assert decided(it).outcome == "passed"
+    assert oks(it)["max-speed"] is True

@@ -36,7 +36,13 @@ def lane(tmp_path: Path) -> Iterator[Path]:
 
 def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool = False, **changes: Any) -> Collision:
     flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
-    none: dict[str, Any] = {"gates": [], "min-margin": 0.0, "requests": list(REQUESTS), "max-silence": 60.0}
+    none: dict[str, Any] = {
+        "gates": [],
+        "min-margin": 0.0,
+        "requests": list(REQUESTS),
+        "max-silence": 60.0,
+        "max-speed": None,
+    }
     return Collision(
         Context(
             "collision",
