@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 
+MOST_SURPLUS = 100
+"""Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
+
 
 @dataclass(frozen=True)
 class MessageFilter:
@@ -38,6 +41,7 @@ class Answers:
     _all_times: set[int] = field(default_factory=set)
     _chosen: dict[MessageFilter, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
+    _surplus_now: Counter[str] = field(default_factory=Counter)
     _is_seen: bool = False
     _is_done: bool = False
     _is_collected: bool = False
@@ -47,6 +51,7 @@ class Answers:
         self._times = set(times)
         self._all_times |= self._times
         self._chosen, self._is_seen, self._is_done, self._is_collected = {}, False, False, False
+        self._surplus_now.clear()
 
     def seen(self) -> None:
         """The frame was seen: all that is taken from now on came after it."""
@@ -69,6 +74,7 @@ class Answers:
             if each.matches(envelope):
                 if stale or each in self._chosen or self._is_collected:
                     self.surplus += 1
+                    self._surplus_now[each.name] += 1
                 else:
                     self._chosen[each] = known
                 return
@@ -95,6 +101,12 @@ class Answers:
         if self.done is not None:
             return self._is_done
         return len(self._chosen) == len(self.required)
+
+    @property
+    def flood(self) -> str:
+        """The message of which more than MOST_SURPLUS came since the frame was expected; empty if none."""
+        ((name, count),) = self._surplus_now.most_common(1) or [("", 0)]
+        return name if count > MOST_SURPLUS else ""
 
     @property
     def missing(self) -> list[str]:

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from services.base.lockstep.datagrams import EncodedEnvelope
 from services.base.stamps import others
-from services.clock.answers import Answers
+from services.clock.answers import MOST_SURPLUS, Answers
 from services.clock.exchange import StepCommand, StepResult
-from services.clock.participants import SLICE_S, ApplicationSilent, IsStopped, Patience, ServiceLink
+from services.clock.participants import SLICE_S, ApplicationFloods, ApplicationSilent, IsStopped, Patience, ServiceLink
 from services.clock.processor_time import NOTHING, ApplicationProcesses
 from services.clock.response import ResponseTimes
 
@@ -46,7 +46,7 @@ class SteppedApplication:
             self._first.extend(messages)
 
     def show(self, shown: Sequence[StepResult], now: int) -> None:
-        """Announce new pictures as soon as readers wait for them; raises ApplicationSilent."""
+        """Announce new pictures as soon as readers wait for them; raises ApplicationSilent and ApplicationFloods."""
         self.frames += 1
         self._began, self._spent = time.monotonic(), self.processes.spent()
         again = self._began + _AGAIN_S
@@ -61,6 +61,7 @@ class SteppedApplication:
                     self._link.clear()
                     raise ApplicationSilent(self._sentence(f"no reader waited for a picture of '{camera.service}'"))
                 self._link.pump(SLICE_S)
+                self._check_flood()
                 again = self._repeat_first(again)
             self.answers.seen()
         if not self.answers.is_expected:
@@ -68,11 +69,12 @@ class SteppedApplication:
             self._link.send([StepCommand(camera.service, now, (), show=True) for camera in shown])
 
     def await_answer(self) -> None:
-        """Wait for the answer to what was shown; raises ApplicationSilent."""
+        """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods."""
         while not (self._stopped() or self._is_answered):
             if self._left <= 0:
                 raise ApplicationSilent(self._sentence(self._missing))
             self._link.pump(self._left)
+            self._check_flood()
         spent = time.monotonic() - self._began
         if self.frames == 1:
             self.waited_first += spent
@@ -83,6 +85,12 @@ class SteppedApplication:
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services."""
         return self.answers.collect()
+
+    def _check_flood(self) -> None:
+        message = self.answers.flood.rpartition(".")[2]
+        if message:
+            sent = f"sent more than {MOST_SURPLUS} {message}s that nobody asked for"
+            raise ApplicationFloods(f"the application {sent} within frame {self.frames}: it floods the bus")
 
     @property
     def _limit(self) -> float:

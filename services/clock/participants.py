@@ -23,6 +23,12 @@ class ApplicationSilent(TestEnded):
     kind = "unanswered"
 
 
+class ApplicationFloods(TestEnded):
+    """The application sends far more than it is asked for."""
+
+    kind = "unanswered"
+
+
 class ServiceSilent(TestEnded):
     """A service of the test does not answer the clock."""
 

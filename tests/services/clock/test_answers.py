@@ -3,7 +3,7 @@
 import pytest
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
-from services.clock.answers import Answers, MessageFilter, filters
+from services.clock.answers import MOST_SURPLUS, Answers, MessageFilter, filters
 
 STEER, PEDAL, BOX, READY = 1090, 1086, 1134, 1054
 FRAME, NEXT, ELSEWHEN = 1_000_000, 1_100_000, 77
@@ -127,3 +127,12 @@ def test_names_with_and_without_a_stamp() -> None:
     for wrong in ("a.C", "a.B/x"):
         with pytest.raises(ValueError, match="is not a message, expected a name such as"):
             filters([wrong], {"a.B": 5})
+
+
+def test_a_flood_is_far_more_than_one_surplus_message_to_a_frame() -> None:
+    answers = answering(said(STEER, FRAME), *[said(STEER, FRAME)] * MOST_SURPLUS)
+    assert answers.flood == ""
+    answers.take(said(STEER, FRAME))
+    assert answers.flood == "steer"
+    answers.expect([NEXT])
+    assert answers.flood == ""
