@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from services.object_detection.boxes import LabelledBox, overlaps
+from services.object_detection.mistakes import Frame, Mistakes, mistakes
 from services.object_detection.pairing import best_pairs
 
 
@@ -46,9 +47,10 @@ class Counts:
 
 @dataclass
 class CountsByClass:
-    """Counts by class, in the order in which classes came."""
+    """Counts by class, in the order in which classes came, and what kinds of mistakes they contain."""
 
     by_label: dict[str, Counts] = field(default_factory=dict)
+    mistakes: Mistakes = field(default_factory=Mistakes)
 
     def add(self, label: str, counts: Counts) -> None:
         """Add counts of a class."""
@@ -73,15 +75,21 @@ def compare(
     Only classes in ``labels`` count, or all where it is empty.
     """
     result = CountsByClass()
+    false, hit, missed = list[LabelledBox](), list[LabelledBox](), list[LabelledBox]()
     for label in dict.fromkeys(each.label for each in (*true, *found)):
         if labels and label not in labels:
             continue
-        mine = [each.box for each in found if each.label == label]
-        real = [each.box for each in true if each.label == label]
-        scores = overlaps(mine, real)
+        mine = [each for each in found if each.label == label]
+        real = [each for each in true if each.label == label]
+        scores = overlaps([each.box for each in mine], [each.box for each in real])
         pairs = best_pairs(scores, threshold)
         overlap = float(sum(scores[pair] for pair in pairs))
         result.add(label, Counts(len(pairs), len(mine) - len(pairs), len(real) - len(pairs), overlap))
+        rows, columns = {row for row, _ in pairs}, {column for _, column in pairs}
+        false += [each for row, each in enumerate(mine) if row not in rows]
+        for column, each in enumerate(real):
+            (hit if column in columns else missed).append(each)
+    result.mistakes = mistakes(Frame(false, hit, missed), threshold)
     return result
 
 

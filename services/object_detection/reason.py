@@ -11,7 +11,7 @@ def verdict(score: Score, limits: DetectionLimits, during: str) -> Verdict:
         return Verdict("failed", _silence(score, during), checks)
     faults = [_fault(check, score) for check in checks if not check.ok]
     if faults:
-        return Verdict("failed", "; ".join(faults) + _worst(score) + _aside(score), checks)
+        return Verdict("failed", "; ".join(faults) + _kinds(score) + _worst(score) + _aside(score), checks)
     total = score.counts.total()
     kept = ", ".join(
         f"{check.name} {_number(check)} ({_bound(check)})" for check in checks[: len(MEASURES)] if check.limit
@@ -61,6 +61,11 @@ def _nothing(measure: str) -> str:
     return {"precision": "nothing was detected", "recall": "there was nothing to detect"}.get(
         measure, "there was nothing"
     )
+
+
+def _kinds(score: Score) -> str:
+    sentence = score.counts.mistakes.sentence
+    return f"; {sentence}" if sentence else ""
 
 
 def _worst(score: Score) -> str:

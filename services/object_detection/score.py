@@ -85,6 +85,7 @@ class Score:
         self.answered += answered
         for label, counts in frame:
             self.counts.add(label, counts)
+        self.counts.mistakes.add(frame.mistakes)
         worst = WorstFrame(place, frame.total())
         if worst.mistakes > (self.worst.mistakes if self.worst else 0):
             self.worst = worst

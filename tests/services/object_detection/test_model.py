@@ -89,7 +89,8 @@ def test_every_limit_that_is_broken_is_named_with_the_worst_frame() -> None:
         "precision is 0.6667 (at least 0.9), with 1 false detection beside 2 found; "
         "recall is 0.5 (at least 0.9), with 2 missed beside 2 found; "
         "F1 is 0.5714 (at least 0.9), with 1 false detection and 2 missed beside 2 found; "
-        "only 2 frames had an answer (at least 3); worst was the frame at 0.50 s, with 1 false and 2 missed",
+        "only 2 frames had an answer (at least 3); "
+        "false detections: 1 where nothing is; worst was the frame at 0.50 s, with 1 false and 2 missed",
     )
 
 
