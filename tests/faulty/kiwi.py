@@ -1,0 +1,117 @@
+"""The programs of the example application, and decorators that make them faulty.
+
+A fault alters one loaded program: it replaces a function of it by a wrapped one. Every ``begin`` is called once for a
+program and gives the function that is called from then on, so that what it remembers begins anew.
+"""
+
+import importlib.util
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).resolve().parents[2] / "examples" / "kiwi"
+PERCEPTION, STEERING = "perception", "steering"
+
+Program = Any
+"""A module, ``perception`` or ``steering``, loaded for this process alone."""
+
+Make = Callable[[Program], None]
+"""Makes a program faulty."""
+
+Driving = Callable[[float, float], tuple[float, float]]
+"""Steering request (rad) and pedal of a frame, as they should be and as they are sent."""
+
+Cones = list[Any]
+"""Of ``perception.Cone``: colour and box in fractions of the image."""
+
+Sent = tuple[Any, int | None, int]
+"""A message with its sample time (us, None is now) and its sender stamp."""
+
+HANDSHAKE = "SystemStatusMessage"
+
+
+def program(name: str) -> Program:
+    """A new copy of one of the example's programs."""
+    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def driving(begin: Callable[[], Driving]) -> Make:
+    """Changes what ``Driver.drive`` decides."""
+
+    def make(steering: Program) -> None:
+        change, drive = begin(), steering.Driver.drive
+        steering.Driver.drive = lambda self, yellow, blue: change(*drive(self, yellow, blue))
+
+    return make
+
+
+def finding(begin: Callable[[], Callable[[Cones], Cones]]) -> Make:
+    """Changes which cones ``find_cones`` finds."""
+
+    def make(perception: Program) -> None:
+        change, find = begin(), perception.find_cones
+        perception.find_cones = lambda image: change(find(image))
+
+    return make
+
+
+def seeing(begin: Callable[[], Callable[[Any], Any]]) -> Make:
+    """Changes the image in which ``find_cones`` looks, an array of height x width x 4 bytes."""
+
+    def make(perception: Program) -> None:
+        change, find = begin(), perception.find_cones
+        perception.find_cones = lambda image: find(change(image))
+
+    return make
+
+
+def announcing(begin: Callable[[], Callable[[Cones, int, int], tuple[Cones, int, int]]]) -> Make:
+    """Changes cones, number and sample time (us) of the frames that ``announce`` sends."""
+
+    def make(perception: Program) -> None:
+        change, announce = begin(), perception.announce
+        perception.announce = lambda session, cones, frame, sample_time, source: announce(
+            session, *change(cones, frame, sample_time), source
+        )
+
+    return make
+
+
+def sending(begin: Callable[[], Callable[[Sent], Iterable[Sent]]]) -> Make:
+    """Changes what a program sends, message by message, but for the question whether the other one listens."""
+
+    def make(module: Program) -> None:
+        change, plain = begin(), module.Session
+
+        class FaultySession(plain):  # type: ignore[misc, valid-type]
+            def send(self, message: Any, sample_time: int | None = None, sender_stamp: int = 0) -> bytes:
+                sent: Sent = (message, sample_time, sender_stamp)
+                frame = b""
+                for each in [sent] if message.DESCRIPTOR.name == HANDSHAKE else change(sent):
+                    frame = super().send(*each)
+                return frame
+
+        module.Session = FaultySession
+
+    return make
+
+
+def framing(begin: Callable[[], Callable[[], None]]) -> Make:
+    """Does something before each frame is processed, in either program."""
+
+    def make(module: Program) -> None:
+        act = begin()
+        owner, name = (module.Driver, "drive") if module.__name__ == STEERING else (module, "find_cones")
+        process = getattr(owner, name)
+
+        def act_and_process(*words: Any) -> Any:
+            act()
+            return process(*words)
+
+        setattr(owner, name, act_and_process)
+
+    return make
