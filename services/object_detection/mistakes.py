@@ -1,6 +1,5 @@
 """What kind of mistakes an application makes, so that a verdict can say what is wrong."""
 
-import math
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
@@ -9,6 +8,8 @@ from services.object_detection.boxes import Box, LabelledBox, overlaps
 
 OUTSIDE = 2.0
 """Fraction of the picture from which on a box is far outside of it."""
+SMALL = 0.6
+"""Mean height of the missed objects to that of the found ones, below which size is the matter."""
 KINDS = {
     "far": "far outside the picture (are they in pixels?)",
     "misnamed": "on objects of another class",
@@ -20,25 +21,26 @@ KINDS = {
 
 @dataclass
 class Mistakes:
-    """False detections by KINDS, and heights of objects in fractions of the picture."""
+    """False detections by KINDS, and heights of missed and found objects in fractions of the picture."""
 
     kinds: Counter[str] = field(default_factory=Counter)
-    highest_missed: float = 0.0
-    lowest_found: float = math.inf
+    missed: list[float] = field(default_factory=list)
+    found: list[float] = field(default_factory=list)
 
     def add(self, other: "Mistakes") -> None:
         """Add those of another frame."""
         self.kinds.update(other.kinds)
-        self.highest_missed = max(self.highest_missed, other.highest_missed)
-        self.lowest_found = min(self.lowest_found, other.lowest_found)
+        self.missed.extend(other.missed)
+        self.found.extend(other.found)
 
     @property
     def sentence(self) -> str:
-        """Where the false detections are, and whether only the small objects are missed; empty without mistakes."""
+        """Where the false detections are, and whether small objects are missed; empty without mistakes."""
         places = [f"{count} {KINDS[kind]}" for kind, count in self.kinds.most_common()]
         where = f"false detections: {', '.join(places)}" if places else ""
-        small = 0.0 < self.highest_missed < self.lowest_found < math.inf
-        size = f"only objects up to {self.highest_missed:.2g} of the picture's height are missed" if small else ""
+        missed, found = (sum(heights) / max(1, len(heights)) for heights in (self.missed, self.found))
+        sizes = f"{missed:.2g} of the picture's height on average, and found ones {found:.2g}"
+        size = f"missed objects are small: {sizes}" if 0.0 < missed < SMALL * found else ""
         return "; ".join(part for part in (where, size) if part)
 
 
@@ -53,10 +55,8 @@ class Frame:
 
 def mistakes(frame: Frame, threshold: float) -> Mistakes:
     """The mistakes of one frame; ``threshold`` is the overlap that a hit needs."""
-    result = Mistakes(Counter(_kind(each, frame, threshold) for each in frame.false))
-    result.highest_missed = max((each.box.height for each in frame.missed), default=0.0)
-    result.lowest_found = min((each.box.height for each in frame.hit), default=math.inf)
-    return result
+    kinds = Counter(_kind(each, frame, threshold) for each in frame.false)
+    return Mistakes(kinds, [each.box.height for each in frame.missed], [each.box.height for each in frame.hit])
 
 
 def _kind(detection: LabelledBox, frame: Frame, threshold: float) -> str:
