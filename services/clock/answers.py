@@ -42,6 +42,8 @@ class Answers:
     _chosen: dict[MessageFilter, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
     _surplus_now: Counter[str] = field(default_factory=Counter)
+    is_silent: bool = True
+    """Whether nothing that matters has come yet."""
     _is_seen: bool = False
     _is_done: bool = False
     _is_collected: bool = False
@@ -70,6 +72,8 @@ class Answers:
         known = envelope if copies else envelope._replace(sample_time=max(self._times))
         if self.done is not None and self.done.matches(envelope) and not stale:
             self._is_done = True
+        if self.is_silent:
+            self.is_silent = not any(each.matches(envelope) for each in self.filters)
         for each in self.required:
             if each.matches(envelope):
                 if stale or each in self._chosen or self._is_collected:

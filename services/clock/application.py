@@ -19,8 +19,15 @@ class SteppedApplication:
     """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
     def __init__(
-        self, answers: Answers, patience: Patience, link: ServiceLink, stopped: IsStopped, response: ResponseTimes
+        self,
+        answers: Answers,
+        patience: Patience,
+        link: ServiceLink,
+        stopped: IsStopped,
+        response: ResponseTimes,
+        cid: int | None = None,
     ) -> None:
+        """``cid`` is the test's: an application of which nothing comes may be on another bus."""
         self.answers = answers
         self.frames = 0
         self.waited_first, self.waited = 0.0, 0.0
@@ -30,6 +37,7 @@ class SteppedApplication:
         """To be set when they are known."""
         self._patience, self._link, self._stopped = patience, link, stopped
         self._began, self._spent = 0.0, NOTHING
+        self._cid = cid
         self._first: list[EncodedEnvelope] = []
         self._reading: set[str] = set()
         """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
@@ -72,7 +80,8 @@ class SteppedApplication:
         """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods."""
         while not (self._stopped() or self._is_answered):
             if self._left <= 0:
-                raise ApplicationSilent(self._sentence(self._missing))
+                where = f"; the test is on CID {self._cid}" if self._cid and self.answers.is_silent else ""
+                raise ApplicationSilent(f"{self._sentence(self._missing)}{where}")
             self._link.pump(self._left)
             self._check_flood()
         spent = time.monotonic() - self._began

@@ -50,7 +50,7 @@ class ClockService(Service):
         self._begin_id = session.messages.id("dodo.TestBegin")
         exchange = Exchange(session, channel, answers.take)
         self._response = ResponseTimes(float(period) / MICROSECONDS, max_response)
-        self._application = SteppedApplication(answers, patience, exchange, self._over, self._response)
+        self._application = SteppedApplication(answers, patience, exchange, self._over, self._response, session.cid)
         self._stepper = Stepper(roles, period, timeout, self._application, exchange, self._over)
         self._reported = 0.0
         self._stopped: Callable[[], bool] = lambda: False

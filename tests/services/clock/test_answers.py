@@ -136,3 +136,10 @@ def test_a_flood_is_far_more_than_one_surplus_message_to_a_frame() -> None:
     assert answers.flood == "steer"
     answers.expect([NEXT])
     assert answers.flood == ""
+
+
+def test_an_application_is_silent_until_anything_that_matters_comes() -> None:
+    answers = answering(said(BOX, FRAME))
+    assert answers.is_silent
+    answers.take(said(PEDAL, ELSEWHEN))
+    assert not answers.is_silent
