@@ -11,3 +11,12 @@ MAKES: dict[str, dict[str, Make]] = {
     STEERING: {**STEERING_FAULTS, **STEERING_CONDUCT},
 }
 NAMES = tuple(dict.fromkeys(name for faults in MAKES.values() for name in faults))
+
+
+def fault_of(text: str, cid: str) -> str:
+    """The fault in ``NAME``, or of a bus in ``CID=NAME,CID=NAME``; raises ValueError for one that does not exist."""
+    faults = dict(each.split("=", 1) for each in text.split(",")) if "=" in text else {cid: text}
+    name = faults.get(cid, GOOD)
+    if name not in (GOOD, *NAMES):
+        raise ValueError(f"'{name}' is not a fault: they stand in tests/faulty/faults.yml")
+    return name

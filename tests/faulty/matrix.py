@@ -12,6 +12,8 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import yaml
+
 from dodo_dsl.atomic import write_text
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -22,7 +24,7 @@ OUTCOMES = 0, 1, 3
 
 @dataclass(frozen=True)
 class ShippedTest:
-    """An instance of a shipped test; ``digest`` is of its spec and of what DoDo judges with."""
+    """An instance of a shipped test; ``digest`` is of its spec: with another one it has to run again."""
 
     slug: str
     kind: str
@@ -46,10 +48,17 @@ def shipped_tests() -> list[ShippedTest]:
     """The shipped tests of the levels sil and dil."""
     listed = json.loads(_dodo("list", "--json").stdout)
     return [
-        ShippedTest(test["slug"], test["kind"], hashlib.sha256((ROOT / test["file"]).read_bytes()).hexdigest()[:12])
+        ShippedTest(test["slug"], test["kind"], _digest(ROOT / test["file"]))
         for test in listed
         if test["level"] in {"sil", "dil"}
     ]
+
+
+def _digest(spec: Path) -> str:
+    """Of all that a spec says but for its clock, as the clock is chosen here."""
+    said = yaml.safe_load(spec.read_text(encoding="utf-8"))
+    said.pop("clock", None)
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def outcomes_of(fault: str, slugs: Iterable[str], report: Path, jobs: int = 1) -> dict[str, tuple[str, str]]:

@@ -15,7 +15,7 @@ from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from tests.faulty import of_conduct
 from tests.faulty.kiwi import PERCEPTION, STEERING, Make, program
-from tests.faulty.makes import MAKES, NAMES
+from tests.faulty.makes import MAKES, NAMES, fault_of
 from tests.faulty.page import GAPS
 from tests.faulty.table import FAULTS
 
@@ -163,8 +163,20 @@ def test_computing_takes_processor_time_and_sleeping_takes_none() -> None:
     assert computed - began >= 0.02 > time.process_time() - computed
 
 
+def test_a_fault_belongs_to_a_bus_where_the_flag_says_so() -> None:
+    both = "128=steering-nan,130=silent"
+    assert [fault_of(both, cid) for cid in ("128", "129", "130")] == ["steering-nan", "none", "silent"]
+    assert fault_of("steering-nan", "129") == "steering-nan"
+
+
 def test_the_program_refuses_an_unknown_fault() -> None:
-    words = [sys.executable, str(Path(__file__).with_name("program.py")), STEERING, "--fault=steering-revered"]
+    words = [
+        sys.executable,
+        str(Path(__file__).with_name("program.py")),
+        STEERING,
+        "--fault=steering-revered",
+        "--cid=1",
+    ]
     result = subprocess.run(words, capture_output=True, text=True, check=False)
     assert result.returncode == 2
-    assert "invalid choice: 'steering-revered'" in result.stderr
+    assert "'steering-revered' is not a fault" in result.stderr
