@@ -15,24 +15,10 @@ from tests.realtime import hurry
 ROOT = Path(__file__).parents[2]
 KIWI = ROOT / "examples" / "kiwi"
 
-BLIND = ("perception.py", "for x, y, w, h in _boxes(", "for x, y, w, h in _boxes(0 * ")
-SWAPPED = ("perception.py", "Cone(colour, x /", 'Cone("blue" if colour == "yellow" else "yellow", x /')
-STOPS = (
-    "steering.py",
-    "        self.blind = 0\n        self.steering",
-    "        self.seen = getattr(self, 'seen', 0) + 1\n"
-    "        if self.seen > 30:\n            return 0.0, 0.0\n        self.steering",
-)
-
 LEAVES = (
     "perception.py",
     "        if not memory.wait():\n            continue\n",
     "        if not memory.wait(0.9 if 'frame' in locals() else None):\n            sys.exit(0)\n",
-)
-STAMPED = (
-    "steering.py",
-    "session.send(steer(groundSteering=angle), envelope.sample_time)",
-    "session.send(steer(groundSteering=angle), envelope.sample_time, 99)",
 )
 
 

@@ -1,4 +1,4 @@
-"""Every shipped test that runs without hardware: the example application passes it, and wrong ones fail it rightly."""
+"""Every shipped test that runs without hardware: the example application passes it, and a wrong one fails."""
 
 import re
 import subprocess
@@ -7,29 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.drive.applications import BLIND, LEAVES, ROOT, STAMPED, STOPS, SWAPPED, dodo, kiwi, results
-
-REVERSED = {"steering": "--reverse"}
-WRONG = [
-    ("reversed", None, REVERSED, {
-        "sil-closed-straight": r"hit wall \w+ after .* s at x = ",
-        "sil-closed-kiwi-track": "hit wall ",
-        "sil-open-straight": "the mean distance is ",
-        "dil-kiwi-track": "the mean distance is ",
-    }),
-    ("blind", BLIND, {}, {
-        "sil-open-left-curve": "the mean distance is ",
-        "dil-static-rig": "no detection came",
-    }),
-    ("swapped", SWAPPED, {}, {
-        "sil-closed-left-curve": "hit wall right",
-        "sil-perception--light-1--clutter-60": "precision is 0 ",
-    }),
-    ("stamped", STAMPED, {}, {
-        "sil-open-left-curve": r"no opendlv\.proxy\.GroundSteeringRequest/0 came, but \d+ with sender stamp 99$",
-    }),
-    ("stops", STOPS, {}, {"sil-closed-straight": "did not reach finish"}),
-]  # fmt: skip
+from tests.drive.applications import LEAVES, ROOT, dodo, kiwi, results
+from tests.faulty.matrix import APPLICATION
 
 pytestmark = pytest.mark.slow
 
@@ -50,19 +29,16 @@ def test_the_example_passes_in_lockstep(tmp_path: Path) -> None:
     assert counts["true-positives"] > 300
 
 
-@pytest.mark.parametrize(("wrong", "edit", "flags", "reasons"), WRONG, ids=[w[0] for w in WRONG])
-def test_wrong_applications_fail_for_the_right_reason(
-    wrong: str, edit: tuple[str, str, str] | None, flags: dict[str, str], reasons: dict[str, str], tmp_path: Path
-) -> None:
-    application = kiwi(tmp_path / "app", edit, **flags)
-    report = tmp_path / "report"
-    words = ("--application", str(application), "--report", str(report))
-    out = dodo("run", *reasons, *words, code=1)
-    tests = results(report)
-    assert set(tests) == set(reasons)
-    for slug, test in tests.items():
-        assert test["outcome"] == "failed", (wrong, test)
-        assert re.search(reasons[slug], test["reason"]), (wrong, test)
+def test_a_drive_that_leaves_the_track_fails_where_it_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What else is wrong with applications, tests/faulty tries."""
+    monkeypatch.setenv("FAULT", "steering-reversed")
+    names = ("sil-closed-straight", "sil-closed-kiwi-track", "sil-closed-left-curve")
+    out = dodo("run", *names, "--application", str(APPLICATION), "-j", "2", "--report", str(tmp_path), code=1)
+    tests = results(tmp_path)
+    assert set(tests) == set(names)
+    for test in tests.values():
+        assert test["outcome"] == "failed", test
+        assert re.fullmatch(r"hit wall \w+ after .* s at x = .* m, y = .* m", test["reason"]), test
         assert test["reason"] in out
 
 
