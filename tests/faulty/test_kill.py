@@ -13,7 +13,7 @@ from tests.faulty.table import FAULTS, Fault
 
 CAUGHT = sorted((fault for fault in FAULTS.values() if not fault.due), key=lambda fault: fault.name)
 FIRST_CID = 128
-SILENT = "3"  # tests at a time, as some of them only wait until an application has been silent for too long
+SILENT = "4"  # tests at a time, as some of them only wait until an application has been silent for too long
 
 
 def copy_of(fault: Fault, registry: Path) -> None:
