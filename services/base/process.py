@@ -73,7 +73,7 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
     try:
         ready.unlink(missing_ok=True)  # left by one that was killed
         with ExitStack() as resources:
-            session = resources.enter_context(Session(flags["cid"], _messages()))
+            session = resources.enter_context(_session(flags["cid"]))
             resources.enter_context(published(session, flags["log-id"]))
             clock = clock or _clock(session, role)
             on_rig = bool(os.environ.get("DODO_RIG"))
@@ -97,8 +97,25 @@ def _messages() -> MessageSet:
     return MessageSet.load(*(Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p))
 
 
+def _recording() -> Path | None:
+    """The recording that is judged, and that takes the place of the bus: with ``DODO_CLOCK=recording``."""
+    return Path(os.environ["DODO_RECORDING"]) if os.environ.get("DODO_CLOCK") == "recording" else None
+
+
+def _session(cid: int) -> Session:
+    if _recording() is None:
+        return Session(cid, _messages())
+    from services.base.recorded.silent_session import SilentSession
+
+    return SilentSession(cid, _messages())
+
+
 def _clock(session: Session, role: str) -> Clock:
     """The test's clock, by ``DODO_CLOCK``."""
+    if (recording := _recording()) is not None:
+        from services.base.recorded.clock import clock_of
+
+        return clock_of(recording, session, role)
     if os.environ.get("DODO_CLOCK") != "lockstep":
         return RealTimeClock()
     from services.base.lockstep.lockstep_clock import LockstepClock

@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dodo_dsl.opendlv.bus.envelope import Envelope
 from services.base import Context, Service
+from services.base.recorded.step_marks import RECORDING_END
 from services.base.service import period_of
 from services.rec_recorder.model import RecordingFile
 from services.rec_recorder.source import MemorySpec, Source, parse
@@ -21,6 +23,7 @@ class Recorder(Service):
     """Records every envelope, and pictures where there are cameras."""
 
     period = None
+    has_begun = False
 
     def __init__(
         self, recording: RecordingFile, cameras: "Cameras | None", snapshot: "SnapshotWriter | None", commands: bool
@@ -35,6 +38,7 @@ class Recorder(Service):
             self.inputs = {(COMMAND, None): self._command}
 
     def begin(self, now: int) -> None:
+        self.has_begun = True
         if self._snapshot is not None:
             self._snapshot.begin()
 
@@ -63,7 +67,16 @@ def build(context: Context) -> Service:
     sources = [Source(spec, round(period_of(flags["frames"]))) for spec in memories if flags["frames"]]
     cameras = _cameras(context, sources, recording) if sources else None
     snapshot = _snapshot(context, Path(flags["snapshot"]), memories[0]) if flags["snapshot"] else None
-    return Recorder(recording, cameras, snapshot, flags["commands"])
+    recorder = Recorder(recording, cameras, snapshot, flags["commands"])
+    context.resources.callback(_end, recorder, recording, context)
+    return recorder
+
+
+def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None:
+    """Record when the test ended, which nothing else tells where no more messages came."""
+    if recorder.has_begun:
+        now = context.clock.now()
+        recording.write(Envelope(context.messages.id(RECORDING_END), b"", now, now, now, 0))
 
 
 def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "SnapshotWriter":

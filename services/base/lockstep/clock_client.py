@@ -35,6 +35,8 @@ class ClockClient:
     A service that does not observe the bus leaves it then, so that messages for others do not wake it.
     """
 
+    is_over = False
+
     def __init__(self, session: Session, name: str) -> None:
         self._session, self._name = session, name
         self._channel = Channel(session.cid, session.messages)

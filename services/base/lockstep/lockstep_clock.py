@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
+from typing import Protocol
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
@@ -17,6 +18,7 @@ from services.base.lockstep.announced_memory import AnnouncedMemory, Announcer
 from services.base.lockstep.clock_client import ClockClient, Reply, Step
 from services.base.lockstep.datagrams import STEP_DONE, split
 from services.base.lockstep.observer import EPOCH, LONGEST, Observer
+from services.base.recorded.step_marks import StepMarks
 
 __all__ = ["EPOCH", "LockstepClock"]
 
@@ -24,21 +26,36 @@ _GOODBYES = 10
 _LINGER_S = 0.05
 
 
+class StepSource(Protocol):
+    """Where steps come from and their answers go, as ClockClient implements it; ``is_over`` when no more will come."""
+
+    is_over: bool
+
+    def next_step(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None: ...
+    def answer(self, reply: Reply, on_the_bus: bool = False) -> None: ...
+    def repeat(self) -> None: ...
+    def is_acknowledged(self) -> bool: ...
+    def close(self) -> None: ...
+
+
 class LockstepClock:
-    """Test time in the clock service's steps; ``name`` is the service's name in the test."""
+    """Test time in the clock service's steps; ``name`` is the service's name in the test.
+
+    Steps come from ``source``, by default from the clock service.
+    """
 
     relays = True
 
-    def __init__(self, session: Session, name: str, readers: int) -> None:
+    def __init__(self, session: Session, name: str, readers: int, source: StepSource | None = None) -> None:
         self._session, self._name = session, name
         self._step_done = session.messages.type(STEP_DONE)
-        self._client = ClockClient(session, name)
+        self._client: StepSource = source or ClockClient(session, name)
         self._now = EPOCH - 1
         self._number = -1
         self._open = False
         self._sent: list[bytes] = []
         self._announcer = Announcer(readers)
-        self._observer = Observer()
+        self._observer = Observer(StepMarks(session.messages).of)
         self._next = 0
         self._consumed = ""
 
@@ -110,7 +127,7 @@ class LockstepClock:
 
     def _next_step(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | None:
         """The next step that is for this service; None when it is to stop."""
-        while not stopped():
+        while not (stopped() or self._client.is_over):
             step = self._client.next_step(inbox.observes, self._observer.collect)
             if step is not None:
                 self._number, self._open = step.number, True

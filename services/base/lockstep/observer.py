@@ -1,7 +1,7 @@
 """What a service that observes the bus gets in lockstep: each message once, in the step that it belongs to."""
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from services.base.clock import Inbox
@@ -19,10 +19,12 @@ class Observer:
     """Merges the messages of the test's services, which the clock passes on completely, with the rest of the bus.
 
     Messages of services may be on the bus, too, early or late: those from the clock count. Messages of the application
-    count as they are on the bus, not as the clock passes them on.
+    count as they are on the bus, not as the clock passes them on. ``marked`` adds to a step (its time in us, and all
+    messages that the clock passes on) what tells a recording how it went.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:
+        self._marked = marked
         self._collected: list[Envelope] = []
         self._first: set[Envelope] = set()
         self._relayed: deque[set[Envelope]] = deque(maxlen=_REMEMBERED)
@@ -31,7 +33,7 @@ class Observer:
         """An envelope that was on the bus."""
         self._collected.append(envelope)
 
-    def deliver(self, inbox: Inbox, until: int, relayed: Iterable[Envelope]) -> None:
+    def deliver(self, inbox: Inbox, until: int, relayed: Sequence[Envelope]) -> None:
         """Deliver all of a step (its end ``until`` in us), after the application's answer to the one before.
 
         The answer to this one, and what belongs to later ones, waits: whether it is there already is chance.
@@ -47,7 +49,7 @@ class Observer:
                 self._collected.append(envelope)
             elif not self._is_known(_key(envelope)):
                 inbox.observe(envelope)
-        for envelope in own:
+        for envelope in self._marked(until, relayed) if self._marked else own:
             inbox.observe(envelope)
 
     def flush(self, inbox: Inbox) -> None:

@@ -1,0 +1,81 @@
+"""A recording gives services the same messages in the same steps as the clock did."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.base.evaluator import UnjudgeableError
+from services.base.lockstep.datagrams import STEP_DONE
+from services.base.lockstep.observer import EPOCH, Observer
+from services.base.recorded.recorded_steps import RecordedSteps, read_steps
+from services.base.recorded.step_marks import StepMarks
+from tests.services.base.lockstep.test_observer import Seen
+
+STEP = 100_000
+MESSAGES = MessageSet.standard()
+END = Envelope(MESSAGES.id("dodo.RecordingEnd"), b"", 9, 9, EPOCH, 0)
+
+
+def sent(name: str, received: int = 0) -> Envelope:
+    return Envelope(1003, name.encode(), 5, received, EPOCH, 0)
+
+
+def write(path: Path, envelopes: Iterable[Envelope]) -> Path:
+    path.write_bytes(b"".join(map(encode_frame, envelopes)))
+    return path
+
+
+class Recorder(Seen):
+    """Everything that an observer sees, as a recorder takes it."""
+
+    def __init__(self) -> None:
+        self.envelopes: list[Envelope] = []
+
+    def observe(self, envelope: Envelope) -> None:
+        self.envelopes.append(envelope)
+
+
+names = st.text("abc", max_size=2)
+relayed = st.lists(st.builds(sent, names, st.sampled_from((0, 0, 7))), max_size=5)
+raw = st.lists(st.builds(sent, names, st.integers(8, 9)), max_size=3)
+
+
+@given(st.lists(st.tuples(relayed, raw), min_size=1, max_size=5))
+def test_steps_are_those_of_the_clock_whatever_was_on_the_bus(
+    tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[list[Envelope], list[Envelope]]]
+) -> None:
+    observer, recorder = Observer(StepMarks(MESSAGES).of), Recorder()
+    for number, (messages, on_the_bus) in enumerate(steps):
+        for envelope in on_the_bus:
+            observer.collect(envelope)
+        observer.deliver(recorder, EPOCH + number * STEP, messages)
+    observer.flush(recorder)
+    path = write(tmp_path_factory.mktemp("steps") / "test.rec", [*recorder.envelopes, END])
+    assert [(step.time, step.messages) for step in read_steps(path, MESSAGES)] == [
+        (EPOCH + number * STEP, messages) for number, (messages, _) in enumerate(steps)
+    ]
+
+
+def test_a_recording_with_a_hole_is_refused(tmp_path: Path) -> None:
+    marks = StepMarks(MESSAGES)
+    steps = [list(marks.of(EPOCH + number * STEP, [sent(str(number))])) for number in range(5)]
+    path = write(tmp_path / "test.rec", [*steps[0], *steps[4]])
+    with pytest.raises(UnjudgeableError, match="lacks the steps 2 to 4: it was paused"):
+        list(read_steps(path, MESSAGES))
+
+
+def test_a_service_does_not_hear_itself(tmp_path: Path) -> None:
+    marks, own = StepMarks(MESSAGES), sent("own")
+    first, second = marks.of(EPOCH, [sent("a")]), marks.of(EPOCH + STEP, [own, sent("b"), own])
+    source = RecordedSteps(write(tmp_path / "test.rec", [*first, *second]), MESSAGES)
+    assert source.next_step(False, lambda _: None) == (1, EPOCH, False, [sent("a")])
+    source.answer([MESSAGES.type(STEP_DONE)(frames=encode_frame(own._replace(sent=77)))])
+    assert source.next_step(False, lambda _: None) == (2, EPOCH + STEP, False, [sent("b"), own])
+    assert not source.is_over
+    assert source.next_step(False, lambda _: None) is None
+    assert source.is_over
