@@ -96,6 +96,8 @@ class Outcome:
     sim_s: float | None = None
     services: tuple[dict[str, Any], ...] = ()
     checks: tuple[dict[str, Any], ...] = ()
+    verdicts: tuple[dict[str, Any], ...] = ()
+    """Of each evaluator: its name, outcome, reason, and ``evidence``, the data of its decision."""
     last_lines: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     description: str = ""

@@ -1,6 +1,7 @@
 """What a backend is, and the events that it reports to the engine while a test runs."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from dodo_dsl.outcome import Response
@@ -20,6 +21,14 @@ class VerdictEvent:
     passed: bool
     reason: str
     checks: tuple[dict[str, Any], ...]
+    evidence: Mapping[str, float | str | None] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """The verdict in ``results.json``."""
+        outcome = "passed" if self.passed else "failed"
+        return {
+            "evaluator": self.service, "outcome": outcome, "reason": self.reason, "evidence": dict(self.evidence),
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -163,6 +163,7 @@ class RunState:
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
             checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks),
+            verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=tuple(backend.tail(finding.service)) if finding.result != "passed" else (),
             notes=(*self.notes, *losses, *answers.notes),
             machine=considered.load,

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 from typing import Any
 
 from dodo_dsl.outcome import Response
@@ -25,6 +26,8 @@ _OUTCOMES = ("passed", "failed")
 _STOPS = ("unanswered", "stuck", "timedout")
 _MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
+_EVIDENCE_KEY = re.compile(r"[a-z][a-z0-9-]{0,39}")
+_MOST_EVIDENCE, _MAX_EVIDENCE_TEXT = 20, 200
 
 
 def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
@@ -52,7 +55,8 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
     if kind == "verdict" and is_evaluator:
         if problem := _problem(message):
             return Malformed(service, problem)
-        return VerdictEvent(service, message["outcome"] == "passed", message["reason"], tuple(message["checks"]))
+        passed, evidence = message["outcome"] == "passed", message.get("evidence", {})
+        return VerdictEvent(service, passed, message["reason"], tuple(message["checks"]), evidence)
     return _clock_event(kind, message) if service == CLOCK else None
 
 
@@ -97,7 +101,19 @@ def _problem(message: dict[str, Any]) -> str:
     checks = message.get("checks")
     if not isinstance(checks, list):
         return "its checks are not a list"
-    return next((p for p in map(_check_problem, checks) if p), "")
+    return next((p for p in map(_check_problem, checks) if p), "") or _evidence_problem(message.get("evidence", {}))
+
+
+def _evidence_problem(evidence: object) -> str:
+    """What is wrong with the data of a decision."""
+    if not isinstance(evidence, dict) or len(evidence) > _MOST_EVIDENCE:
+        return f"its evidence is not an object of at most {_MOST_EVIDENCE} values"
+    for key, value in evidence.items():
+        if not _EVIDENCE_KEY.fullmatch(key):
+            return f"its evidence has a key {json.dumps(key)[:50]}, expected lower-case words with hyphens"
+        if not _is_number(value, none=True) and not (_is_text(value) and len(value) <= _MAX_EVIDENCE_TEXT):
+            return f"'{key}' of its evidence is neither a finite number nor a short string nor null"
+    return ""
 
 
 def _check_problem(check: object) -> str:

@@ -30,12 +30,17 @@ class Check:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Passed or failed, in one sentence, with checks; ``silent`` when nothing of the application came."""
+    """Passed or failed, in one sentence, with checks; ``silent`` when nothing of the application came.
+
+    ``evidence`` is the data of the decision, by lower-case words with hyphens: ``time`` in s of the test, and where and
+    what the evaluator saw then. At most 20 numbers or strings of 200 characters; no finite number is null.
+    """
 
     outcome: Literal["passed", "failed"]
     reason: str
     checks: tuple[Check, ...] = ()
     silent: bool = False
+    evidence: Mapping[str, float | str | None] = field(default_factory=dict)
 
     def line(self, cid: int) -> str:
         """The verdict line, without its line break; ASCII, whatever the locale.
@@ -44,7 +49,10 @@ class Verdict:
         """
         checks = [check.as_json() for check in self.checks]
         reason = f"{self.reason}; the test is on CID {cid}" if self.silent else self.reason
-        message = {"dodo": "verdict", "outcome": self.outcome, "reason": reason, "checks": checks}
+        message: dict[str, Any] = {"dodo": "verdict", "outcome": self.outcome, "reason": reason, "checks": checks}
+        if self.evidence:
+            numbers = {key: v if isinstance(v, str) else _number(v) for key, v in self.evidence.items()}
+            message["evidence"] = numbers
         return json.dumps(message, allow_nan=False)
 
 

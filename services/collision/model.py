@@ -33,9 +33,11 @@ class TrackEvaluator(Evaluator):
         self._early = False
         self._requests = requests or Requests()
         self._last: tuple[int, VehiclePose] | None = None
+        self._closest: dict[str, float | str | None] = {}
 
     def forget(self, now: int) -> None:
         self._measures = DriveMeasures()
+        self._closest = {}
         self._requests.forget(now)
 
     def request(self, name: str) -> None:
@@ -74,10 +76,11 @@ class TrackEvaluator(Evaluator):
         wall, (margin, near) = touched(self.track.walls, area), self._approach(area)
         goal = self._reached(start[1], pose, area)
         if wall is not None:
-            self.verdict = self._verdict("failed", f"hit wall {wall} {when} {place(pose)}")
+            self.verdict = self._verdict("failed", f"hit wall {wall} {when} {place(pose)}", obstacle=wall)
         elif margin < self.track.min_margin:
             close = f"came within {margin:.3f} m of wall {near} {when} {place(pose)}"
-            self.verdict = self._verdict("failed", f"{close}, expected at least {self.track.min_margin:g} m")
+            expected = f"expected at least {self.track.min_margin:g} m"
+            self.verdict = self._verdict("failed", f"{close}, {expected}", obstacle=near)
         elif self.track.max_speed is not None and (speed := self._measures.max_speed or 0.0) > self.track.max_speed:
             fast = f"drove {speed:.3f} m/s {when} {place(pose)}, expected at most {self.track.max_speed:g} m/s"
             self.verdict = self._verdict("failed", fast)
@@ -97,7 +100,10 @@ class TrackEvaluator(Evaluator):
     def _approach(self, area: shapely.Geometry) -> tuple[float, str]:
         near = nearest(self.track.walls, area)
         if near is not None:
+            before = self._measures.wall_margin
             self._measures.approach(near[0])
+            if before is None or near[0] < before:
+                self._closest = {"closest-wall": near[1], **self._moment("closest-")}
         return near or (math.inf, "")
 
     def _reached(self, start: VehiclePose, end: VehiclePose, area: shapely.Geometry) -> str | None:
@@ -134,10 +140,21 @@ class TrackEvaluator(Evaluator):
         early = f"; {next(iter(self.track.goal))} does not count before the gates" if self._early else ""
         return f"crossed {self._gates.crossed} of {len(self._gates)} gates {within}: {away} {name}, the next{early}"
 
-    def _verdict(self, outcome: Literal["passed", "failed"], reason: str, silent: bool = False) -> Verdict:
+    def _moment(self, prefix: str = "") -> dict[str, float | str | None]:
+        """Time (s) and place (m) of the newest pose."""
+        if self._last is None:
+            return {}
+        time, pose = self._last
+        return {f"{prefix}time": self.elapsed(time), f"{prefix}x": pose.x, f"{prefix}y": pose.y}
+
+    def _verdict(
+        self, outcome: Literal["passed", "failed"], reason: str, silent: bool = False, obstacle: str | None = None
+    ) -> Verdict:
         track, measures = self.track, self._measures
         goal = (measures.goal_check(track.max_time),) if track.goal or track.gates else ()
         gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
         walls = (measures.wall_check(track.min_margin),) if track.walls else ()
         drive = measures.drive_checks(track.max_speed)
-        return Verdict(outcome, reason, (*goal, *gates, *walls, *drive, *self._requests.checks()), silent)
+        checks = (*goal, *gates, *walls, *drive, *self._requests.checks())
+        named = {} if obstacle is None else {"obstacle": obstacle}
+        return Verdict(outcome, reason, checks, silent, {**self._moment(), **named, **self._closest})

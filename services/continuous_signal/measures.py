@@ -103,6 +103,15 @@ class SignalMeasures:
             _check("broken", len(self.broken), "max", 0),
         )
 
+    def evidence(self) -> dict[str, float | str | None]:
+        """The worst sample, the longest gap, and the first sample that is not finite; times in s of the target."""
+        worst, gap = self.worst, self.coverage
+        return {
+            **({"time": worst.time, "value": worst.value, "target": worst.target} if worst else {}),
+            **({"gap-begin": gap.gap_begin, "gap-end": gap.gap_end} if gap else {}),
+            **({"broken-time": self.broken[0]} if self.broken else {}),
+        }
+
 
 def measure(
     target: Target, times: Times, values: Values, limits: SignalLimits, judged: tuple[int, int] | None = None

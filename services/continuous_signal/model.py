@@ -1,7 +1,7 @@
 """The evaluator of an open loop: a signal of the application against its target."""
 
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -78,7 +78,8 @@ class SignalEvaluator(Evaluator):
         times, values = self._samples.since(start)
         judged = self._judged(target, span.is_complete)
         measures = measure(target, times, values, self._limits, judged)
-        return verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
+        said = verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
+        return replace(said, evidence=measures.evidence())
 
     def _judged(self, target: Target, is_complete: bool) -> tuple[int, int]:
         """What samples have to cover of the target's time (us): of what was observed of it, all in the window.

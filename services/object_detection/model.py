@@ -1,6 +1,7 @@
 """The evaluator of a perception: the application's boxes against the true ones, frame by frame."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
@@ -72,13 +73,13 @@ class DetectionEvaluator(Evaluator):
         for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
             if self._truth and (span.is_complete or key < self._last):
                 counts = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
-                self._count(counts, JudgedFrame(key, f"of picture {key}", None))
+                self._count(counts, JudgedFrame(key, f"of picture {key}", None), {"picture": key})
         if self._truth is None or span.is_complete:
             self._require_truth(span.within)
         end = self.elapsed(self.now if self._ended is None else self._ended) if self.now is not None else 0.0
         self._score.unanswered = self._silence.unanswered()
         self._score.gap = self._silence.gap(self._rules.start, min(end, self._max_time))
-        return verdict(self._score, self._limits, span.within)
+        return replace(verdict(self._score, self._limits, span.within), evidence=self._score.evidence())
 
     def _require_truth(self, within: str) -> None:
         """Raises UnjudgeableError when there was nothing to find in any frame, or nothing of a class that counts."""
@@ -97,9 +98,9 @@ class DetectionEvaluator(Evaluator):
             frame.answered = self.elapsed(self.now)
             self._silence.answers.append(frame.answered)
 
-    def _count(self, counts: CountsByClass, frame: JudgedFrame) -> None:
+    def _count(self, counts: CountsByClass, frame: JudgedFrame, key: Mapping[str, float]) -> None:
         total = counts.total()
-        self._score.add(counts, frame.place, frame.answered is not None)
+        self._score.add(counts, frame.place, frame.answered is not None, key)
         self._silence.frames.append(frame._replace(expects=bool(total.hits + total.missed)))
 
     def _take(self, key: FrameKey, number: int, value: Value, side: Callable[[DetectedFrame], Detections]) -> None:
@@ -141,7 +142,9 @@ class DetectionEvaluator(Evaluator):
             return
         counts = compare(frame.found.labelled(), true, self._rules.iou, self._rules.labels)
         order = frame.key.number if self._truth and self._truth.frames == "number" else frame.key.time
-        self._count(counts, JudgedFrame(order, f"at {self.elapsed(frame.since):.2f} s", frame.answered))
+        time = self.elapsed(frame.since)
+        key = {"time": time, "sample-time": frame.key.time, "sample-id": frame.key.number}
+        self._count(counts, JudgedFrame(order, f"at {time:.2f} s", frame.answered), key)
 
     def _true(self, frame: DetectedFrame) -> Sequence[LabelledBox] | None:
         """The true boxes of a frame; each picture of a file holds for one frame, unless there is one for all."""

@@ -1,7 +1,8 @@
 """How frames are judged, what is counted over all of them, and the checks made of it."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from services.base import Check
 from services.object_detection.counts import Counts, CountsByClass
@@ -49,10 +50,11 @@ class DetectionLimits:
 
 @dataclass(frozen=True)
 class WorstFrame:
-    """The frame with the most mistakes, where it was, and what was wrong."""
+    """The frame with the most mistakes, where it was, and what was wrong; ``key`` identifies it in the evidence."""
 
     place: str
     counts: Counts
+    key: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def mistakes(self) -> int:
@@ -79,16 +81,27 @@ class Score:
     unanswered: Unanswered = field(default_factory=lambda: Unanswered(0, 0))
     gap: Gap | None = None
 
-    def add(self, frame: CountsByClass, place: str, answered: bool) -> None:
-        """Add a frame's counts; ``place`` names it in sentences."""
+    def add(
+        self, frame: CountsByClass, place: str, answered: bool, key: Mapping[str, float] = MappingProxyType({})
+    ) -> None:
+        """Add a frame's counts; ``place`` names it in sentences, ``key`` in the evidence."""
         self.frames += 1
         self.answered += answered
         for label, counts in frame:
             self.counts.add(label, counts)
         self.counts.mistakes.add(frame.mistakes)
-        worst = WorstFrame(place, frame.total())
+        worst = WorstFrame(place, frame.total(), key)
         if worst.mistakes > (self.worst.mistakes if self.worst else 0):
             self.worst = worst
+
+    def evidence(self) -> dict[str, float | str | None]:
+        """The worst frame with its counts, and the longest silence; times in s of the test."""
+        worst, gap = self.worst, self.gap
+        counts = worst and {"found": worst.counts.hits, "false": worst.counts.false, "missed": worst.counts.missed}
+        return {
+            **({**worst.key, **counts} if worst and counts else {}),
+            **({"gap-begin": gap.begin, "gap-end": gap.end} if gap else {}),
+        }
 
     def checks(self, limits: DetectionLimits) -> tuple[Check, ...]:
         """Totals, what was counted, and a line of measures for each class; a measure without a value keeps no limit."""

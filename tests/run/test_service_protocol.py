@@ -57,7 +57,42 @@ def test_notes_and_the_end_of_the_input_are_taken_from_every_service() -> None:
         assert read_line("pose", False, b'{"dodo": "note", "text": ' + text + b"}") is None
 
 
+def test_a_verdict_may_carry_the_data_of_its_decision() -> None:
+    evidence = {"time": 5.2, "obstacle": "left", "x": None, "sample-time": 1_700_000_005_200_000}
+    event = read_line("track", True, line(evidence=evidence))
+    assert event == VerdictEvent("track", True, "done", (CHECK,), evidence)
+    assert isinstance(event, VerdictEvent)
+    assert event.as_json() == {"evaluator": "track", "outcome": "passed", "reason": "done", "evidence": evidence}
+
+
 MALFORMED = {
+    "evidence list": (line(evidence=[1]), "its evidence is not an object of at most 20 values"),
+    "much evidence": (
+        line(evidence={f"a{n}": n for n in range(21)}),
+        "its evidence is not an object of at most 20 values",
+    ),
+    "evidence key": (line(evidence={"No": 1}), 'its evidence has a key "No", expected lower-case words with hyphens'),
+    "long evidence key": (
+        line(evidence={"a" * 41: 1}),
+        f'its evidence has a key "{"a" * 41}", expected lower-case words with hyphens',
+    ),
+    "evidence object": (
+        line(evidence={"x": {}}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "evidence true": (
+        line(evidence={"x": True}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "infinite evidence": (
+        line(evidence={"x": float("inf")}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "long evidence": (
+        line(evidence={"x": "a" * 201}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "no evidence": (line(evidence=None), "its evidence is not an object of at most 20 values"),
     "no value": (line(checks=[{k: v for k, v in CHECK.items() if k != "value"}]), "check 'time' has no key 'value'"),
     "no unit": (line(checks=[{k: v for k, v in CHECK.items() if k != "unit"}]), "check 'time' has no key 'unit'"),
     "no limit": (line(checks=[{k: v for k, v in CHECK.items() if k != "limit"}]), "check 'time' has no key 'limit'"),

@@ -39,6 +39,14 @@ def test_numbers_of_numpy_and_any_text() -> None:
     assert found["checks"][0]["value"] == 0.5 and found["checks"][0]["ok"] is True
 
 
+def test_evidence_is_in_the_line_where_there_is_some() -> None:
+    evidence = {"time": np.float64(0.5), "sample-time": 1_700_000_000_100_000, "obstacle": "left", "x": math.nan}
+    assert json.loads(Verdict("failed", "hit", evidence=evidence).line(111))["evidence"] == {
+        "time": 0.5, "sample-time": 1_700_000_000_100_000, "obstacle": "left", "x": None,
+    }  # fmt: skip
+    assert "evidence" not in json.loads(Verdict("failed", "hit").line(111))
+
+
 def test_where_nothing_was_heard_the_reason_names_the_bus() -> None:
     assert json.loads(Verdict("failed", "nothing came", silent=True).line(130))["reason"] == (
         "nothing came; the test is on CID 130"

@@ -108,7 +108,9 @@ def test_a_signal_on_its_target_passes() -> None:
     assert decided(it) == Verdict("passed", (
         f"{SIGNAL} kept to its target over 4 samples: mean 0.03125 (at most 0.1), std 0.05413 (at most 0.1), "
         "distance 0.125 (at most 0.2), share 0.75 (at least 0.75); worst at 5.00 s: 0.625 with a target of 0.5"
-    ), decided(it).checks)  # fmt: skip
+    ), decided(it).checks, evidence={
+        "time": 5.0, "value": 0.625, "target": 0.5, "gap-begin": 0.0, "gap-end": 2.5,
+    })  # fmt: skip
     assert values(decided(it)) == {
         "mean": 0.03125, "std": pytest.approx(0.0541266), "distance": 0.125, "share": 0.75, "samples": 4, "outside": 0,
         "mean-over-time": 0.03125, "std-over-time": pytest.approx(0.0541266), "broken": 0, "late": 0,
