@@ -16,6 +16,7 @@ from dodo_dsl.cli import list as list_command
 from dodo_dsl.cli import report as report_command
 from dodo_dsl.cli.errors import exit_code, sentence
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.judge import command as judge_command
 from dodo_dsl.cli.new import command as new_command
 from dodo_dsl.cli.rec import command as rec_command
 from dodo_dsl.cli.rig import command as rig_command
@@ -28,6 +29,7 @@ COMMANDS: dict[str, ModuleType] = {
     "explain": explain_command,
     "new": new_command,
     "report": report_command,
+    "judge": judge_command,
     "rec": rec_command,
     "images": images_command,
     "rig": rig_command,

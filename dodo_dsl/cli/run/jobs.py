@@ -26,10 +26,10 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     if options.compiled:
         if options.test or options.level or options.application:
             raise UsageError("--compiled runs a test as it was compiled: TEST, --level and --application do not apply")
-        plans, deployment = [_compiled(options.compiled, settings)], _deployment(stdout)
+        plans, deployment = [load_compiled(options.compiled, settings)], _deployment(stdout)
         folders = {plans[0].slug: options.compiled.resolve()}
     else:
-        plans, deployment = _compile(options, settings, folder, stdout)
+        plans, deployment = compile_tests(options, settings, folder, stdout)
         folders = {plan.slug: folder / plan.slug for plan in plans}
     report = _usable(options.report, [p.slug for p in plans])
     return [
@@ -37,7 +37,7 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     ], deployment
 
 
-def _compiled(folder: Path, settings: Settings) -> Plan:
+def load_compiled(folder: Path, settings: Settings) -> Plan:
     """The Plan of a compiled test, whose clock and isolation are settled."""
     plan = _load_plan(folder, settings)
     if settings.clock not in (None, plan.clock):
@@ -87,9 +87,10 @@ def _kept_clock(names: Sequence[str]) -> str:
     return f"note: {who} in real time, as hardware does not wait\n"
 
 
-def _compile(
+def compile_tests(
     options: argparse.Namespace, settings: Settings, folder: Path, stdout: TextIO
 ) -> tuple[list[Plan], Deployment]:
+    """The Plans of the tests that ``options`` select, compiled into ``folder``; raises UsageError."""
     checked = selection.select(options.test, options.level, options.application, settings)
     stdout.write(selection.left_out(checked))
     if not checked.specs:

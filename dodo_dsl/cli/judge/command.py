@@ -1,0 +1,78 @@
+"""dodo judge: judge the recording of a test again, also by other limits."""
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError, files_of_the_user
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.judge.known_run import KnownRun, known_run
+from dodo_dsl.cli.judge.output import as_json, as_text
+from dodo_dsl.cli.run.jobs import compile_tests, load_compiled
+from dodo_dsl.outcome import Result
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.recorded.judge import judge
+from dodo_dsl.run.recorded.test_recording import inspect
+from dodo_dsl.spec.settings import Settings
+
+EXAMPLES = """examples:
+  dodo judge dodo-report/sil-closed-straight/test.rec --spec sil-closed-straight
+  dodo judge test.rec --spec my-limits/my-limits.dodo.yml      by the limits of another spec
+  dodo judge test.rec --spec 'sil-perception[light=1,clutter=0]'
+  dodo judge dodo-report/sil-open-straight/test.rec --compiled generated/sil-open-straight --json
+
+Every run leaves the recording of each test in its report. The evaluators of the spec get its messages in test time: in
+lockstep the verdict is the same, bit for bit; in real time it can differ where single updates decide.
+
+exit codes: 0 passed, 1 failed, 2 wrong usage, spec or recording, 3 error: there is no verdict
+"""
+
+_EXITS: dict[Result, Exit] = {"passed": Exit.OK, "failed": Exit.PROBLEMS, "error": Exit.ERROR}
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, metavar="FILE.rec", help="recording of a test, test.rec in its report")
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--spec", metavar="SPEC", help="name, instance or spec of the test by which it is judged")
+    source.add_argument(
+        "--compiled", type=Path, metavar="DIR/SLUG", help="folder of a compiled test, instead of a spec"
+    )
+    parser.add_argument("--json", action="store_true", help="print the judgement as JSON")
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    with files_of_the_user():
+        recording = inspect(options.file)
+    run = known_run(options.file)
+    with tempfile.TemporaryDirectory(prefix="dodo-judge-") as name:
+        work = Path(name).resolve()
+        plan, folder = _plan(options, run, work / "compiled", stderr if options.json else stdout)
+        (work / "files").mkdir()
+        cid = run.cid if run and run.slug == plan.slug else plan.cid
+        judgement = judge(plan, folder, recording, cid, work / "files")
+    stdout.write((as_json if options.json else as_text)(plan, recording, judgement, run))
+    return _EXITS[judgement.finding.result]
+
+
+def _plan(options: argparse.Namespace, run: KnownRun | None, out: Path, notes: TextIO) -> tuple[Plan, Path]:
+    """The Plan by which to judge, and the folder of the compiled test; raises UsageError."""
+    if options.compiled:
+        if options.application:
+            raise UsageError("--compiled judges by a test as it was compiled: --application does not apply")
+        return load_compiled(options.compiled, Settings()), options.compiled.resolve()
+    words = argparse.Namespace(test=[options.spec], level=[], application=options.application)
+    plans, _ = compile_tests(words, Settings(), out, notes)
+    plan = _only(plans, run, options.spec)
+    return plan, out / plan.slug
+
+
+def _only(plans: list[Plan], run: KnownRun | None, word: str) -> Plan:
+    """The test itself, or of several the one that the recording is of."""
+    same = [plan for plan in plans if len(plans) == 1 or (run is not None and plan.slug == run.slug)]
+    if same:
+        return same[0]
+    names = "', '".join(plan.name for plan in plans[:3])
+    raise UsageError(f"'{word}' means {len(plans)} tests, expected one, such as '{names}'")

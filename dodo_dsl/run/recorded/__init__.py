@@ -1,0 +1,1 @@
+"""Judging the recording of a test again, without driving."""
