@@ -76,7 +76,7 @@ def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None
     """Record when the test ended, which nothing else tells where no more messages came."""
     if recorder.has_begun:
         now = context.clock.now()
-        recording.write(Envelope(context.messages.id(RECORDING_END), b"", now, now, now, 0))
+        recording.write(Envelope(context.messages.id(RECORDING_END), b"", now, 0, now, 0))
 
 
 def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "SnapshotWriter":

@@ -72,7 +72,8 @@ def _checks(verdict: VerdictEvent) -> Iterator[str]:
         unit = f" {check['unit']}" if check["unit"] else ""
         sides = {"min": "at least", "max": "at most"}
         limits = " and ".join(f"{sides[side]} {value:g}{unit}" for side, value in check["limit"].items())
-        said = f"{_text(check['value'])}{unit}{f' ({limits})' if limits else ''}"
+        value = "none" if check["value"] is None else f"{_text(check['value'])}{unit}"
+        said = f"{value}{f' ({limits})' if limits else ''}"
         yield f"  {printable(check['name']):<16} {said}{'' if check['ok'] else '  broken'}"
 
 

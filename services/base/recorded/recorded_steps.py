@@ -72,6 +72,8 @@ def read_steps(path: Path, messages: MessageSet) -> Iterator[RecordedStep]:
     step_id, end_id = messages.id(RECORDED_STEP), messages.id(RECORDING_END)
     step, number = RecordedStep(0, []), 0
     for envelope in read_envelopes(path):
+        if envelope.received:
+            continue  # as it was on the bus, where anyone can send marks
         if envelope.data_type == step_id:
             mark: Any = messages.decode(step_id, envelope.payload)
             if mark.number != number:
@@ -84,7 +86,7 @@ def read_steps(path: Path, messages: MessageSet) -> Iterator[RecordedStep]:
                     )
                 step, number = RecordedStep(mark.time, []), mark.number
             step.messages.extend(each.envelope for each in decode(mark.frames))
-        elif number and not envelope.received and envelope.data_type != end_id:
+        elif number and envelope.data_type != end_id:
             step.messages.append(envelope)
     if number:
         yield step

@@ -60,7 +60,8 @@ class RecordingClock:
     def _arrivals(self) -> Iterator[Envelope]:
         """All messages, the end of the recording as one that was received then."""
         for envelope in read_envelopes(self._path):
-            if envelope.data_type == self._end_id:
-                yield envelope._replace(received=envelope.sample_time)
-            elif envelope.received:
+            if envelope.received:
                 yield envelope
+            elif envelope.data_type == self._end_id:
+                yield envelope._replace(received=envelope.sample_time)
+                return

@@ -18,7 +18,8 @@ from tests.services.base.lockstep.test_observer import Seen
 
 STEP = 100_000
 MESSAGES = MessageSet.standard()
-END = Envelope(MESSAGES.id("dodo.RecordingEnd"), b"", 9, 9, EPOCH, 0)
+END = Envelope(MESSAGES.id("dodo.RecordingEnd"), b"", 9, 0, EPOCH, 0)
+FORGED = Envelope(MESSAGES.id("dodo.RecordedStep"), b"", 9, 9, EPOCH, 0)
 
 
 def sent(name: str, received: int = 0) -> Envelope:
@@ -55,7 +56,7 @@ def test_steps_are_those_of_the_clock_whatever_was_on_the_bus(
             observer.collect(envelope)
         observer.deliver(recorder, EPOCH + number * STEP, messages)
     observer.flush(recorder)
-    path = write(tmp_path_factory.mktemp("steps") / "test.rec", [*recorder.envelopes, END])
+    path = write(tmp_path_factory.mktemp("steps") / "test.rec", [*recorder.envelopes, FORGED, END])
     assert [(step.time, step.messages) for step in read_steps(path, MESSAGES)] == [
         (EPOCH + number * STEP, messages) for number, (messages, _) in enumerate(steps)
     ]

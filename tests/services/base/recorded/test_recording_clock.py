@@ -26,7 +26,7 @@ class Inbox(Seen):
 
 def recording(path: Path, *arrivals: tuple[str, int], end: int) -> Path:
     envelopes = [Envelope(1003, text.encode(), 1, START + time, 2, 0) for text, time in arrivals]
-    envelopes.append(Envelope(MESSAGES.id("dodo.RecordingEnd"), b"", START, START, START + end, 0))
+    envelopes.append(Envelope(MESSAGES.id("dodo.RecordingEnd"), b"", START, 0, START + end, 0))
     path.write_bytes(b"".join(map(encode_frame, envelopes)))
     return path
 
