@@ -24,7 +24,7 @@ them against all {tests} shipped tests of the levels sil and dil in lockstep, an
 
     FAULT=steering-reversed dodo run sil-open-straight --application tests/faulty/docker-compose.yml
 
-{caught} of {faults} are caught by one test or more. {good}
+{caught} of {faults} are caught by one test or more. {good} {run} of {all} combinations of fault and test have run.
 
 **F**: the test failed, so the fault is caught. ·: it passed. E: it ended in error: no answer. ?: not run.
 """
@@ -77,7 +77,10 @@ def _head(cells: Cells, tests: Sequence[ShippedTest]) -> str:
     caught = sum(any(c.outcome == "failed" for c in cells.get(name, {}).values()) for name in FAULTS)
     passed = not list(_of_the_good(cells))
     good = "The example itself passes all tests." if passed else "The example itself does not pass all tests."
-    return HEAD.format(faults=len(FAULTS), tests=len(tests), caught=caught, good=good)
+    slugs = {test.slug for test in tests}
+    run = sum(len(slugs & cells.get(name, {}).keys()) for name in FAULTS)
+    counts = {"faults": len(FAULTS), "tests": len(tests), "run": run, "all": len(FAULTS) * len(tests)}
+    return HEAD.format(caught=caught, good=good, **counts)
 
 
 def _legend(tests: Sequence[ShippedTest]) -> str:
