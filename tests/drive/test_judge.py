@@ -40,9 +40,15 @@ def in_the_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
 
 
-def test_every_shipped_test_is_here(runs: Runs) -> None:
+def test_the_example_passes_every_shipped_test(runs: Runs) -> None:
+    """Closed and open loop, perception, and recordings."""
     names = {path.name for path in REGISTRY.glob("[sd]il-*")}
     assert {slug.partition("--")[0] for slug in runs.tests} == names
+    assert sum(test["sim_s"] for test in runs.tests.values()) > 40
+    for slug, test in runs.tests.items():
+        assert (test["outcome"], test["clock"], test["checks"] != []) == ("passed", "lockstep", True), test
+        assert runs.recording(slug).stat().st_size > 10_000
+    assert runs.checks(BOARD)["true-positives"] > 300
 
 
 @pytest.mark.parametrize("slug", ALL)

@@ -1,4 +1,4 @@
-"""Every shipped test that runs without hardware: the example application passes it, and a wrong one fails."""
+"""Shipped tests that run without hardware, and applications that are wrong."""
 
 import re
 import subprocess
@@ -10,25 +10,8 @@ import pytest
 from tests.drive.applications import LEAVES, ROOT, dodo, kiwi, results
 from tests.faulty.matrix import APPLICATION
 
-pytestmark = pytest.mark.slow
 
-
-def test_the_example_passes_in_lockstep(tmp_path: Path) -> None:
-    """Closed and open loop, perception, and recordings: each picture is answered."""
-    names = ("sil-closed-straight", "sil-closed-kiwi-track", "sil-open-*", "sil-perception*clutter-60", "dil-*")
-    dodo("run", *names, "-j", "2", "--report", str(tmp_path), code=0)
-    tests = results(tmp_path)
-    closed, opened = {"sil-closed-straight", "sil-closed-kiwi-track"}, {"sil-open-straight", "sil-open-left-curve"}
-    assert set(tests) >= {*closed, *opened, "dil-static-rig", "dil-kiwi-track"}
-    assert {t["clock"] for t in tests.values()} == {"lockstep"}
-    assert sum(t["sim_s"] for t in tests.values()) > 40
-    for slug, test in tests.items():
-        assert (test["outcome"], test["checks"] != []) == ("passed", True), test
-        assert (tmp_path / slug / "test.rec").stat().st_size > 10_000
-    counts = {c["name"]: c["value"] for c in tests["dil-static-rig"]["checks"]}
-    assert counts["true-positives"] > 300
-
-
+@pytest.mark.slow
 def test_a_drive_that_leaves_the_track_fails_where_it_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What else is wrong with applications, tests/faulty tries."""
     monkeypatch.setenv("FAULT", "steering-reversed")
@@ -42,6 +25,7 @@ def test_a_drive_that_leaves_the_track_fails_where_it_does(tmp_path: Path, monke
         assert test["reason"] in out
 
 
+@pytest.mark.realtime
 def test_an_application_may_end_with_its_recording(tmp_path: Path) -> None:
     """In real time, so that a busy machine may cost it frames: but that it went is no fault of it."""
     application, report = kiwi(tmp_path / "app", LEAVES), tmp_path / "report"
@@ -51,5 +35,5 @@ def test_an_application_may_end_with_its_recording(tmp_path: Path) -> None:
     )
     test = results(report)["dil-static-rig"]
     assert {s["name"]: s["exit_code"] for s in test["services"]}["perception"] == 0, "it ended by itself"
-    assert test["outcome"] != "error" and test["checks"], "it was judged"
+    assert test["checks"] and (test["outcome"] != "error" or test["machine"]["undecided"]), "it was judged"
     assert "before the test was decided" not in test["reason"]
