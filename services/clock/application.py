@@ -36,7 +36,7 @@ class SteppedApplication:
         self.processes = ApplicationProcesses(())
         """To be set when they are known."""
         self._patience, self._link, self._stopped = patience, link, stopped
-        self._began, self._spent = 0.0, NOTHING
+        self._began, self._before = 0.0, NOTHING
         self._cid = cid
         self._first: list[EncodedEnvelope] = []
         self._reading: set[str] = set()
@@ -56,7 +56,7 @@ class SteppedApplication:
     def show(self, shown: Sequence[StepResult], now: int) -> None:
         """Announce new pictures as soon as readers wait for them; raises ApplicationSilent and ApplicationFloods."""
         self.frames += 1
-        self._began, self._spent = time.monotonic(), self.processes.spent()
+        self._began, self._before = time.monotonic(), self.processes.snapshot()
         again = self._began + _AGAIN_S
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
@@ -89,7 +89,7 @@ class SteppedApplication:
             self.waited_first += spent
         else:
             self.waited += spent
-            self.response.add(spent, self.processes.spent().since(self._spent) if self.processes else None)
+            self.response.add(spent, self.processes.snapshot().since(self._before) if self.processes else None)
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services."""

@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,17 +11,37 @@ _LOOK_AGAIN = 20
 
 
 class Spent(NamedTuple):
-    """Seconds on a processor, and ready to run without one; sums over processes and threads."""
+    """Seconds on a processor, and ready to run without one."""
 
     ran_s: float
     waited_s: float
 
-    def since(self, before: "Spent") -> "Spent":
-        """The difference; nothing is negative where a process has ended in between."""
-        return Spent(max(self.ran_s - before.ran_s, 0.0), max(self.waited_s - before.waited_s, 0.0))
+
+class ThreadTimes(NamedTuple):
+    """Seconds that a thread has run, and that it was ready to run and did not."""
+
+    ran_s: float
+    waited_s: float
 
 
-NOTHING = Spent(0.0, 0.0)
+class Snapshot(NamedTuple):
+    """What processes have spent up to now, by process id: processor time in s, and the times of each thread."""
+
+    ran_s: Mapping[int, float]
+    threads: Mapping[int, Mapping[str, ThreadTimes]]
+
+    def since(self, before: "Snapshot") -> Spent:
+        """What was spent since another snapshot. A process waits as long as the one of its threads that ran the most.
+
+        Others may have nothing to do and be ready all the same, such as those of OpenCV's pool, which look for work
+        for a while before they sleep: on a busy machine they wait much longer than the work takes.
+        """
+        ran = sum(max(now - before.ran_s.get(pid, now), 0.0) for pid, now in self.ran_s.items())
+        waits = (_wait(threads, before.threads.get(pid, {})) for pid, threads in self.threads.items())
+        return Spent(ran, sum(waits))
+
+
+NOTHING = Snapshot({}, {})
 
 
 class ApplicationProcesses:
@@ -35,17 +55,16 @@ class ApplicationProcesses:
     def __bool__(self) -> bool:
         return bool(self._roots)
 
-    def spent(self) -> Spent:
-        """What all of them have spent up to now; those that have ended count no more."""
+    def snapshot(self) -> Snapshot:
+        """What they have spent up to now, without those that have ended."""
         if self._looks % _LOOK_AGAIN == 0:
             self._pids = tuple(descendants(self._roots, self._proc))
         self._looks += 1
-        ran = waited = 0.0
+        ran: dict[int, float] = {}
         for pid in self._pids:
             with contextlib.suppress(OSError):
-                ran += _process_clock(pid)
-            waited += _waited(self._proc / str(pid) / "task")
-        return Spent(ran, waited)
+                ran[pid] = _process_clock(pid)
+        return Snapshot(ran, {pid: dict(_threads(self._proc / str(pid) / "task")) for pid in self._pids})
 
 
 def descendants(roots: frozenset[int], proc: Path) -> list[int]:
@@ -65,14 +84,25 @@ def _process_clock(pid: int) -> float:
     return time.clock_gettime_ns((~pid << 3) | 2) / 1e9
 
 
-def _waited(tasks: Path) -> float:
-    """Seconds that the threads of a process were ready to run and did not: the second number of schedstat, ns."""
-    total = 0.0
+def _threads(tasks: Path) -> Iterator[tuple[str, ThreadTimes]]:
+    """The threads of a process by their ids: the first two numbers of schedstat are times in ns."""
     with contextlib.suppress(OSError):
         for task in tasks.iterdir():
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                total += int((task / "schedstat").read_bytes().split()[1]) / 1e9
-    return total
+            with contextlib.suppress(OSError, ValueError):
+                ran, waited, *_ = (task / "schedstat").read_bytes().split()
+                yield task.name, ThreadTimes(int(ran) / 1e9, int(waited) / 1e9)
+
+
+def _wait(now: Mapping[str, ThreadTimes], before: Mapping[str, ThreadTimes]) -> float:
+    """How long the thread waited that ran the most in between; nothing where none ran."""
+    spent = [(times.ran_s - then.ran_s, times.waited_s - then.waited_s) for times, then in _both(now, before)]
+    return max(max(spent, default=(0.0, 0.0))[1], 0.0)
+
+
+def _both(
+    now: Mapping[str, ThreadTimes], before: Mapping[str, ThreadTimes]
+) -> Iterator[tuple[ThreadTimes, ThreadTimes]]:
+    return ((times, before.get(thread, ThreadTimes(0.0, 0.0))) for thread, times in now.items())
 
 
 def _parent(stat: Path) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from services.clock.processor_time import ApplicationProcesses, Spent, descendants
+from services.clock.processor_time import ApplicationProcesses, Snapshot, Spent, ThreadTimes, descendants
 
 BURN = """
 import subprocess, sys, threading, time
@@ -36,33 +36,53 @@ def test_threads_that_ended_and_children_count(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == b"ready\n"
-        parent = ApplicationProcesses([process.pid]).spent()
-        assert parent.ran_s >= 0.2
-        while (both := ApplicationProcesses([process.pid]).spent()).ran_s < 0.4:  # the child burns as much
+        parent = ran(process.pid)
+        assert parent >= 0.2
+        while ran(process.pid) < 0.4:  # the child burns as much
             assert process.poll() is None
-        assert both.ran_s > parent.ran_s
         assert len(descendants(frozenset([process.pid]), Path("/proc"))) == 2
         process.communicate(b"")
-    assert ApplicationProcesses([process.pid]).spent() == Spent(0.0, 0.0)
+    assert ran(process.pid) == 0.0
+
+
+def ran(pid: int) -> float:
+    """All that a process and its descendants ran so far, in s."""
+    return sum(ApplicationProcesses([pid]).snapshot().ran_s.values())
 
 
 def test_it_agrees_with_what_the_process_knows_of_itself() -> None:
     before = resource.getrusage(resource.RUSAGE_SELF)
-    spent = ApplicationProcesses([os.getpid()]).spent()
+    mine = ApplicationProcesses([os.getpid()]).snapshot().ran_s[os.getpid()]
     after = resource.getrusage(resource.RUSAGE_SELF)
-    assert before.ru_utime + before.ru_stime - 0.02 <= spent.ran_s <= after.ru_utime + after.ru_stime + 0.02
+    assert before.ru_utime + before.ru_stime - 0.02 <= mine <= after.ru_utime + after.ru_stime + 0.02
 
 
-def test_the_wait_is_that_of_all_threads(tmp_path: Path) -> None:
-    for thread, waited in ((7, 1_500_000_000), (8, 250_000_000)):
-        (tmp_path / "7" / "task" / str(thread)).mkdir(parents=True)
-        (tmp_path / "7" / "task" / str(thread) / "schedstat").write_text(f"1 {waited} 3\n")
-    (tmp_path / "7" / "stat").write_text("7 (a) name) S 1 7\n")
-    (tmp_path / "9").mkdir()
-    (tmp_path / "9" / "stat").write_text("9 (other) S 1 9\n")
+def write(proc: Path, pid: int, threads: dict[int, tuple[float, float]]) -> None:
+    for thread, (running, waiting) in threads.items():
+        folder = proc / str(pid) / "task" / str(thread)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "schedstat").write_text(f"{running * 1e9:.0f} {waiting * 1e9:.0f} 3\n")
+    (proc / str(pid) / "stat").write_text(f"{pid} (a) name) S 1 {pid}\n")
+
+
+def test_a_process_waits_as_long_as_its_busiest_thread(tmp_path: Path) -> None:
+    """One that only looks for work waits for longer, and nobody waits for it."""
+    write(tmp_path, 7, {7: (1.0, 0.5), 8: (0.1, 3.0)})
+    write(tmp_path, 9, {9: (2.0, 0.0)})
+    processes = ApplicationProcesses([7, 9], tmp_path)
+    before = processes.snapshot()
+    write(tmp_path, 7, {7: (1.3, 0.75), 8: (0.11, 3.5)})
+    write(tmp_path, 9, {9: (2.2, 0.125), 10: (0.1, 0.1)})
+    assert processes.snapshot().since(before).waited_s == pytest.approx(0.375)
+
+
+def test_others_do_not_count(tmp_path: Path) -> None:
+    write(tmp_path, 7, {7: (1.0, 0.5)})
+    write(tmp_path, 9, {9: (1.0, 0.5)})
     assert descendants(frozenset([7]), tmp_path) == [7]
-    assert ApplicationProcesses([7], tmp_path).spent().waited_s == pytest.approx(1.75)
 
 
-def test_a_process_that_ended_in_between_takes_nothing_back() -> None:
-    assert Spent(1.0, 0.5).since(Spent(2.0, 0.1)) == Spent(0.0, 0.4)
+def test_what_ended_in_between_takes_nothing_back() -> None:
+    before = Snapshot({7: 1.0, 8: 1.0}, {7: {"7": ThreadTimes(1.0, 0.5)}})
+    after = Snapshot({7: 1.25}, {7: {}})
+    assert after.since(before) == Spent(0.25, 0.0)
