@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, PlannedService
 
 FILES = "/dodo/files"
@@ -59,6 +60,8 @@ def _word(flag: Flag) -> str:
 def _environment(plan: Plan, service: PlannedService) -> tuple[tuple[str, str], ...]:
     messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
     own = {"DODO_SERVICE": service.name, "DODO_ODVD": messages, **plan.variables}
+    if service.name == CLOCK:
+        own[RUNNER_VARIABLE] = f"${{{RUNNER_VARIABLE}:-}}"  # the runner sets it: without one the clock begins by itself
     return tuple((name, value) for name, value in own.items() if value)
 
 

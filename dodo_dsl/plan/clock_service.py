@@ -12,6 +12,8 @@ from dodo_dsl.spec.model import Spec
 
 CLOCK = "dodo-clock"
 MANIFEST = "clock"
+RUNNER_VARIABLE = "DODO_RUNNER"
+"""Empty in the clock's container where no runner announces the begin of the test, as with ``docker compose up``."""
 
 _WALL_FACTOR, _WALL_SPARE_S = 10.0, 60.0
 

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import os
 import time
 from collections.abc import Callable
 from fractions import Fraction
@@ -88,6 +89,10 @@ class ClockService(Service):
         return self._stopped()
 
     def _await_begin(self) -> Envelope | None:
+        """The begin that the runner announces; one of its own where DODO_RUNNER says that there is none."""
+        if os.environ.get("DODO_RUNNER") == "":
+            begin = self._session.messages.type("dodo.TestBegin")()
+            return Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)
         while not self._stopped():
             envelope = self._session.receive(_SLICE)
             if envelope is not None and envelope.data_type == self._begin_id:

@@ -113,6 +113,6 @@ def test_an_evaluator_survives_a_restart_of_what_moves_the_vehicle(cid: int, tmp
         assert judge.poll() is None
         with running("beacon", tmp_path, f"--cid={cid}", *WAY, "--points=0 0.2,0 3.5", "--speed=6"):
             out, err = judge.communicate(timeout=PATIENCE)
-    verdict = json.loads(out)
+    verdict = json.loads(out.splitlines()[-1])
     assert (judge.returncode, verdict["outcome"], err) == (0, "passed", "")
     assert verdict["checks"][1]["name"] == "gates" and verdict["checks"][1]["value"] == 1

@@ -41,3 +41,14 @@ def test_who_is_stopped_before_the_begin_reports_nothing(cid: int, capsys: pytes
     with Session(cid) as session:
         driven(session, Roles((), (), ()), stopped=True)
     assert capsys.readouterr().out == ""
+
+
+def test_without_a_runner_it_begins_by_itself(
+    cid: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As with ``docker compose up`` on a compiled test; it then looks for the test's services."""
+    monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.1)
+    monkeypatch.setenv("DODO_RUNNER", "")
+    with Session(cid) as session:
+        driven(session, Roles((), (), ("gone",)))
+    assert '"stuck"' in capsys.readouterr().out
