@@ -103,8 +103,10 @@ def test_a_second_recorder_goes_on_where_a_killed_one_ended(cid: int, tmp_path: 
 @pytest.mark.realtime
 def test_an_evaluator_survives_a_restart_of_what_moves_the_vehicle(cid: int, tmp_path: Path) -> None:
     track = ["--map-path=tests_registry/maps/straight", "--gates=finish", "--walls=left,right", "--frame-id=3"]
+    track += ["--max-silence=600"]
     with Session(cid) as session, running("collision", tmp_path, f"--cid={cid}", *track) as judge:
         session.send(session.messages.type("dodo.TestBegin")())
+        session.send(session.messages.type("opendlv.proxy.GroundSteeringRequest")())
         with running("beacon", tmp_path, f"--cid={cid}", *WAY, "--points=0 0,0 1", "--speed=0.5") as first:
             while receive(session, "opendlv.sim.Frame", 3)[1].y < 0.1:
                 pass

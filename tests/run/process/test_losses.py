@@ -10,7 +10,7 @@ from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from tests.run.helpers import READY, Bench
 
-CROWD, LAST = 400, 4711
+CROWD, LAST, RECORDING_END = 400, 4711, 2906
 SLOW_RECORDER = f"""
 import pathlib, sys, time
 from dodo_dsl.opendlv.bus import session
@@ -58,7 +58,7 @@ def test_what_the_recorder_lost_reaches_the_outcome(tmp_path: Path, monkeypatch:
     (outcome,) = bench.run(plan)
     assert (outcome.outcome, outcome.reason) == ("passed", "it crowded")
     recorded = [e.data_type for e in read_envelopes(tmp_path / "report" / plan.slug / "test.rec")]
-    assert recorded[-1] == LAST
+    assert recorded[-2:] == [LAST, RECORDING_END]
     lost = CROWD - recorded.count(1086)
     assert lost > 0
     note = f"service 'dodo-recorder' lost {lost} messages, as its receive buffer was full"

@@ -168,7 +168,7 @@ def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
         send(session, FRAME, sample_time=START + 2_010_000, x=2.9, y=0.05, qw=1.0)
         code, output, errors = finished(process)
     assert (code, errors) == (0, "")
-    verdict = json.loads(output)
+    verdict = json.loads(output.splitlines()[-1])
     assert (verdict["dodo"], verdict["outcome"], verdict["reason"]) == (
         "verdict",
         "passed",

@@ -113,7 +113,7 @@ def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
         send(session, "dodo.EndOfInput", source="recording")
         code, output, errors = finished(process)
     assert (code, errors) == (0, "")
-    verdict = json.loads(output)
+    verdict = json.loads(output.splitlines()[-1])
     assert (verdict["dodo"], verdict["outcome"]) == ("verdict", "passed")
     checks = {check["name"]: check for check in verdict["checks"]}
     expected = sum(abs(0.04 * math.sin(step)) for step in range(101)) / 101
@@ -134,7 +134,7 @@ def test_another_sender_stamp_is_part_of_the_reason(table: Path, cid: int, tmp_p
             send(session, STEERING, sender_stamp=99, sample_time=start + step)
         send(session, "dodo.EndOfInput", source="recording")
         code, output, _ = finished(it)
-    verdict = json.loads(output)
+    verdict = json.loads(output.splitlines()[-1])
     assert (code, verdict["outcome"]) == (0, "failed")
     assert verdict["reason"].startswith(f"no sample of groundSteering of {STEERING}/0 came before the input ended")
     assert verdict["reason"].endswith(f"; no {STEERING}/0 came, but 3 with sender stamp 99")

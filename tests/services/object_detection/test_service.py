@@ -96,7 +96,7 @@ def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
         send(session, "dodo.EndOfInput", source="recording")
         code, output, errors = finished(process)
     assert (code, errors) == (0, "")
-    verdict = json.loads(output)
+    verdict = json.loads(output.splitlines()[-1])
     assert (verdict["outcome"], verdict["reason"]) == (
         "passed",
         "found 40 of 40 objects in 20 frames, with 0 false detections: "
