@@ -17,20 +17,20 @@ class Spent(NamedTuple):
     waited_s: float
 
 
-class ThreadTimes(NamedTuple):
+class ThreadSpent(NamedTuple):
     """Seconds that a thread has run, and that it was ready to run and did not."""
 
     ran_s: float
     waited_s: float
 
 
-class Snapshot(NamedTuple):
+class ProcessorTimes(NamedTuple):
     """What processes have spent up to now, by process id: processor time in s, and the times of each thread."""
 
     ran_s: Mapping[int, float]
-    threads: Mapping[int, Mapping[str, ThreadTimes]]
+    threads: Mapping[int, Mapping[str, ThreadSpent]]
 
-    def since(self, before: "Snapshot") -> Spent:
+    def since(self, before: "ProcessorTimes") -> Spent:
         """What was spent since another snapshot. A process waits as long as the one of its threads that ran the most.
 
         Others may have nothing to do and be ready all the same, such as those of OpenCV's pool, which look for work
@@ -41,7 +41,7 @@ class Snapshot(NamedTuple):
         return Spent(ran, sum(waits))
 
 
-NOTHING = Snapshot({}, {})
+NOTHING = ProcessorTimes({}, {})
 
 
 class ApplicationProcesses:
@@ -55,7 +55,7 @@ class ApplicationProcesses:
     def __bool__(self) -> bool:
         return bool(self._roots)
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> ProcessorTimes:
         """What they have spent up to now, without those that have ended."""
         if self._looks % _LOOK_AGAIN == 0:
             self._pids = tuple(descendants(self._roots, self._proc))
@@ -64,7 +64,7 @@ class ApplicationProcesses:
         for pid in self._pids:
             with contextlib.suppress(OSError):
                 ran[pid] = _process_clock(pid)
-        return Snapshot(ran, {pid: dict(_threads(self._proc / str(pid) / "task")) for pid in self._pids})
+        return ProcessorTimes(ran, {pid: dict(_threads(self._proc / str(pid) / "task")) for pid in self._pids})
 
 
 def descendants(roots: frozenset[int], proc: Path) -> list[int]:
@@ -84,25 +84,25 @@ def _process_clock(pid: int) -> float:
     return time.clock_gettime_ns((~pid << 3) | 2) / 1e9
 
 
-def _threads(tasks: Path) -> Iterator[tuple[str, ThreadTimes]]:
+def _threads(tasks: Path) -> Iterator[tuple[str, ThreadSpent]]:
     """The threads of a process by their ids: the first two numbers of schedstat are times in ns."""
     with contextlib.suppress(OSError):
         for task in tasks.iterdir():
             with contextlib.suppress(OSError, ValueError):
                 ran, waited, *_ = (task / "schedstat").read_bytes().split()
-                yield task.name, ThreadTimes(int(ran) / 1e9, int(waited) / 1e9)
+                yield task.name, ThreadSpent(int(ran) / 1e9, int(waited) / 1e9)
 
 
-def _wait(now: Mapping[str, ThreadTimes], before: Mapping[str, ThreadTimes]) -> float:
+def _wait(now: Mapping[str, ThreadSpent], before: Mapping[str, ThreadSpent]) -> float:
     """How long the thread waited that ran the most in between; nothing where none ran."""
     spent = [(times.ran_s - then.ran_s, times.waited_s - then.waited_s) for times, then in _both(now, before)]
     return max(max(spent, default=(0.0, 0.0))[1], 0.0)
 
 
 def _both(
-    now: Mapping[str, ThreadTimes], before: Mapping[str, ThreadTimes]
-) -> Iterator[tuple[ThreadTimes, ThreadTimes]]:
-    return ((times, before.get(thread, ThreadTimes(0.0, 0.0))) for thread, times in now.items())
+    now: Mapping[str, ThreadSpent], before: Mapping[str, ThreadSpent]
+) -> Iterator[tuple[ThreadSpent, ThreadSpent]]:
+    return ((times, before.get(thread, ThreadSpent(0.0, 0.0))) for thread, times in now.items())
 
 
 def _parent(stat: Path) -> int:

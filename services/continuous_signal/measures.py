@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from services.base import Check
 from services.continuous_signal.coverage import Coverage, cover, holds
-from services.continuous_signal.shape import Run, lag, likeness, longest_run
+from services.continuous_signal.shape import RepeatedValue, lag, likeness, longest_run
 from services.continuous_signal.target import MICROSECONDS, Target, Times, Values
 
 _DIGITS = 12
@@ -76,7 +76,7 @@ class SignalMeasures:
     std_over_time: float | None = None
     coverage: Coverage | None = None
     lag: float | None = None
-    repeats: Run | None = None
+    repeats: RepeatedValue | None = None
     likeness: str = ""
 
     def checks(self, limits: SignalLimits) -> tuple[Check, ...]:

@@ -24,7 +24,7 @@ def lag(target: Target, times: Times, values: Values) -> float:
 
 
 @dataclass(frozen=True)
-class Run:
+class RepeatedValue:
     """Samples in a row with one and the same value, from a time in s on."""
 
     samples: int
@@ -32,7 +32,7 @@ class Run:
     time: float
 
 
-def longest_run(times: Times, values: Values) -> Run:
+def longest_run(times: Times, values: Values) -> RepeatedValue:
     """The first of the longest runs; samples in any order."""
     order = np.argsort(times, kind="stable")
     ordered = values[order]
@@ -40,7 +40,7 @@ def longest_run(times: Times, values: Values) -> Run:
     lengths = np.diff(np.append(begins, len(ordered)))
     longest = int(np.argmax(lengths))
     first = begins[longest]
-    return Run(int(lengths[longest]), float(ordered[first]), float(times[order][first]) / MICROSECONDS)
+    return RepeatedValue(int(lengths[longest]), float(ordered[first]), float(times[order][first]) / MICROSECONDS)
 
 
 def likeness(target: Target, times: Times, values: Values) -> str:

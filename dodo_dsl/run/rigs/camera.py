@@ -20,7 +20,7 @@ PROGRAMS = {
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class SnapshotCommand:
     """A program that takes a snapshot, its words without the output, and whether it renders a scene with its truth."""
 
     program: tuple[str, ...]
@@ -28,7 +28,7 @@ class Snapshot:
     is_rendered: bool
 
 
-def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> Snapshot:
+def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> SnapshotCommand:
     """A snapshot as the service ``camera`` of a test sees it, or without a test as the rig is; raises RigProblem."""
     use = next((use for use in spec.uses if use.uses.text == CAMERA), None) if spec else None
     if spec and use is None:
@@ -41,7 +41,7 @@ def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> 
     real = PlannedService("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
     service = hardware(real, manifests, "")
     words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags)
-    return Snapshot(PROGRAMS[service.uses], words, service.uses == DRAWN)
+    return SnapshotCommand(PROGRAMS[service.uses], words, service.uses == DRAWN)
 
 
 def _flags(rig: Rig, manifest: Manifest, spec: Spec | None, use: Use | None) -> tuple[Flag, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from services.clock.processor_time import ApplicationProcesses, Snapshot, Spent, ThreadTimes, descendants
+from services.clock.processor_time import ApplicationProcesses, ProcessorTimes, Spent, ThreadSpent, descendants
 
 BURN = """
 import subprocess, sys, threading, time
@@ -82,6 +82,6 @@ def test_others_do_not_count(tmp_path: Path) -> None:
 
 
 def test_what_ended_in_between_takes_nothing_back() -> None:
-    before = Snapshot({7: 1.0, 8: 1.0}, {7: {"7": ThreadTimes(1.0, 0.5)}})
-    after = Snapshot({7: 1.25}, {7: {}})
+    before = ProcessorTimes({7: 1.0, 8: 1.0}, {7: {"7": ThreadSpent(1.0, 0.5)}})
+    after = ProcessorTimes({7: 1.25}, {7: {}})
     assert after.since(before) == Spent(0.25, 0.0)

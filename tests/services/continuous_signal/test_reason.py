@@ -6,7 +6,7 @@ import pytest
 from services.continuous_signal.late import LateFacts
 from services.continuous_signal.measures import SignalLimits, SignalMeasures, WorstSample
 from services.continuous_signal.reason import verdict
-from services.continuous_signal.shape import Run
+from services.continuous_signal.shape import RepeatedValue
 from services.continuous_signal.target import Target
 
 TARGET = Target(np.array([0, 10_000_000]), np.array([0.0, 1.0]))
@@ -60,7 +60,7 @@ def test_without_samples_the_reason_is_why(measures: SignalMeasures, text: str) 
 
 
 def test_a_lag_and_a_value_that_stays_are_named() -> None:
-    bad = replace(GOOD, lag=0.3, repeats=Run(7, 0.05, 2.0), likeness="about 2 times its target")
+    bad = replace(GOOD, lag=0.3, repeats=RepeatedValue(7, 0.05, 2.0), likeness="about 2 times its target")
     limits = SignalLimits(mean=0.05, lag=0.15, repeats=4)
     assert reason(bad, limits) == (
         "it lags its target by 0.3 s (at most 0.15 s); 7 samples in a row have the same value, 0.05, from 2.00 s on "

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.continuous_signal.shape import Run, lag, likeness, longest_run
+from services.continuous_signal.shape import RepeatedValue, lag, likeness, longest_run
 from services.continuous_signal.target import MICROSECONDS, Target
 
 TIMES = np.arange(0, 8 * MICROSECONDS, MICROSECONDS // 10)
@@ -37,8 +37,8 @@ def test_few_samples_have_no_lag() -> None:
 def test_the_first_of_the_longest_runs_counts_in_the_order_of_time() -> None:
     values = np.array([1.0, 2.0, 2.0, 2.0, 1.0, 3.0, 3.0, 3.0])
     order = np.array([7, 2, 5, 0, 3, 1, 6, 4])
-    assert longest_run(TIMES[:8][order], values[order]) == Run(3, 2.0, 0.1)
-    assert longest_run(TIMES[:1], values[:1]) == Run(1, 1.0, 0.0)
+    assert longest_run(TIMES[:8][order], values[order]) == RepeatedValue(3, 2.0, 0.1)
+    assert longest_run(TIMES[:1], values[:1]) == RepeatedValue(1, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(
