@@ -4,8 +4,10 @@ DODO := .venv/bin/dodo
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
-# `make test` runs two parts side by side, then two more: an engine that makes networks disturbs tests in real time
-PARTS := realtime-tests fast-tests engine-tests slow-tests
+# `make test` runs two chains side by side. An engine that makes networks disturbs tests in real time, so one chain has both
+ALONE := realtime-tests engine-tests
+BESIDE := fast-tests slow-tests
+PARTS := $(ALONE) $(BESIDE) alone beside
 
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
@@ -66,10 +68,14 @@ check:
 
 test:
 	@$(MAKE) --no-print-directory -j 3 style types tools
-	@status=0; rm -f $(JUNIT)/*.xml; \
-		$(MAKE) --no-print-directory -j 2 --output-sync=target realtime-tests fast-tests || status=$$?; \
-		$(MAKE) --no-print-directory -j 2 --output-sync=target engine-tests slow-tests || status=$$?; \
+	@status=0; rm -f $(JUNIT)/*.xml; $(MAKE) --no-print-directory -j 2 --keep-going alone beside || status=$$?; \
 		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status
+
+alone:
+	@status=0; for part in $(ALONE); do $(MAKE) --no-print-directory --output-sync=target $$part || status=$$?; done; exit $$status
+
+beside:
+	@status=0; for part in $(BESIDE); do $(MAKE) --no-print-directory --output-sync=target $$part || status=$$?; done; exit $$status
 
 bench:
 	@scripts/setup dev

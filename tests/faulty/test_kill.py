@@ -42,7 +42,7 @@ def copy_of(fault: Fault, registry: Path) -> None:
     (folder / f"{fault.name}.dodo.yml").write_text(yaml.safe_dump(spec, sort_keys=False))
 
 
-@pytest.mark.slow
+@pytest.mark.realtime  # as it takes the whole machine, not for its clock
 def test_each_fault_is_caught_and_its_cause_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     registry, report = tmp_path / "tests", tmp_path / "report"
     shutil.copytree(ROOT / "tests_registry", registry)
