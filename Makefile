@@ -16,8 +16,8 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
-	@echo "make check    format, lint, types, imports, and the tests that need only Python: a minute and a half"
-	@echo "make test     set up, then every check and every test: ten minutes"
+	@echo "make check    format, lint, types, imports, and the tests that need only Python: two minutes"
+	@echo "make test     set up, then every check and every test: a quarter of an hour"
 	@echo "make lint     format, lint, types, imports"
 	@echo "make bench    measure, beside a peer in the same run"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
