@@ -103,7 +103,7 @@ def test_lossless_pictures_are_decoded_bit_for_bit(tmp_path: Path, kind: str) ->
         assert frame is not None and np.array_equal(frame.pixels(kind), scene(number, kind))
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize("kind", ["i420", "argb"])
 def test_lossless_pictures_come_back_bit_for_bit(cid: int, tmp_path: Path, kind: str) -> None:
     path = record(tmp_path, kind, "--lossless")

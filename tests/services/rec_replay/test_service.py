@@ -148,7 +148,7 @@ def test_damage_and_missing_pictures_are_logged(tmp_path: Path, caplog: pytest.L
     assert "has no pictures in the selected part: no shared memory is created" in caplog.text
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_pictures_with_their_sample_times(cid: int, tmp_path: Path) -> None:
     times = [n / 20 for n in range(12)]
     rec = write(tmp_path / "drive.rec", [*images(times), *images([0, 0.1], sender_stamp=3)])
@@ -195,7 +195,7 @@ def shortened(rec: Path, count: int, target: Path) -> Path:
     return write(target, rows)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize(("name", "count"), [("sim-2023-04-27.rec", 500), ("cones-2020-05-15.rec", 30)])
 def test_the_bus_has_what_cluon_replay_sends(
     cid: int, tmp_path: Path, shared_data: Callable[[str], Path], name: str, count: int
@@ -206,7 +206,7 @@ def test_the_bus_has_what_cluon_replay_sends(
     assert len(ours) == count
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_every_message_of_real_recordings(cid: int, tmp_path: Path, shared_data: Callable[[str], Path]) -> None:
     rec = shared_data("sim-2023-04-27.rec")
     flags = (f"--cid={cid}", f"--rec={rec}", "--timemod=50", "--settle=0", "--await-begin=false")
@@ -216,7 +216,7 @@ def test_every_message_of_real_recordings(cid: int, tmp_path: Path, shared_data:
         assert [key(e) for e in heard] == [key(e) for e in recording.envelopes(recording.by_time())]
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_every_picture_of_the_track(cid: int, tmp_path: Path, shared_data: Callable[[str], Path]) -> None:
     rec = shared_data("track-1-2025-05-08.rec")
     names = [f"--name.{kind}=track-{os.getpid()}.{kind}" for kind in ("argb", "i420")]
