@@ -85,7 +85,7 @@ def test_a_kernel_that_does_not_measure(proc: Proc) -> None:
     assert ThreadTimes(proc.root).add_up({10: "app"}) is None
 
 
-@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="this kernel does not measure")
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="this kernel counts no waits")
 def test_the_kernel_s_own() -> None:
     """A child of a child that computes for 50 ms."""
     work = "import time\nwhile time.process_time() < 0.05: pass\nprint(flush=True); input()"
