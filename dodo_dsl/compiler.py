@@ -94,7 +94,7 @@ def load(
 def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Checked:
     """The same without shipped tests that need what the application does not send, but for the files ``named``.
 
-    Warnings about shipped tests go, too: whoever reads them did not write these.
+    Warnings about shipped tests go, too, as the user did not write these tests.
     """
     first = {test.spec.path: test.spec for test in reversed(checked.tests)}
     shipped = {

@@ -148,7 +148,7 @@ def test_the_rig_itself_saw_no_limit_passed_and_knows_where_it_stands(tmp_path: 
 
 
 def test_the_rig_goes_its_way_whatever_the_application_does(tmp_path: Path) -> None:
-    """On a machine that is too busy the reversed application is not judged, but what was found is told."""
+    """On a busy machine the reversed application is not judged, but the reason says what was found."""
     application = str(kiwi(tmp_path / "app", None, steering="--reverse"))
     test = run(tmp_path / "good", "hil-open-straight", code=0)
     assert (test["outcome"], test["kind"]) == ("passed", "open-loop")

@@ -1,4 +1,4 @@
-"""Whether a machine was too busy for a verdict in real time: then the test is in error, as nobody knows."""
+"""Whether a machine was too busy for a verdict in real time; the test then ends in error."""
 
 from dataclasses import dataclass, replace
 

@@ -27,7 +27,7 @@ class Snapshot:
     """Sums since some time in the past; ``at_s`` by a clock that never goes back.
 
     ``services`` are the test's, by name; processes that belong to none of them have the name ``''``.
-    ``busy_s`` is that of all ``cores`` which the test may use, whoever used them.
+    ``busy_s`` is how long the ``cores`` that the test may use were busy, with any process.
     """
 
     at_s: float
