@@ -25,6 +25,8 @@ them against all {tests} shipped tests of the levels sil and dil in lockstep, an
     FAULT=steering-reversed dodo run sil-open-straight --application tests/faulty/docker-compose.yml
 
 {caught} of {faults} are caught by one test or more. {good} {run} of {all} combinations of fault and test have run.
+A result is kept until the
+test's spec changes, so that it may be of an earlier version of DoDo; `scripts/kill-matrix --afresh` runs all again.
 
 **F**: the test failed, so the fault is caught. ·: it passed. E: it ended in error: no answer. ?: not run.
 """
