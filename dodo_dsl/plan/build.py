@@ -3,7 +3,7 @@
 import functools
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
@@ -55,7 +55,8 @@ def build(
         cid: int, isolated: str, evaluators: tuple[str, ...], hardware: bool, privileged: bool
     ) -> Application:
         kept = {"hil": hardware, "privileged_allowed": privileged}
-        return plan_application(application, cid, isolated, out / "test", evaluators, **kept)
+        planned = plan_application(application, cid, isolated, out / "test", evaluators, **kept)
+        return replace(planned, limits=deployment.sandbox, hidden=_hidden(application, deployment))
 
     builders = [
         _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten)
@@ -65,6 +66,13 @@ def build(
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
     return Compiled(Suite(plans, deployment.gates), files), problems
+
+
+def _hidden(application: ApplicationSource, deployment: Deployment) -> tuple[str, ...]:
+    """Folders with tests, maps and truths within the application's own folder, relative to it."""
+    own = application.folder.resolve()
+    found = {folder.resolve() for folder in (*deployment.registry, *deployment.services)}
+    return tuple(sorted(path.relative_to(own).as_posix() for path in found if path != own and path.is_relative_to(own)))
 
 
 def _cids(tests: Sequence[ResolvedTest], deployment: Deployment) -> list[int]:

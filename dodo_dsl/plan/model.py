@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from dodo_dsl.spec import model as spec_model
+from dodo_dsl.spec.sandbox import SandboxLimits
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0
@@ -59,7 +60,8 @@ class ApplicationService:
 class Application:
     """The application; ``folder`` is its compose file's folder, relative to the compiled test's.
 
-    ``variables`` are those of its ``.env``, as compose interpolates them.
+    ``variables`` are those of its ``.env``, as compose interpolates them. ``hidden`` are folders of tests within its
+    own, relative to it.
     """
 
     folder: str
@@ -67,6 +69,8 @@ class Application:
     compose: dict[str, Any] = field(default_factory=dict)
     changes: tuple[str, ...] = ()
     variables: dict[str, str] = field(default_factory=dict)
+    limits: SandboxLimits = field(default_factory=SandboxLimits)
+    hidden: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

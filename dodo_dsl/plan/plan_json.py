@@ -21,6 +21,7 @@ from dodo_dsl.plan.model import (
 )
 from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS
+from dodo_dsl.spec.sandbox import SandboxLimits
 from dodo_dsl.spec.settings import Settings
 
 FORMAT = 1
@@ -47,6 +48,9 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         application = raw["application"]
         application["services"] = tuple(_application_service(s) for s in application["services"])
         application["changes"] = tuple(application["changes"])
+        application["hidden"] = tuple(application["hidden"])
+        reads = tuple(application["limits"]["reads"])
+        application["limits"] = SandboxLimits(**{**application["limits"], "reads": reads})
         raw["application"] = Application(**application)
         if settings.seed is not None:
             raw["seed"] = settings.seed

@@ -23,6 +23,7 @@ from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.attendance import attended, is_real
 
 Say = Callable[[str], None]
+WAY_OUT = "install bubblewrap and allow user namespaces, or trust the application and run with --isolation host"
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,8 @@ class Processes:
         self._isolation = isolation
         self._descriptors = descriptors
         self._alone = asyncio.Lock()
+        self._problem = ""
+        self._is_apart = True
 
     def _exclusively(self, plan: Plan) -> AbstractAsyncContextManager[None]:
         """A queue without time limit for tests of this run that need the machine for themselves."""
@@ -80,9 +83,14 @@ class Processes:
         if self._isolation is None and "network" in wanted:
             refusal = await asyncio.to_thread(host_isolation.namespaces_refusal)
             if refusal:
-                note(f"no namespaces on this machine ({refusal}): tests share the host, each with leases")
-                self._isolation = "host"
-        if "network" in wanted and self._isolation != "host":
+                self._problem = f"the application cannot be isolated on this machine: {refusal}; {WAY_OUT}"
+                return
+        if "host" in wanted or any(is_real(plan) for plan in plans):
+            refusal = await asyncio.to_thread(host_isolation.process_namespace_refusal)
+            self._is_apart = not refusal
+            if refusal:
+                note(f"what an application starts may outlive its test on the host: {refusal}")
+        if "network" in wanted:
             self._fork_server = ForkServer(self._descriptors)
 
     def close(self) -> None:
@@ -94,6 +102,8 @@ class Processes:
         plan = job.plan
         isolation = "host" if is_real(plan) else self._isolation or plan.isolation
         if isolation == "network":
+            if self._problem:
+                raise BackendError(self._problem)
             slot = Slot(plan.cid, descriptors=self._descriptors)
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, self._fork_server)
             return
@@ -105,7 +115,7 @@ class Processes:
             attended(plan, leased.cid, leased.descriptors, say) as descriptors,
         ):
             slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
-            yield ProcessBackend(plan, job.folder, job.report, isolation, slot)
+            yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)
 
 
 class Containers:

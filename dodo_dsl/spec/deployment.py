@@ -11,6 +11,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.rig import Rig
+from dodo_dsl.spec.sandbox import SandboxLimits, sandbox_limits
 from dodo_dsl.spec.schema import validate
 
 _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
@@ -38,6 +39,7 @@ class Deployment:
     subnets: ipaddress.IPv4Network = DEFAULT_SUBNETS
     gates: bool = True
     rigs: dict[str, Rig] = field(default_factory=dict)
+    sandbox: SandboxLimits = field(default_factory=SandboxLimits)
 
     def rig(self, name: str) -> Rig | None:
         """A rig of the deployment, or the emulated one."""
@@ -83,6 +85,7 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
         subnets=_subnets(node.entries.get("subnets"), problems),
         gates=raw.get("gates", True),
         rigs=rigs,
+        sandbox=sandbox_limits(node.entries.get("sandbox")),
     )
     _odvd(node.entries.get("messages"), deployment.messages, problems)
     return deployment, [*found, *problems]

@@ -26,6 +26,7 @@ _FACTORS: dict[str, dict[str, Decimal]] = {
     "angular acceleration": {"rad/s2": Decimal(1), "deg/s2": _PI / 180},
     "share": {SHARE: Decimal(1), "%": Decimal("0.01")},
     "pixel count": {"px": Decimal(1)},
+    "size": {"B": Decimal(1), "kB": Decimal(10**3), "MB": Decimal(10**6), "GB": Decimal(10**9)},
     "mass": {"kg": Decimal(1), "g": Decimal("0.001")},
 }
 _DIMENSION = {unit: dimension for dimension, units in _FACTORS.items() for unit in units}

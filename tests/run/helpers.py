@@ -19,10 +19,11 @@ READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
 PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'
 FAIL = 'print(\'{"dodo": "verdict", "outcome": "failed", "reason": "hit wall left", "checks": []}\', flush=True)\n'
 WAIT = "import time; time.sleep(600)\n"
-STARTED = 'open(sys.argv[0].rpartition("-")[0] + "-started", "w").close()\n'
+_STARTED = '"/tmp/" + sys.argv[0].rpartition("-")[0].replace("/", "_") + "-started"'
+STARTED = f'open({_STARTED}, "w").close()\n'
 """What an application does first, so that others, by AFTER_START or BEGUN, go on only when the test has begun."""
-AFTER_START = """
-while not os.path.exists(sys.argv[0].rpartition("-")[0] + "-started"):
+AFTER_START = f"""
+while not os.path.exists({_STARTED}):
     time.sleep(0.02)
 """
 BEGUN = AFTER_START + "time.sleep(1)\n"
@@ -124,7 +125,7 @@ class Bench:
             tag="sil",
             sandbox_image="x",
             services=services,
-            application=Application(".", (app,)),
+            application=Application("..", (app,)),
         )
 
     def jobs(self, *plans: Plan) -> list[Job]:

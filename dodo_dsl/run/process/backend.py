@@ -12,11 +12,12 @@ from dodo_dsl.run.announce import begin_frame
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes
+from dodo_dsl.run.process.confined.confinement import confinement
 from dodo_dsl.run.process.environment import EnvironmentProblem
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Slot
-from dodo_dsl.run.protocol import Event, Exited, Lost, Unstartable
+from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
@@ -29,13 +30,23 @@ class ProcessBackend:
     name = "process"
 
     def __init__(
-        self, plan: Plan, folder: Path, report: Path, isolation: str, slot: Slot, fork_server: ForkServer | None = None
+        self,
+        plan: Plan,
+        folder: Path,
+        report: Path,
+        isolation: str,
+        slot: Slot,
+        fork_server: ForkServer | None = None,
+        is_apart: bool = True,
     ) -> None:
+        """``is_apart`` tells that on the host, too, the application gets a process namespace of its own."""
         self.plan = plan
         self.report = report
         self.isolation = isolation
+        self.is_apart = is_apart
         self.slot = slot
         self.cid = slot.cid
+        self._folder = folder
         self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._outputs: dict[str, ServiceOutput] = {}
@@ -59,16 +70,23 @@ class ProcessBackend:
             if self._asked is not None and not self._asked.done():
                 self._asked.set_result(snapshot.from_json(message["load"]))
         elif "exited" in message:
-            task = asyncio.ensure_future(self._exited(message["exited"], message["code"]))
+            task = asyncio.ensure_future(self._exited(**message))
             task.add_done_callback(lambda t: t.exception())
 
-    async def _exited(self, name: str, code: int) -> None:
+    async def _exited(self, exited: str, code: int, used: int, failed: bool) -> None:
         """Reports an exit after the last output has been read, so that no verdict follows it."""
-        output = self._outputs.get(name)
+        output = self._outputs.get(exited)
         if output is not None:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
                 await asyncio.wait_for(output.done.wait(), 1.0)
-        self._events.put_nowait(Exited(name, code))
+        if failed:
+            self._events.put_nowait(Unstartable(exited, " ".join(self.tail(exited)[-1:]) or "it has no sandbox"))
+            return
+        if used:
+            most = self.plan.application.limits.memory
+            text = f"application service '{exited}' used {used / 1e6:,.0f} MB of memory, at most {most / 1e6:,.0f}"
+            self._events.put_nowait(Noted(f"{text} (sandbox: memory in dodo.yml)"))
+        self._events.put_nowait(Exited(exited, code, out_of_memory=used > 0))
 
     async def start(self, layer: str) -> dict[str, bool]:
         commands = []
@@ -97,12 +115,21 @@ class ProcessBackend:
         self._outputs[command.name] = output
         self._pids[command.name] = asyncio.get_running_loop().create_future()
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module}
-        message = {"do": "start", "id": command.name, **words}
+        message = {"do": "start", "id": command.name, "confined": self._confined(command), **words}
         try:
             self._sandbox.send({**message, "env": changes(os.environ, command.environment)}, (output.writer,))
         except ValueError as error:
             self._events.put_nowait(Unstartable(command.name, str(error)))
         output.release_writer()
+
+    def _confined(self, command: Command) -> dict[str, Any] | None:
+        """How an application's process is kept apart; None for DoDo's own services."""
+        if command.layer != "application" or (self.isolation == "host" and not self.is_apart):
+            return None
+        application, outputs = self.plan.application, (self._folder, self.report)
+        return confinement(
+            command.folder, self.isolation, self.cid, application.limits, application.hidden, outputs
+        ).to_json()
 
     async def next_event(self) -> Event:
         return await self._events.get()

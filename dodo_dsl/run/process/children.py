@@ -7,9 +7,14 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl.run.process import namespaces
+from dodo_dsl.run.process.confined import memory_watch
+from dodo_dsl.run.process.confined.confined_process import ConfinedProcess
+from dodo_dsl.run.process.confined.confinement import Confinement
+from dodo_dsl.run.process.confined.places import Places
 from dodo_dsl.run.process.forked_process import ForkedModule
 
 GRACE_S = 3.0
@@ -17,12 +22,28 @@ _POLL_S = 0.05
 _KILL_TRIES, _KILL_S = 100, 0.01
 
 
-class Children:
-    """Children of this process by name; ``on_exit`` is called with the name and exit code of each that ended."""
+Child = subprocess.Popen[bytes] | ForkedModule | ConfinedProcess
 
-    def __init__(self, on_exit: Callable[[str, int], None]) -> None:
+
+@dataclass(frozen=True)
+class Ended:
+    """How a child ended: ``code`` below 0 for a signal; ``used`` bytes of memory where that was more than allowed.
+
+    ``failed`` tells that it never began, as its sandbox could not be set up.
+    """
+
+    code: int
+    used: int = 0
+    failed: bool = False
+
+
+class Children:
+    """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how."""
+
+    def __init__(self, on_exit: Callable[[str, Ended], None]) -> None:
         self._on_exit = on_exit
-        self._running: dict[str, subprocess.Popen[bytes] | ForkedModule] = {}
+        self._running: dict[str, Child] = {}
+        self._used: dict[str, int] = {}
         self.names: dict[int, str] = {}
         """All that were ever started, by process id."""
 
@@ -44,7 +65,33 @@ class Children:
         )
         return self._add(name, child)
 
-    def _add(self, name: str, child: "subprocess.Popen[bytes] | ForkedModule") -> int:
+    def confine(
+        self,
+        name: str,
+        words: Sequence[str],
+        environment: dict[str, str],
+        output: int,
+        confined: Confinement,
+        places: Places | None,
+    ) -> int:
+        """Starts a program of the application; raises as ``start``, and NoSeccomp."""
+        return self._add(name, ConfinedProcess(words, environment, output, confined, places))
+
+    @property
+    def are_watched(self) -> bool:
+        """Whether any has a limit of memory."""
+        return any(isinstance(child, ConfinedProcess) for child in self._running.values())
+
+    def watch_memory(self) -> None:
+        """Ends those that use more memory than they may."""
+        limits = {c.pid: (name, c.memory) for name, c in self._running.items() if isinstance(c, ConfinedProcess)}
+        for pid, size in memory_watch.used(limits, dict(_parents())).items():
+            name, most = limits[pid]
+            if size > most and name not in self._used:
+                self._used[name] = size
+                os.kill(pid, signal.SIGKILL)
+
+    def _add(self, name: str, child: Child) -> int:
         self._running[name] = child
         self.names[child.pid] = name
         return child.pid
@@ -58,7 +105,10 @@ class Children:
                 if name is None:
                     os.waitpid(info.si_pid, 0)
                 else:
-                    self._on_exit(name, self._running.pop(name).wait())
+                    child = self._running.pop(name)
+                    code = child.wait()
+                    failed = isinstance(child, ConfinedProcess) and child.failed
+                    self._on_exit(name, Ended(code, self._used.pop(name, 0), failed))
 
     def end_all(self, owns_namespace: bool, wait: Callable[[float], None]) -> None:
         """SIGTERM to the children, GRACE_S to comply, then SIGKILL to all descendants.
@@ -67,8 +117,9 @@ class Children:
         ``wait`` returns after some seconds, or sooner when a child has ended.
         """
         for child in self._running.values():
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(child.pid, signal.SIGTERM)
+            for pid in _within(child.pid) if isinstance(child, ConfinedProcess) else (-child.pid,):
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGTERM)
         deadline = time.monotonic() + GRACE_S
         while self._running and time.monotonic() < deadline:
             wait(_POLL_S)
@@ -82,6 +133,17 @@ class Children:
                     os.kill(pid, signal.SIGKILL)
             time.sleep(_KILL_S)
             self.reap()
+
+
+def _within(bubblewrap: int) -> Iterator[int]:
+    """The processes in a sandbox, without bubblewrap's own two: its first process, and the one that it watches."""
+    parents = dict(_parents())
+    for pid in parents:
+        line = [pid]
+        while line[-1] in parents and line[-1] != bubblewrap:
+            line.append(parents[line[-1]])
+        if line[-1] == bubblewrap and len(line) > 2:
+            yield pid
 
 
 def _descendants(owns_namespace: bool) -> Iterator[int]:

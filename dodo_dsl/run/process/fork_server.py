@@ -30,6 +30,7 @@ LOADED = (
     "shapely",
     "scipy.optimize",
     "trimesh",
+    "pyseccomp",
 )
 """What services import; modules that are not installed are skipped."""
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import os
 import secrets
 import socket
@@ -14,7 +15,9 @@ from pathlib import Path
 from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
+from dodo_dsl.run.process.confined.bubblewrap import PROGRAM
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
+from dodo_dsl.run.process.sandbox import MAX_MESSAGE
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 
@@ -22,19 +25,30 @@ PROBE_S = 0.3
 
 
 def namespaces_refusal() -> str:
-    """Why tests cannot have namespaces of their own on this machine; empty when they can."""
+    """Why tests and applications cannot have namespaces of their own on this machine; empty when they can."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
         argv = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(theirs.fileno()), "network"]
         environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
         process = subprocess.Popen(argv, pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL, env=environment)
         theirs.close()
-        answer = ours.recv(4096)
+        answer = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
+        if "up" in answer:
+            ours.send(b'{"do": "probe"}')
+            answer = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
         ours.close()
         process.wait()
-    if b'"up"' in answer:
-        return ""
-    return answer.decode().partition('"down": "')[2].rstrip('"}') or "the kernel refuses them"
+    return str(answer.get("probe", answer.get("down", "the kernel refuses them")))
+
+
+def process_namespace_refusal() -> str:
+    """Why an application on the host cannot have a process namespace of its own; empty when it can."""
+    words = [PROGRAM, "--unshare-pid", "--dev-bind", "/", "/", "--proc", "/proc", "--", "true"]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=10)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    return "" if done.returncode == 0 else done.stderr.strip() or f"exit code {done.returncode}"
 
 
 def runs_alone(plan: Plan) -> bool:

@@ -73,6 +73,22 @@ def furnish() -> None:
     _multicast_route()
 
 
+def mount_tmpfs(folder: Path, options: str) -> None:
+    """An empty file system in memory at a folder; raises OSError."""
+    _call("mount", b"tmpfs", bytes(folder), b"tmpfs", _MS_NOSUID | _MS_NODEV, options.encode())
+
+
+def bind(source: Path, target: Path, *, deep: bool) -> None:
+    """Shows a folder at another place, ``deep`` with what is mounted in it; raises OSError."""
+    _call("mount", bytes(source), bytes(target), None, _MS_BIND | (_MS_REC if deep else 0), None)
+
+
+def overlay(lower: Path, upper: Path, work: Path, target: Path) -> None:
+    """Shows ``lower`` at ``target``, where what is written goes to ``upper``; raises OSError."""
+    options = f"lowerdir={lower},upperdir={upper},workdir={work}"
+    _call("mount", b"overlay", bytes(target), b"overlay", _MS_NOSUID | _MS_NODEV, options.encode())
+
+
 def _private_tmp() -> None:
     """An empty ``/tmp`` with the old one's folders, but not its files: those may be another test's tokens."""
     old = os.open(_TMP, os.O_PATH | os.O_DIRECTORY)

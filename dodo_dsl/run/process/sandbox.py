@@ -6,11 +6,13 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
 
     runner to sandbox   {"do": "start", "id", "argv", "env", "cwd", "fork"} with the output's descriptor,
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
-                        is a Python module for which a fork of the sandbox will do; {"do": "close"};
+                        is a Python module for which a fork of the sandbox will do, "confined" the
+                        application's confinement or null; {"do": "close"}; {"do": "probe"};
                         {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs;
                         {"do": "load"}
     sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or {"unstartable": id, "why"};
-                        {"exited": id, "code"}; {"load": snapshot or null}
+                        {"exited": id, "code", "used", "failed"}; {"load": snapshot or null};
+                        {"probe": why an application cannot be confined, or ""}
 """
 
 import contextlib
@@ -21,6 +23,10 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +35,11 @@ from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
+from dodo_dsl.run.process.confined.confined_process import ConfinedProcess, user_of
+from dodo_dsl.run.process.confined.confinement import Confinement
+from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
+from dodo_dsl.run.process.confined.places import Places
+from dodo_dsl.run.process.confined.seccomp_filter import NoSeccomp
 
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
@@ -42,7 +53,8 @@ class Sandbox:
         self.channel = channel
         self.isolation = isolation
         self.forks = forks
-        self.children = Children(lambda name, code: self.send(exited=name, code=code))
+        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)))
+        self.places: Places | None = None
         self.times = ThreadTimes()
         self.keep = False
         self.ended = False
@@ -67,8 +79,13 @@ class Sandbox:
     def run(self) -> None:
         """Serves the runner until it closes the channel, then ends every process."""
         sources: list[socket.socket | int] = [self.channel, self.wakeup]
+        watched_s = 0.0
         while not self.ended:
-            readable, _, _ = select.select([*sources, *self.pumps], [], [])
+            patience = PERIOD_S if self.children.are_watched else None
+            readable, _, _ = select.select([*sources, *self.pumps], [], [], patience)
+            if patience is not None and time.monotonic() >= watched_s + PERIOD_S:
+                self.children.watch_memory()
+                watched_s = time.monotonic()
             if self.wakeup in readable:
                 self._drain_wakeup()
             self.children.reap()
@@ -110,10 +127,38 @@ class Sandbox:
         environment = {k: v for k, v in {**os.environ, **command["env"]}.items() if v is not None}
         start = self.children.fork if self.forks and command["fork"] else self.children.start
         try:
-            self.send(started=name, pid=start(name, words, environment, command["cwd"], output))
-        except (OSError, subprocess.SubprocessError, ValueError) as error:
+            if command["confined"] is not None:
+                pid = self._confine(name, words, environment, output, Confinement.from_json(command["confined"]))
+            else:
+                pid = start(name, words, environment, command["cwd"], output)
+            self.send(started=name, pid=pid)
+        except (OSError, subprocess.SubprocessError, ValueError, NoSeccomp) as error:
             why = getattr(error, "strerror", None) or str(error)
             self.send(unstartable=name, why=f"{getattr(error, 'filename', None) or words[0]}: {why}")
+
+    def _confine(
+        self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
+    ) -> int:
+        if confined.isolation == "network" and self.places is None:
+            self.places = Places(user_of(confined.folder, confined.cid))
+        return self.children.confine(name, words, environment, output, confined, self.places)
+
+    def _do_probe(self, _descriptors: list[int]) -> None:
+        """Confines a program that does nothing."""
+        with tempfile.TemporaryFile() as output:
+            try:
+                places = Places(user_of("/usr", 0))
+                environment = {"PATH": os.defpath}
+                true = ConfinedProcess(
+                    ["true"], environment, output.fileno(), Confinement("/usr", "network", 0), places
+                )
+                code = true.wait()
+            except (OSError, subprocess.SubprocessError, NoSeccomp) as error:
+                self.send(probe=str(error))
+                return
+            output.seek(0)
+            told = output.read(1000).decode(errors="replace").strip()
+            self.send(probe="" if code == 0 else told or f"exit code {code}")
 
     def _do_send(self, _descriptors: list[int], cid: int, data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):

@@ -1,0 +1,102 @@
+"""A program of the application in its own sandbox, with the interface of subprocess.Popen that ``Children`` uses."""
+
+import errno
+import functools
+import json
+import os
+import resource
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from dodo_dsl.run.process import namespaces
+from dodo_dsl.run.process.confined import bubblewrap, seccomp_filter
+from dodo_dsl.run.process.confined.confinement import FIRST_USER, Confinement
+from dodo_dsl.run.process.confined.places import Places
+from dodo_dsl.spec.sandbox import SandboxLimits
+
+_SIGNALLED = range(129, 129 + 64)
+"""Exit codes by which bubblewrap tells the signal that ended the program."""
+
+
+def user_of(folder: str, cid: int) -> int | None:
+    """Who the application is where DoDo is root: its folder's owner, else a user of its own; None without root."""
+    if os.getuid() != 0:
+        return None
+    owner = Path(folder).stat().st_uid
+    return owner or FIRST_USER + cid
+
+
+class ConfinedProcess:
+    """``pid`` is that of bubblewrap, which ends with the program and gives its exit code."""
+
+    def __init__(
+        self,
+        words: Sequence[str],
+        environment: Mapping[str, str],
+        output: int,
+        confined: Confinement,
+        places: Places | None,
+    ) -> None:
+        """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
+        program = _found(words[0], environment, confined.folder)
+        user = user_of(confined.folder, confined.cid) if places else None
+        mounts = bubblewrap.Mounts(places.written(confined.folder), places.home, places.tmp) if places else None
+        self._status, status = os.pipe()
+        filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)
+        try:
+            self._process = subprocess.Popen(
+                [*bubblewrap.words(confined, mounts, program, user, filter_fd, status), *words],
+                env=dict(environment),
+                cwd=confined.folder,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                start_new_session=True,
+                pass_fds=(filter_fd, status),
+                preexec_fn=functools.partial(_limit, confined.limits, os.getpid()),  # noqa: PLW1509  (it has one thread)
+            )
+        except BaseException:
+            os.close(self._status)
+            raise
+        finally:
+            os.close(status)
+            os.close(filter_fd)
+        self.pid = self._process.pid
+        self.memory = confined.limits.memory
+        self.failed = False
+        """Whether the sandbox could not be set up; known after ``wait``."""
+
+    def wait(self) -> int:
+        """The program's exit code, below 0 for the signal that ended it."""
+        code = self._process.wait()
+        with os.fdopen(self._status, "rb") as status:
+            told = status.read().decode(errors="replace")
+        self.failed = code > 0 and not any("exit-code" in json.loads(line) for line in told.splitlines())
+        return 128 - code if code in _SIGNALLED else code
+
+
+def _found(name: str, environment: Mapping[str, str], folder: str) -> str:
+    """The path of a program; raises FileNotFoundError and PermissionError as starting it would."""
+    path = Path(folder, name) if "/" in name else None
+    found = shutil.which(path or name, path=environment.get("PATH", os.defpath))
+    if found is None:
+        number = errno.EACCES if path and path.exists() else errno.ENOENT
+        raise OSError(number, os.strerror(number), name)
+    return str(Path(folder, found))
+
+
+def _limit(limits: SandboxLimits, parent: int) -> None:
+    """Between fork and exec."""
+    namespaces.end_with(parent)
+    for kind, most in (
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_NPROC, limits.processes),
+        (resource.RLIMIT_NOFILE, limits.files),
+        (resource.RLIMIT_FSIZE, limits.file_size),
+        (resource.RLIMIT_DATA, 2 * limits.memory),  # what memory_watch would see too late
+    ):
+        _, hard = resource.getrlimit(kind)
+        allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(kind, (allowed, allowed))

@@ -1,0 +1,55 @@
+"""What a service of the application sees and may use, as the runner tells its sandbox."""
+
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.spec.sandbox import SandboxLimits
+
+_PACKAGE = Path(__file__).resolve().parents[3]
+FIRST_USER = 64_000
+"""A test's application has this user plus its CID where DoDo runs as root and its folder belongs to root."""
+
+
+@dataclass(frozen=True)
+class Confinement:
+    """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
+
+    With ``isolation`` ``host`` it has only processes of its own, and sees what DoDo sees. ``cid`` tells users apart.
+    """
+
+    folder: str
+    isolation: str
+    cid: int
+    reads: tuple[str, ...] = ()
+    hidden: tuple[str, ...] = ()
+    limits: SandboxLimits = field(default_factory=SandboxLimits)
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, raw: Mapping[str, Any]) -> "Confinement":
+        lists = {name: tuple(raw[name]) for name in ("reads", "hidden")}
+        limits = SandboxLimits(**{**raw["limits"], "reads": tuple(raw["limits"]["reads"])})
+        return cls(**{**raw, **lists, "limits": limits})
+
+
+def confinement(
+    folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[str], outputs: Iterable[Path]
+) -> Confinement:
+    """The confinement of an application; ``hidden`` are folders below its own, ``outputs`` those that DoDo writes."""
+    reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
+    inside = [
+        *(folder / path for path in hidden),
+        *(path for own in outputs if (path := _below(own.resolve(), folder))),
+    ]
+    python = [sys.prefix, sys.base_prefix, str(_PACKAGE)]
+    return Confinement(str(folder), isolation, cid, (*dict.fromkeys([*python, *reads]),), (*map(str, inside),), limits)
+
+
+def _below(path: Path, folder: Path) -> Path | None:
+    """The folder to hide for an output: the one that holds it, if that is still below the application's."""
+    return next((p for p in (path.parent, path) if p != folder and p.is_relative_to(folder)), None)
