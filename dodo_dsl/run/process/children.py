@@ -84,10 +84,11 @@ class Children:
 
     def watch_memory(self) -> None:
         """Ends those that use more memory than they may."""
-        limits = {c.pid: (name, c.memory) for name, c in self._running.items() if isinstance(c, ConfinedProcess)}
-        for pid, size in memory_watch.used(limits, dict(_parents())).items():
-            name, most = limits[pid]
-            if size > most and name not in self._used:
+        confined = {c.pid: (name, c.memory) for name, c in self._running.items() if isinstance(c, ConfinedProcess)}
+        limits = {pid: most for pid, (_, most) in confined.items()}
+        for pid, size in memory_watch.above(limits, dict(_parents())).items():
+            name, _ = confined[pid]
+            if name not in self._used:
                 self._used[name] = size
                 os.kill(pid, signal.SIGKILL)
 

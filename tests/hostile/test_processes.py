@@ -1,0 +1,82 @@
+"""What an application on processes tries on the machine does not get through: as root, and as an ordinary user."""
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
+from tests.hostile import attacks
+from tests.run.desk import ROOT
+
+pytestmark = pytest.mark.slow
+USER = 12_345
+OF_PLACES = ("repository", "results", "tests-in-its-folder", "state", "neighbour", "compiled")
+NAMES = sorted({*attacks.ATTACKS, *(f"{verb}-{place}" for place in OF_PLACES for verb in ("read", "write"))})
+
+
+def words_as_user(folder: Path) -> list[str]:
+    """What runs a program as an ordinary user, who sees the interpreter and the sources even below ``/root``."""
+    shown = [str(path) for path in dict.fromkeys((ROOT, Path(sys.prefix), Path(sys.base_prefix)))]
+    below = [path for path in shown if path.startswith("/root/")]
+    parents = sorted({str(p) for path in below for p in Path(path).parents if str(p).startswith("/root/")})
+    mounts = ["--perms", "0755", "--tmpfs", "/root"] if below else []
+    mounts += [word for path in parents for word in ("--perms", "0755", "--dir", path)]
+    mounts += [word for path in below for word in ("--ro-bind", path, path)]
+    os.chown(folder, USER, USER)
+    user = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups", "--bounding-set=-all", "--inh-caps=-all"]
+    kept = ["--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", "--cap-add", "CAP_SETPCAP"]
+    return ["bwrap", "--dev-bind", "/", "/", *mounts, *kept, "--", *user, "--"]
+
+
+@pytest.fixture(scope="module", params=["root", "user"])
+def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
+    """What became of the attacks of one run."""
+    if why := namespaces_refusal():
+        pytest.skip(f"no namespaces here: {why}")
+    if (os.getuid() == 0) != (request.param == "root") and os.getuid() != 0:
+        pytest.skip("these tests are not run by root")
+    with tempfile.TemporaryDirectory(prefix="dodo-hostile-") as name, socket.socket(socket.AF_UNIX) as listener:
+        folder = Path(name)
+        secret = Path(tempfile.gettempdir(), "dodo-test-secret")
+        secret.write_text("of another test")
+        listener.bind("\0dodo-test-abstract")
+        listener.listen()
+        (folder / "state").mkdir(mode=0o777)
+        (folder / "neighbour").write_text("a recording")
+        places = {
+            "repository": str(ROOT / "tests_registry"),
+            "state": str(folder / "state"),
+            "neighbour": str(folder / "neighbour"),
+            "compiled": str(folder / "compiled"),
+        }
+        as_user = words_as_user(folder) if os.getuid() == 0 and request.param == "user" else []
+        words = [*as_user, sys.executable, "-m", "tests.hostile.run_attacks", name]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(folder / "state"), "HOME": name}
+        done = subprocess.run(
+            words, input=json.dumps(places), capture_output=True, text=True, check=False, cwd=ROOT, env=environment
+        )
+        secret.unlink()
+        assert done.returncode == 0, done.stdout + done.stderr
+        yield json.loads(done.stdout.splitlines()[-1])
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+
+
+def test_the_test_itself_goes_on(told: dict[str, Any]) -> None:
+    assert (told["outcome"], told["reason"]) == ("passed", "it drove")
+    assert told["kept"] == ["as it was", "[]"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_does_not_get_through(told: dict[str, Any], name: str) -> None:
+    (row,) = [row for row in told["attacks"] if row["attack"] == name]
+    assert not row["through"], row["how"]
