@@ -32,7 +32,8 @@ class Desk:
     def compiled(self, plan: Plan) -> Path:
         target = self.folder / "generated" / plan.slug
         target.mkdir(parents=True, exist_ok=True)
-        (target / "test.json").write_text(to_json(replace(plan, cid=self._cids[0])))
+        application = replace(plan.application, folder="../..")
+        (target / "test.json").write_text(to_json(replace(plan, cid=self._cids[0], application=application)))
         return target
 
     def start(self, plan: Plan, *flags: str, report: str = "report") -> "subprocess.Popen[str]":

@@ -23,10 +23,12 @@ def namespaces() -> Iterator[Capability]:
     """Whether tests can have namespaces of their own."""
     refusal = host_isolation.namespaces_refusal()
     if refusal:
-        advice = "tests run on the host with leases; for isolation allow user namespaces or run as root"
-        yield Capability("namespaces", "warning", f"the kernel refuses them: {refusal}", advice)
+        advice = "sudo apt install bubblewrap; allow user namespaces; or, for applications you trust, --isolation host"
+        yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal}", advice)
     else:
-        yield Capability("namespaces", "ok", "each test of the process backend gets a network, IPC and /tmp of its own")
+        yield Capability(
+            "namespaces", "ok", "each test gets a network, IPC and /tmp of its own, its application a sandbox"
+        )
 
 
 def multicast() -> Iterator[Capability]:

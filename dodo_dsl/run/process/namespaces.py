@@ -6,6 +6,7 @@ in ``/tmp`` stay visible, so that programs and specs kept there still run.
 
 import contextlib
 import ctypes
+import errno
 import os
 import signal
 import socket
@@ -19,6 +20,10 @@ _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _SIOCSIFFLAGS, _IFF_UP, _IFF_RUNNING = 0x8914, 1, 64
 _RTM_NEWROUTE, _NLM_F_REQUEST, _NLM_F_ACK, _NLM_F_CREATE = 24, 1, 4, 0x400
 _RTA_DST, _RTA_OIF, _RTA_PREFSRC = 1, 4, 7
+_OPEN_TREE, _MOVE_MOUNT, _MOUNT_SETATTR = 428, 429, 442
+"""System calls that have the same number on every processor."""
+_AT_FDCWD, _AT_EMPTY_PATH, _AT_RECURSIVE = -100, 0x1000, 0x8000
+_OPEN_TREE_CLONE, _MOVE_MOUNT_F_EMPTY_PATH, _MOUNT_ATTR_IDMAP = 1, 4, 0x00100000
 _TMP = Path("/tmp")
 _TMP_SIZE = "size=1g,mode=1777"
 
@@ -29,6 +34,13 @@ def _call(name: str, *arguments: object) -> None:
     if getattr(_libc, name)(*arguments) != 0:
         number = ctypes.get_errno()
         raise OSError(number, f"{name}: {os.strerror(number)}")
+
+
+def _syscall(number: int, *arguments: int | bytes) -> int:
+    result = _libc.syscall(*(ctypes.c_long(a) if isinstance(a, int) else a for a in (number, *arguments)))
+    if result < 0:
+        raise OSError(ctypes.get_errno(), f"system call {number}: {os.strerror(ctypes.get_errno())}")
+    return int(result)
 
 
 def die_with_parent(signal_number: int) -> None:
@@ -81,6 +93,45 @@ def mount_tmpfs(folder: Path, options: str) -> None:
 def bind(source: Path, target: Path, *, deep: bool) -> None:
     """Shows a folder at another place, ``deep`` with what is mounted in it; raises OSError."""
     _call("mount", bytes(source), bytes(target), None, _MS_BIND | (_MS_REC if deep else 0), None)
+
+
+def bind_as(source: Path, target: Path, user: int) -> None:
+    """Shows a folder at another place, where what belongs to root belongs to ``user`` and the other way round.
+
+    By an ID-mapped mount (mount_setattr(2)); raises OSError where the kernel or the file system has none.
+    """
+    users = _user_namespace(f"0 {user} 1\n1 1 {user - 1}\n{user} 0 1\n")
+    try:
+        tree = _syscall(_OPEN_TREE, _AT_FDCWD, bytes(source), _OPEN_TREE_CLONE | _AT_RECURSIVE | os.O_CLOEXEC)
+        attributes = struct.pack("QQQQ", _MOUNT_ATTR_IDMAP, 0, 0, users)
+        _syscall(_MOUNT_SETATTR, tree, b"", _AT_EMPTY_PATH, attributes, len(attributes))
+        _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(target), _MOVE_MOUNT_F_EMPTY_PATH)
+        os.close(tree)
+    finally:
+        os.close(users)
+
+
+def _user_namespace(mapping: str) -> int:
+    """A descriptor of a user namespace with a mapping of users and groups; raises OSError."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        with contextlib.suppress(OSError):
+            _call("unshare", _CLONE_NEWUSER)
+            os.write(writer, b"x")
+            signal.pause()
+        os._exit(1)
+    os.close(writer)
+    try:
+        if not os.read(reader, 1):
+            raise OSError(errno.EPERM, "the kernel refuses user namespaces")
+        for kind in ("uid_map", "gid_map"):
+            Path(f"/proc/{child}/{kind}").write_text(mapping)
+        return os.open(f"/proc/{child}/ns/user", os.O_RDONLY | os.O_CLOEXEC)
+    finally:
+        os.close(reader)
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
 
 
 def overlay(lower: Path, upper: Path, work: Path, target: Path) -> None:

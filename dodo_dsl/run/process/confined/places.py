@@ -1,5 +1,6 @@
 """What a sandbox prepares once for the application: its view of ``/tmp``, a home, and its folder with writes apart."""
 
+import contextlib
 import os
 import tempfile
 from pathlib import Path
@@ -29,6 +30,14 @@ class Places:
             os.chown(path, self._user, self._user)
         return path
 
+    def _show(self, source: Path, target: Path) -> None:
+        """The folder as it is or, where it is root's, as the application's own."""
+        if self._user is not None and source.stat().st_uid == 0:
+            with contextlib.suppress(OSError):
+                namespaces.bind_as(source, target, self._user)
+                return
+        namespaces.bind(source, target, deep=True)
+
     def written(self, folder: str) -> Path | None:
         """A copy of a folder on write, the same for all services; None where the kernel cannot mount one."""
         if folder not in self._written:
@@ -37,7 +46,7 @@ class Places:
             upper, work = self._own(f"{name}/upper"), self._own(f"{name}/work")
             for path in (lower, merged):
                 path.mkdir()
-            namespaces.bind(Path(folder), lower, deep=True)  # whose name needs no escapes
+            self._show(Path(folder), lower)  # whose name needs no escapes
             try:
                 namespaces.overlay(lower, upper, work, merged)
             except OSError:

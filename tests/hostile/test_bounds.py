@@ -1,0 +1,72 @@
+"""An application that takes too much, or stays: it fails, and nothing of it is left."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run.process.host_isolation import namespaces_refusal
+from dodo_dsl.spec.sandbox import SandboxLimits
+from tests.run.desk import gone, processes_with
+from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
+
+pytestmark = pytest.mark.slow
+TAKES = "held = []\nwhile True:\n    held.append(b'x' * 10_000_000)\n    time.sleep(0.02)\n"
+CHILD_TAKES = f"if os.fork() == 0:\n    exec({TAKES!r})\nos.wait()\n" + WAIT
+STAYS = """
+if os.fork() == 0:
+    os.setsid()
+    if os.fork() == 0:
+        os.execve(sys.executable, [sys.executable, "-c", "import time; time.sleep(600)", "MARK"], {})
+    os._exit(0)
+os.wait()
+"""
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    if why := namespaces_refusal():
+        pytest.skip(f"no namespaces here: {why}")
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    return Bench(tmp_path, "network")
+
+
+@pytest.mark.parametrize("application", [TAKES, CHILD_TAKES], ids=["itself", "child"])
+def test_memory_without_end(bench: Bench, application: str) -> None:
+    plan = bench.plan(judge=READY + WAIT, application=application, timeout_s=60)
+    limited = replace(plan.application, limits=SandboxLimits(memory=200_000_000))
+    (outcome,) = bench.run(replace(plan, application=limited))
+    assert outcome.outcome == "failed"
+    assert outcome.reason.startswith("application service 'app' ran out of memory")
+    (note,) = [note for note in outcome.notes if "MB of memory, at most 200" in note]
+    assert note.startswith("application service 'app' used ")
+
+
+@pytest.mark.parametrize("isolation", ["network", "host"])
+def test_a_child_that_hides_does_not_outlive_its_test(bench: Bench, isolation: str) -> None:
+    """It has another session, another parent and no environment."""
+    bench.isolation = isolation
+    mark = f"hides-{bench.folder.name}-{isolation}"
+    plan = bench.plan(judge=READY + AFTER_START + PASS, application=STAYS.replace("MARK", mark) + STARTED + WAIT)
+    (outcome,) = bench.run(plan)
+    assert (outcome.outcome, outcome.reason) == ("passed", "it drove")
+    assert gone(mark, 5.0), processes_with(mark)
+
+
+def test_what_it_writes_goes_with_the_test(bench: Bench) -> None:
+    own = bench.folder / "data.txt"
+    own.write_text("as it was")
+    write = f"open({str(own)!r}, 'a').write('!')\nopen({str(own)!r} + '.new', 'w').close()\n"
+    application = write + f"assert open({str(own)!r}).read() == 'as it was!'\n" + STARTED + WAIT
+    (outcome,) = bench.run(bench.plan(judge=READY + AFTER_START + PASS, application=application))
+    assert outcome.outcome == "passed"
+    assert own.read_text() == "as it was"
+    assert not Path(f"{own}.new").exists()
+
+
+def test_it_has_time_to_end(bench: Bench) -> None:
+    """SIGTERM reaches it through bubblewrap, and what it says then is in its log."""
+    handler = "import signal\nsignal.signal(signal.SIGTERM, lambda *_: (print('landed', flush=True), sys.exit(0)))\n"
+    plan = bench.plan(judge=READY + AFTER_START + PASS, application=handler + STARTED + WAIT)
+    bench.run(plan)
+    assert "landed" in bench.log(plan, "application.app")

@@ -1,0 +1,50 @@
+"""What an application may read, and what of its own folder it does not see."""
+
+import sys
+from pathlib import Path
+
+from dodo_dsl.run.process.confined.bubblewrap import Mounts, words
+from dodo_dsl.run.process.confined.confinement import Confinement, confinement
+from dodo_dsl.spec.sandbox import SandboxLimits
+
+MOUNTS = Mounts(Path("/tmp/x/folder"), Path("/tmp/x/home"), Path("/tmp/x/tmp"))
+
+
+def test_paths_are_relative_to_its_folder_and_the_interpreter_is_there(tmp_path: Path) -> None:
+    limits = SandboxLimits(reads=("../models", "/srv/ros"))
+    reads = confinement(tmp_path / "app", "network", 130, limits, (), ()).reads
+    assert {sys.prefix, sys.base_prefix, str(tmp_path / "models"), "/srv/ros"} <= set(reads)
+
+
+def test_tests_and_outputs_in_its_folder_are_hidden(tmp_path: Path) -> None:
+    outputs = (tmp_path / "generated" / "sil", tmp_path / "report" / "sil", tmp_path.parent / "elsewhere" / "sil")
+    found = confinement(tmp_path, "network", 130, SandboxLimits(), ("tests",), outputs)
+    assert found.hidden == tuple(str(tmp_path / name) for name in ("tests", "generated", "report"))
+
+
+def test_an_output_beside_it_hides_nothing_of_it(tmp_path: Path) -> None:
+    assert confinement(tmp_path, "network", 130, SandboxLimits(), (), (tmp_path,)).hidden == ()
+
+
+def test_it_goes_to_the_sandbox_and_back() -> None:
+    one = Confinement("/app", "network", 130, ("/usr/x",), ("/app/tests",), SandboxLimits(memory=5, reads=("a",)))
+    assert Confinement.from_json(one.to_json()) == one
+
+
+def test_a_program_elsewhere_is_shown_and_its_folder_is_not() -> None:
+    argv = words(Confinement("/app", "network", 130), MOUNTS, "/srv/bin/drive", None, 5, 6)
+    bound = [argv[n + 1] for n, word in enumerate(argv) if word == "--ro-bind-try"]
+    assert "/srv/bin/drive" in bound
+    assert not {"/srv", "/srv/bin", "/", "/home", "/var"} & set(bound)
+
+
+def test_as_root_another_user_starts_it() -> None:
+    argv = words(Confinement("/app", "network", 130), MOUNTS, "/usr/bin/true", 64_130, 5, 6)
+    assert argv[argv.index("setpriv") + 1 :][:2] == ["--reuid=64130", "--regid=64130"]
+    assert argv.index("setpriv") > argv.index("ALL")
+
+
+def test_on_the_host_it_sees_what_dodo_sees_in_a_process_namespace() -> None:
+    argv = words(Confinement("/app", "host", 130), None, "/usr/bin/true", None, 5, 6)
+    assert "--unshare-pid" in argv
+    assert argv[argv.index("--dev-bind") :][:3] == ["--dev-bind", "/", "/"]

@@ -1,0 +1,40 @@
+"""The key ``sandbox`` of ``dodo.yml``."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.spec.deployment import load_deployment
+from dodo_dsl.spec.sandbox import SandboxLimits
+
+
+def deployed(folder: Path, text: str) -> tuple[SandboxLimits, list[str]]:
+    path = folder / "dodo.yml"
+    path.write_text(f"dodo: 1\n{text}")
+    found, problems = load_deployment(path)
+    return found.sandbox, [f"{p.span.line}: {p.message}" for p in problems]
+
+
+def test_without_it_the_defaults_hold(tmp_path: Path) -> None:
+    assert deployed(tmp_path, "") == (SandboxLimits(), [])
+
+
+def test_all_that_can_be_said(tmp_path: Path) -> None:
+    text = "sandbox: {memory: 4 GB, processes: 20, files: 100, file-size: 1.5 MB, read: [~/models, /srv]}\n"
+    limits = SandboxLimits(4 * 10**9, 20, 100, 1_500_000, ("~/models", "/srv"))
+    assert deployed(tmp_path, text) == (limits, [])
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("memory: 4", "'4' has no unit, expected a size in B"),
+        ("memory: 4 s", "'4 s' is a time, expected a size in B"),
+        ("processes: 1", "1"),
+        ("reads: [x]", "reads"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, told: str) -> None:
+    limits, (problem,) = deployed(tmp_path, f"sandbox:\n  {text}\n")
+    assert problem.startswith("3: ") and told in problem
+    assert limits == SandboxLimits()
