@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.rig import EMULATED_FILE, Rig
+from dodo_dsl.spec.sandbox import SandboxLimits
 from dodo_dsl.spec.settings import Settings
 from dodo_dsl.spec.values import Value
 
@@ -56,7 +58,7 @@ def build(
     ) -> Application:
         kept = {"hil": hardware, "privileged_allowed": privileged}
         planned = plan_application(application, cid, isolated, out / "test", evaluators, **kept)
-        return replace(planned, limits=deployment.sandbox, hidden=_hidden(application, deployment))
+        return replace(planned, limits=_limits(application, deployment), hidden=_hidden(application, deployment))
 
     builders = [
         _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten)
@@ -66,6 +68,17 @@ def build(
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
     return Compiled(Suite(plans, deployment.gates), files), problems
+
+
+def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:
+    """The deployment's limits, with what may be read relative to the application's folder."""
+    limits, base = deployment.sandbox, application.folder.resolve()
+    root = deployment.root.resolve()
+    reads = [
+        path if path.startswith(("/", "~")) else Path(os.path.relpath(root / path, base)).as_posix()
+        for path in limits.reads
+    ]
+    return replace(limits, reads=tuple(reads))
 
 
 def _hidden(application: ApplicationSource, deployment: Deployment) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from tests.faulty.kiwi import Cones, Make, Program, Sent, announcing, framing, s
 
 OWN_CID = 111
 LATER = 30
-LEAK_BYTES, LEAK_FRAMES = 50_000_000, 20
+LEAK_BYTES, LEAK_FRAMES = 50_000_000, 50
 
 
 def stamped(stamp: int) -> Make:
@@ -103,7 +103,7 @@ def sleeping(seconds: float) -> Callable[[], None]:
 
 
 def leaking() -> Callable[[], None]:
-    """50 MB lost in each frame; no more after a GB, as the machine has others to serve."""
+    """50 MB lost in each frame; no more after 2.5 GB, as the machine has others to serve."""
     lost: list[Any] = []
 
     def act() -> None:

@@ -1,5 +1,6 @@
 """What the page says, and what it finds wrong with a matrix."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,8 +53,8 @@ def test_a_problem_is_a_sentence(fault: str, cells: dict[str, Cell], problem: st
     assert any(line.startswith(problem) for line in page.problems({fault: cells}, TESTS))
 
 
-def test_what_is_not_caught_yet_is_no_problem() -> None:
-    assert FAULTS["leaks"].due
+def test_what_is_not_caught_yet_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FAULTS, "leaks", replace(FAULTS["leaks"], due="by a limit to come"))
     assert page.problems({"leaks": ALL_WELL}, TESTS) == []
 
 
