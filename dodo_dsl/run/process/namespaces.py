@@ -95,12 +95,12 @@ def bind(source: Path, target: Path, *, deep: bool) -> None:
     _call("mount", bytes(source), bytes(target), None, _MS_BIND | (_MS_REC if deep else 0), None)
 
 
-def bind_as(source: Path, target: Path, user: int) -> None:
-    """Shows a folder at another place, where what belongs to root belongs to ``user`` and the other way round.
+def bind_as(source: Path, target: Path, owner: int, user: int) -> None:
+    """Shows a folder at another place, where what belongs to ``owner`` belongs to ``user`` and the other way round.
 
     By an ID-mapped mount (mount_setattr(2)); raises OSError where the kernel or the file system has none.
     """
-    users = _user_namespace(f"0 {user} 1\n1 1 {user - 1}\n{user} 0 1\n")
+    users = _user_namespace(_swapped(owner, user))
     try:
         tree = _syscall(_OPEN_TREE, _AT_FDCWD, bytes(source), _OPEN_TREE_CLONE | _AT_RECURSIVE | os.O_CLOEXEC)
         attributes = struct.pack("QQQQ", _MOUNT_ATTR_IDMAP, 0, 0, users)
@@ -109,6 +109,13 @@ def bind_as(source: Path, target: Path, user: int) -> None:
         os.close(tree)
     finally:
         os.close(users)
+
+
+def _swapped(one: int, other: int) -> str:
+    """The mapping of a user namespace that exchanges two users (user_namespaces(7))."""
+    low, high = sorted((one, other))
+    between = [(0, 0, low), (low, high, 1), (low + 1, low + 1, high - low - 1), (high, low, 1)]
+    return "".join(f"{inside} {outside} {count}\n" for inside, outside, count in between if count)
 
 
 def _user_namespace(mapping: str) -> int:

@@ -140,14 +140,14 @@ class Sandbox:
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
         if confined.isolation == "network" and self.places is None:
-            self.places = Places(user_of(confined.folder, confined.cid))
+            self.places = Places(user_of(confined.cid))
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_probe(self, _descriptors: list[int]) -> None:
         """Confines a program that does nothing."""
         with tempfile.TemporaryFile() as output:
             try:
-                places = Places(user_of("/usr", 0))
+                places = Places(user_of(0))
                 environment = {"PATH": os.defpath}
                 true = ConfinedProcess(
                     ["true"], environment, output.fileno(), Confinement("/usr", "network", 0), places

@@ -20,12 +20,9 @@ _SIGNALLED = range(129, 129 + 64)
 """Exit codes by which bubblewrap tells the signal that ended the program."""
 
 
-def user_of(folder: str, cid: int) -> int | None:
-    """Who the application is where DoDo is root: its folder's owner, else a user of its own; None without root."""
-    if os.getuid() != 0:
-        return None
-    owner = Path(folder).stat().st_uid
-    return owner or FIRST_USER + cid
+def user_of(cid: int) -> int | None:
+    """Who the application is where DoDo is root; None without root, when it is the user who runs DoDo."""
+    return FIRST_USER + cid if os.getuid() == 0 else None
 
 
 class ConfinedProcess:
@@ -41,7 +38,7 @@ class ConfinedProcess:
     ) -> None:
         """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
         program = _found(words[0], environment, confined.folder)
-        user = user_of(confined.folder, confined.cid) if places else None
+        user = user_of(confined.cid) if places else None
         mounts = bubblewrap.Mounts(places.written(confined.folder), places.home, places.tmp) if places else None
         self._status, status = os.pipe()
         filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)

@@ -10,7 +10,7 @@ from dodo_dsl.spec.sandbox import SandboxLimits
 
 _PACKAGE = Path(__file__).resolve().parents[3]
 FIRST_USER = 64_000
-"""A test's application has this user plus its CID where DoDo runs as root and its folder belongs to root."""
+"""Where DoDo runs as root, a test's application has this user plus its CID."""
 
 
 @dataclass(frozen=True)

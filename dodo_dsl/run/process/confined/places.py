@@ -31,10 +31,10 @@ class Places:
         return path
 
     def _show(self, source: Path, target: Path) -> None:
-        """The folder as it is or, where it is root's, as the application's own."""
-        if self._user is not None and source.stat().st_uid == 0:
+        """The folder as the application's own where the kernel can do that, else as it is."""
+        if self._user is not None:
             with contextlib.suppress(OSError):
-                namespaces.bind_as(source, target, self._user)
+                namespaces.bind_as(source, target, source.stat().st_uid, self._user)
                 return
         namespaces.bind(source, target, deep=True)
 
