@@ -116,7 +116,7 @@ class _Reader:
 
     def _size(self, at: Numbers) -> tuple[Numbers, Numbers]:
         size, length = varints.read(self._words, at)
-        self.usual &= (length > 0) & (size < _MAX_SIZE)
+        self.usual &= (length > 0) & (size < _MAX_SIZE) & (at + length <= self._ends)
         return np.minimum(size, _MAX_SIZE), np.minimum(at + length, self._ends)
 
     def _slices(self, at: Numbers) -> tuple[list[bytes], Numbers]:

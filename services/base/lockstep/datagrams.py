@@ -52,7 +52,7 @@ class Reassembly:
         """The whole message when this was the last missing part, else None."""
         if number != self.number:
             self.number, self.parts, self.received = number, max(1, parts), {}
-        if part in self.received or part >= self.parts:
+        if part in self.received or not 0 <= part < self.parts:
             return None
         self.received[part] = data
         if len(self.received) < self.parts:

@@ -89,6 +89,15 @@ def test_any_bytes_are_decoded_as_the_codec_does(
     assert good[-1]
 
 
+def test_a_payload_that_ends_before_the_size_of_its_last_field_is_damaged() -> None:
+    standard = MessageSet.standard()
+    layout, data = standard.layout(2905), bytes.fromhex("082710a6011a")  # dodo.RecordedStep, its last field is bytes
+    with pytest.raises(MessageError):
+        standard.decode(2905, data)
+    _, good = columns.decode(layout, data + PADDING, np.array([0]), np.array([len(data)]))
+    assert not good[0]
+
+
 def test_absent_fields_have_their_defaults(messages: MessageSet) -> None:
     (row,), good = decoded(messages, [b"\x18\x05"])
     assert good == [True]

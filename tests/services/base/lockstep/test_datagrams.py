@@ -46,3 +46,9 @@ def test_a_part_beyond_the_last_is_left() -> None:
     assert pieces.take(1, 0, 2, b"a") is None
     assert pieces.take(1, 2, 2, b"c") is None
     assert pieces.take(1, 1, 2, b"b") == b"ab"
+
+
+def test_parts_that_no_message_has_are_not_taken() -> None:
+    pieces = Reassembly()
+    assert [pieces.take(1, part, 2, b"x") for part in (-1, 2, 0)] == [None] * 3
+    assert pieces.take(1, 1, 2, b"y") == b"xy"
