@@ -1,7 +1,10 @@
 """Signals while a service is being built, which may wait for hardware."""
 
 import contextlib
+import os
 import signal
+import stat
+import threading
 from collections.abc import Iterator
 
 
@@ -18,3 +21,15 @@ def interruptible() -> Iterator[None]:
     finally:
         for number, handler in old.items():
             signal.signal(number, handler)
+
+
+def stop_without_master() -> None:
+    """From now on the end of standard input, where it is a pipe, is a SIGTERM: the process that held it has ended."""
+    if stat.S_ISFIFO(os.fstat(0).st_mode):
+        threading.Thread(target=_await_end, daemon=True).start()
+
+
+def _await_end() -> None:
+    while os.read(0, 4096):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)

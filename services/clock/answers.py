@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.numbers import is_whole, whole
 
 MOST_SURPLUS = 100
 """Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
@@ -143,9 +144,9 @@ def filters(names: Iterable[str], ids: Mapping[str, int]) -> tuple[MessageFilter
     found = []
     for text in names:
         name, _, stamp = text.partition("/")
-        if name not in ids or not (stamp.isdecimal() or not stamp):
+        if name not in ids or not (is_whole(stamp) or not stamp):
             raise ValueError(
                 f"'{text}' is not a message, expected a name such as opendlv.proxy.GroundSteeringRequest/0"
             )
-        found.append(MessageFilter(text, ids[name], int(stamp) if stamp else None))
+        found.append(MessageFilter(text, ids[name], whole(stamp) if stamp else None))
     return tuple(found)

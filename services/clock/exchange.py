@@ -10,6 +10,7 @@ from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
+from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.datagrams import STEP, STEP_DONE, EncodedEnvelope, Reassembly, decode, split
 
@@ -149,7 +150,7 @@ class Exchange:
                 done.number, done.part, done.parts, done.frames
             )
             if data is not None:
-                consumes = frozenset(int(word) for word in done.hears.split(",") if word.isdecimal())
+                consumes = frozenset(whole(word) for word in done.hears.split(",") if is_whole(word))
                 facts = (done.memories, done.pictures, done.sampled, done.ended, done.next, consumes)
                 self._results[done.service] = StepResult(done.service, tuple(decode(data)), *facts)
                 del self._pending[done.service]

@@ -10,6 +10,7 @@ from typing import Any
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base.clock import MICROSECONDS
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.lockstep_clock import EPOCH
@@ -81,7 +82,7 @@ class ClockService(Service):
     def _pids(self, begin: Envelope) -> list[int]:
         """The process ids of the application's services; none where the runner gives none."""
         message: Any = self._session.messages.decode(begin.data_type, begin.payload)
-        return [int(word) for word in message.application.split(",") if word.isdecimal() and len(word) < 10]
+        return [whole(word) for word in message.application.split(",") if is_whole(word) and len(word) < 10]
 
     def _over(self) -> bool:
         if time.monotonic() - self._reported > _REPORT_S:

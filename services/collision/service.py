@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
 from services.collision.geometry import VehicleBox, VehiclePose, heading_of
 from services.collision.model import TrackEvaluator
@@ -67,9 +68,9 @@ def _port(text: str, context: Context) -> tuple[str, int | None]:
     """A message and its sender stamp, None for any; raises ValueError for an unknown one."""
     name, _, stamp = text.partition("/")
     context.messages.id(name)
-    if stamp and not stamp.isdecimal():
+    if stamp and not is_whole(stamp):
         raise ValueError(f"--requests: '{text}' has no whole number as its sender stamp")
-    return name, int(stamp) if stamp else None
+    return name, whole(stamp) if stamp else None
 
 
 def track(flags: Flags) -> Track:

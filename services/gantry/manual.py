@@ -1,5 +1,6 @@
 """Manual control of the rig: ``python -m services.gantry.manual --serial=PORT ACTION``, which prints one JSON object.
 
+A pipe as standard input is the sign of life of whoever commands: its end stops the rig, too.
 Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is stopped
 at every exit, unless a fault has stopped it: that is kept to be seen, and ``calibrate`` acknowledges it. Exit codes:
 0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.
@@ -13,10 +14,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TextIO
 
+from dodo_dsl.opendlv.numbers import number
 from services.base import Flags
 from services.base.flags import parse
 from services.base.manifest import load_manifest
-from services.base.signals import interruptible
+from services.base.signals import interruptible, stop_without_master
 from services.gantry import health_check, start
 from services.gantry.emulator import EmulatedRig
 from services.gantry.link import Link, RigError
@@ -59,7 +61,7 @@ def _parsed(argv: Sequence[str]) -> tuple[Flags, str, list[float]]:
     words = [word for word in argv if not word.startswith("--")]
     try:
         flags = parse(manifest, [*(word for word in argv if word.startswith("--")), "--cid=1"])
-        action, numbers = words[0] if words else "", [float(word) for word in words[1:]]
+        action, numbers = words[0] if words else "", [number(word) for word in words[1:]]
     except ValueError as error:
         raise ManualUsageError(str(error)) from None
     if action not in ACTIONS:
@@ -92,6 +94,7 @@ def _goal(action: str, numbers: Sequence[float], limits: MotionLimits) -> Positi
 def _done(flags: Flags, action: str, goal: Position | None, limits: MotionLimits) -> tuple[dict[str, Any], int]:
     patience = flags["patience"]
     with ExitStack() as resources, interruptible():
+        stop_without_master()
         emulated = resources.enter_context(EmulatedRig()) if flags["serial"] == EMULATED else None
         target = checked(emulated.port if emulated else flags["serial"])
         link = Link(target, lambda: SerialPort(target))

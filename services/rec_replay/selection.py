@@ -7,6 +7,7 @@ import numpy as np
 
 from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet, UnknownMessage
 from dodo_dsl.opendlv.messages.varints import Marks, Numbers
+from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.recordings.recording import Recording
 
 IMAGE = 1055
@@ -91,10 +92,10 @@ def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:
 
 def _parsed(text: str, known: MessageSet) -> tuple[int, int | None]:
     name, slash, stamp = text.partition("/")
-    if slash and not stamp.isdecimal():
+    if slash and not is_whole(stamp):
         raise SelectionError(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
     try:
-        id_ = int(name) if name.isdecimal() else known.id(name)
+        id_ = whole(name) if is_whole(name) else known.id(name)
     except UnknownMessage as error:
         raise SelectionError(f"{error} (or give an id)") from None
-    return id_, int(stamp) if slash else None
+    return id_, whole(stamp) if slash else None

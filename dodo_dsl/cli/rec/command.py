@@ -7,6 +7,7 @@ from typing import TextIO
 
 from dodo_dsl.cli.errors import files_of_the_user
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.opendlv.numbers import is_whole, number, whole
 
 EXAMPLES = """examples:
   dodo rec info drive.rec                                         messages, rates, gaps, frames, damage
@@ -47,10 +48,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     export.add_argument("--pictures", choices=("png", "jpg"), default="png", help="file type for --coco (default: png)")
     export.add_argument(
-        "--camera", metavar="N", type=int, help="sender stamp of the camera for --coco, if there are several"
+        "--camera", metavar="N", type=_stamp, help="sender stamp of the camera for --coco, if there are several"
     )
     export.add_argument(
-        "--labels", metavar="N", type=int, help="sender stamp of the detections for --coco (default: all)"
+        "--labels", metavar="N", type=_stamp, help="sender stamp of the detections for --coco (default: all)"
     )
     export.add_argument(
         "--truth", metavar="FILE.json", type=Path, help="truth file with the boxes for --coco, the same for every frame"
@@ -92,9 +93,15 @@ def _selection(action: argparse.ArgumentParser) -> None:
     action.add_argument("--force", action="store_true", help="replace existing files")
 
 
+def _stamp(text: str) -> int:
+    if not is_whole(text):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a sender stamp, expected a whole number")
+    return whole(text)
+
+
 def _seconds(text: str) -> float:
     try:
-        value = float(text.removesuffix("s"))
+        value = number(text.removesuffix("s"))
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or value < 0:

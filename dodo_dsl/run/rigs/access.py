@@ -3,8 +3,9 @@
 import asyncio
 import contextlib
 import json
+import os
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from dodo_dsl.run import leases
@@ -23,13 +24,31 @@ async def query(
 ) -> dict[str, Any]:
     """The JSON object that a rig's program prints; raises RigProblem.
 
-    When the caller is cancelled, the program gets SIGTERM, upon which it stops the rig. ``descriptors`` are those of
-    leases that the program holds, too.
+    When the caller is cancelled, the program gets SIGTERM, upon which it stops the rig; when the caller is killed, its
+    standard input ends, with the same effect. ``descriptors`` are those of leases that the program holds, too.
     """
+    with _sign_of_life() as alive:
+        return await _query(program, words, patience_s, descriptors, alive)
+
+
+@contextlib.contextmanager
+def _sign_of_life() -> Iterator[int]:
+    """The reading end of a pipe that ends with the block, or with this process."""
+    reader, writer = os.pipe()
+    try:
+        yield reader
+    finally:
+        os.close(writer)
+        os.close(reader)
+
+
+async def _query(
+    program: Sequence[str], words: Sequence[str], patience_s: float, descriptors: tuple[int, ...], alive: int
+) -> dict[str, Any]:
     process = await asyncio.create_subprocess_exec(
         *program,
         *words,
-        stdin=asyncio.subprocess.DEVNULL,
+        stdin=alive,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
         env={**base_environment(), "PYTHONPATH": package_path()},
