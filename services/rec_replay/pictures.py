@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import DecodedFrame, VideoDecoder, VideoError, has_key_frame
+from dodo_dsl.opendlv.video.decoder import DecodedFrame, VideoDecoder, VideoError, has_key_frame, refuse_large
 from services.rec_replay.selection import IMAGE
 
 FARTHEST = 3000
@@ -43,10 +43,11 @@ class Decoder:
         self._codec = None
 
     def frame(self, envelope: Envelope) -> DecodedFrame | None:
-        """The picture of a message; raises VideoError for a format that is not known."""
+        """The picture of a message; raises VideoError for a format that is not known, and a size that is too large."""
         image = self._image(envelope)
         frame = None
         if image is not None:
+            refuse_large(image.width, image.height)
             if self._codec is None or image.format != self._format:
                 self._codec, self._format = VideoDecoder(image.format), image.format
             frame = self._codec.decode(image.data)

@@ -5,14 +5,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.video.picture_size import MAX_PIXELS, too_large
+
 CODECS = {"h264": "h264", "H264": "h264", "VP80": "vp8", "VP90": "vp9", "mjpg": "mjpeg", "MJPG": "mjpeg"}
 _START = b"\x00\x00\x01"
 _IDR = 5
+_SHOWN = 40
 _AV_NAMES = {"argb": "bgra", "i420": "yuv420p", "bgr": "bgr24"}
 
 
 class VideoError(ValueError):
     """Frames that cannot be decoded here: an unknown codec, or PyAV is not installed."""
+
+
+def refuse_large(width: int, height: int) -> None:
+    """Raises VideoError for frames of a size that is not decoded."""
+    if problem := too_large(width, height):
+        raise VideoError(f"frames cannot be decoded: {problem}")
 
 
 class DecodedFrame:
@@ -34,15 +43,19 @@ class DecodedFrame:
 class VideoDecoder:
     """Decodes the packets of one camera in their order; raises VideoError for an unknown format.
 
-    Decoding begins at the first key frame; packets before it, and such that are damaged, give no frame.
+    Decoding begins at the first key frame; packets before it, and such that are damaged, give no frame. Nor do those
+    of pictures with more than MAX_PIXELS, whatever a message says of their size: they are not decoded at all.
     """
 
     def __init__(self, format_: str) -> None:
         if format_ not in CODECS:
-            raise VideoError(f"frames of format '{format_}' cannot be decoded, expected one of {', '.join(CODECS)}")
+            raise VideoError(
+                f"frames of format '{format_[:_SHOWN]}' cannot be decoded, expected one of {', '.join(CODECS)}"
+            )
         self._av = _av()
         self._is_h264 = CODECS[format_] == "h264"
         self._codec: Any = self._av.CodecContext.create(CODECS[format_], "r")
+        self._codec.options = {"max_pixels": str(MAX_PIXELS)}
         self._codec.thread_count = 1
         self._codec.thread_type = "SLICE"  # a frame comes with its packet, not some packets later
         self._codec.flags |= self._av.codec.context.Flags.low_delay

@@ -15,6 +15,7 @@ from services.virtual_camera.draw.lines import line_faces, pick
 from services.virtual_camera.draw.raster import Colour
 from services.virtual_camera.draw.shape import make_shape
 from services.virtual_camera.map.clutter import clutter
+from services.virtual_camera.map.json_node import MapError
 from services.virtual_camera.map.map_file import BlockEntry, MapFile, ModelEntry, OverlayEntry, Vector3, read_map
 from services.virtual_camera.map.meshes import load_obj
 from services.virtual_camera.map.textures import Texture, default_ground, load_picture
@@ -22,6 +23,9 @@ from services.virtual_camera.map.textures import Texture, default_ground, load_p
 SKY: Colour = (206.0, 190.0, 176.0, 255.0)
 GROUND: Colour = (112.0, 114.0, 116.0, 255.0)
 _GROUND_REACH = 40.0
+MAX_TRIANGLES = 200_000
+MAX_TEXTURE_BYTES = 1 << 30
+"""Of all models and blocks of a map together."""
 
 
 @dataclass(frozen=True)
@@ -51,20 +55,39 @@ def _bgr(colour: Vector3) -> Array:
     return np.array(colour[::-1]) * 255.0
 
 
-def _model(entry: ModelEntry) -> Copies:
+@dataclass
+class _Budget:
+    """What the meshes and textures of one map may take together; ``take`` raises MapError."""
+
+    path: Path
+    most: int
+    what: str
+    taken: int = 0
+
+    def take(self, amount: int) -> None:
+        self.taken += amount
+        if self.taken > self.most:
+            raise MapError(f"{self.path}: more than {self.most} {self.what} in all")
+
+
+def _model(entry: ModelEntry, triangles: _Budget) -> Copies:
     paint = entry.paint
     colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
     positions = np.array([instance.position for instance in entry.instances])
     turns = np.array([math.pi - instance.angle for instance in entry.instances])
-    return Copies(make_shape(*load_obj(entry.file)), colour, positions, turns, entry.name)
+    mesh = load_obj(entry.file)
+    triangles.take(len(mesh[1]))
+    return Copies(make_shape(*mesh), colour, positions, turns, entry.name)
 
 
-def _cover(entry: BlockEntry) -> Colour | Covering:
+def _cover(entry: BlockEntry, memory: _Budget) -> Colour | Covering:
     if not isinstance(entry.paint, Path):
         return (*_bgr(entry.paint).tolist(), 255.0)
     tile = entry.tile
     repeats = math.ceil(max(entry.dimension) / min(tile)) if tile else 1
-    return Covering(Texture(load_picture(entry.paint), repeats), tile)
+    texture = Texture(load_picture(entry.paint), repeats)
+    memory.take(texture.size)
+    return Covering(texture, tile)
 
 
 def _default_floor() -> Face:
@@ -75,13 +98,14 @@ def _default_floor() -> Face:
     return Face(points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
 
 
-def _block_faces(entry: BlockEntry) -> list[Face]:
-    cover = _cover(entry)
+def _block_faces(entry: BlockEntry, memory: _Budget) -> list[Face]:
+    cover = _cover(entry, memory)
     return [face for i in entry.instances for face in box_faces(entry.dimension, i, cover)]
 
 
 def _faces(entries: MapFile, options: SceneOptions) -> Iterator[Face]:
-    blocks = [face for block in entries.blocks for face in _block_faces(block)]
+    memory = _Budget(entries.path, MAX_TEXTURE_BYTES, "bytes of textures")
+    blocks = [face for block in entries.blocks for face in _block_faces(block, memory)]
     lines = pick(entries.path, options.lines)
     for face in [*(blocks or [_default_floor()]), *line_faces(lines, options.line_width)]:
         yield face.shaded(options.light.on(face.normal))
@@ -90,7 +114,8 @@ def _faces(entries: MapFile, options: SceneOptions) -> Iterator[Face]:
 def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
     """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
     entries, options = read_map(path), options or SceneOptions()
-    models = tuple(map(_model, entries.models))
+    triangles = _Budget(entries.path, MAX_TRIANGLES, "triangles of models")
+    models = tuple(_model(entry, triangles) for entry in entries.models)
     around = clutter(options.clutter, options.seed, models)
     shade = options.light.on(np.array([0.0, 0.0, 1.0]))
     return Scene(

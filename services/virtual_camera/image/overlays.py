@@ -7,15 +7,16 @@ import cv2
 import numpy as np
 
 from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.map.json_node import MapError, read_bytes
+from services.virtual_camera.map.json_node import MapError
 from services.virtual_camera.map.map_file import OverlayEntry
+from services.virtual_camera.map.textures import picture_bytes
 
 
 def load_with_alpha(path: Path) -> Image:
     """A picture file as (rows, columns, 4), B, G, R, A, opaque where it has no alpha; MapError otherwise."""
-    data = np.frombuffer(read_bytes(path), np.uint8)
+    data = picture_bytes(path)
     try:
-        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if len(data) else None
+        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     except cv2.error:
         picture = None
     if picture is None or picture.dtype != np.uint8:

@@ -12,8 +12,11 @@ from services.virtual_camera.map.json_node import MapError, read_bytes
 
 Indices = npt.NDArray[np.intp]
 
+MAX_BYTES = 16 << 20
 MAX_TRIANGLES = 50_000
+MAX_VERTICES = 4 * MAX_TRIANGLES
 ROUND_SIDES = 16
+_FACE, _VERTEX = (re.compile(rb"^[ \t]*%b[ \t]" % letter, re.MULTILINE) for letter in (b"f", b"v"))
 _RELATIVE_FACE = re.compile(rb"^\s*f\s[^#\n]*-\d", re.MULTILINE)
 
 
@@ -84,7 +87,18 @@ def oriented(vertices: Array, triangles: Indices) -> Indices:
     return triangles if volume(vertices, triangles) > 0 else triangles[:, ::-1]
 
 
+def _refuse_large(path: Path, data: bytes) -> None:
+    """Raises MapError for a file that unfolds to more than a mesh may have, before it is parsed."""
+    if len(data) > MAX_BYTES:
+        raise MapError(f"{path}: the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}")
+    for pattern, what, most in ((_FACE, "triangles", MAX_TRIANGLES), (_VERTEX, "vertices", MAX_VERTICES)):
+        count = sum(1 for _ in pattern.finditer(data))
+        if count > most:
+            raise MapError(f"{path}: {count} {what}, expected at most {most}")
+
+
 def _parse(path: Path, data: bytes) -> tuple[Array, Indices]:
+    _refuse_large(path, data)
     import trimesh
 
     if _RELATIVE_FACE.search(data):

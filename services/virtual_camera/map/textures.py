@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from dodo_dsl.opendlv.video.picture_size import problem_of
 from services.virtual_camera.draw.raster import Image
 from services.virtual_camera.map.json_node import MapError, read_bytes
 
@@ -42,17 +43,30 @@ class Texture:
         self.mean = tuple(float(part) for part in picture.reshape(-1, 3).mean(axis=0))
         """The mean colour: blue, green, red."""
 
+    @property
+    def size(self) -> int:
+        """Bytes of memory."""
+        return sum(picture.nbytes for picture in (*self.tiles, *self.canvases))
+
 
 def _repeated(tile: Image, limit: int) -> Image:
     down, across = (min(limit, -(-CANVAS // size)) for size in tile.shape[:2])
     return np.tile(tile, (down, across, 1))
 
 
+def picture_bytes(path: Path) -> Image:
+    """The bytes of a PNG or JPEG file that is small enough to be decoded; MapError otherwise."""
+    data = read_bytes(path)
+    if problem := problem_of(data):
+        raise MapError(f"{path}: {problem}")
+    return np.frombuffer(data, np.uint8)
+
+
 def load_picture(path: Path) -> Image:
     """A picture file as (rows, columns, 3), B, G, R; MapError when OpenCV cannot read it."""
-    data = np.frombuffer(read_bytes(path), np.uint8)
+    data = picture_bytes(path)
     try:
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
     except cv2.error as error:
         raise MapError(f"{path}: the picture cannot be read: {error.err}") from error
     if picture is None:
