@@ -1,10 +1,16 @@
 """Finding specs: registries are folders, a test is ``<name>/<name>.dodo.yml``."""
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 SUFFIX = ".dodo.yml"
+MAX_FOLDERS = 10_000
+
+
+class RegistryTooLarge(Exception):
+    """A folder has too many folders below it to be a registry; one sentence."""
 
 
 @dataclass(frozen=True, order=True)
@@ -20,9 +26,23 @@ class Location:
 
 
 def _specs_below(folder: Path) -> Iterator[Path]:
-    for path in sorted(folder.rglob(f"*{SUFFIX}")):
-        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts):
-            yield path
+    """The specs of a folder on its own file system, without hidden folders; raises RegistryTooLarge."""
+    found, device = [], folder.stat().st_dev
+    for number, (place, folders, files) in enumerate(os.walk(folder), 1):
+        if number > MAX_FOLDERS:
+            raise RegistryTooLarge(f"'{folder}' has more than {MAX_FOLDERS} folders: name the folder with the tests")
+        folders[:] = [name for name in folders if not name.startswith(".") and _is_on(device, Path(place, name))]
+        specs = (Path(place, name) for name in files if name.endswith(SUFFIX) and not name.startswith("."))
+        found += [path for path in specs if path.is_file()]
+    yield from sorted(found)
+
+
+def _is_on(device: int, folder: Path) -> bool:
+    """Whether a folder belongs to a file system, and nothing else is mounted there."""
+    try:
+        return folder.lstat().st_dev == device
+    except OSError:
+        return False
 
 
 def _root_of(path: Path, registries: Sequence[Path]) -> Path:
@@ -45,7 +65,7 @@ def locate(
 ) -> tuple[list[Location], list[Path]]:
     """The specs at or below ``paths`` (all ``registries`` without any), and the paths without specs.
 
-    ``others`` are further registries, which are only the roots of specs.
+    ``others`` are further registries, which are only the roots of specs. Raises RegistryTooLarge.
     """
     own = [r.resolve() for r in registries]
     roots = [*own, *(r.resolve() for r in others)]
