@@ -10,18 +10,20 @@ from dodo_dsl.spec.manifest import Manifest
 
 RECORDER = "dodo-recorder"
 MANIFEST = "rec-recorder"
+FRAMES = "opendlv.proxy.ImageReading"
 RECORDING, SNAPSHOT = "test.rec", "snapshot.png"
 
 _PARAMETER = re.compile(r"\{([a-z0-9.-]+)\}")
 
 
 def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> PlannedService:
-    """The recorder's service; ``record: {frames: ...}`` adds the frames of each camera.
+    """The recorder's service; ``record: {frames: ..., limit: ...}`` adds each camera's frames and limits its size.
 
     A test on a rig always has a snapshot of its first camera.
     """
     spec = test.spec
     flags = [Flag("rec", RECORDING, "report")]
+    flags += [Flag("limit", f"{spec.record_limit_mb:g}")] if spec.record_limit_mb else []
     wanted = [Flag("frames", f"{spec.frames_hz:g}")] if spec.frames_hz else []
     wanted += [Flag("snapshot", SNAPSHOT, "report")] if spec.level == "hil" else []
     memories = ",".join(_memories(test.services)) if wanted else ""

@@ -6,9 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dodo_dsl import atomic
+from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.model import Plan, PlannedService
-from dodo_dsl.run.protocol import BackendError, VerdictEvent
+from dodo_dsl.plan.recorder_service import FRAMES, RECORDER
+from dodo_dsl.run.protocol import BackendError, Flooded, MemoryTaken, VerdictEvent
+from dodo_dsl.spec.manifest import load_manifests
 
 LOG = "logs/runner.log"
 """The traceback of an internal error, in the test's report."""
@@ -103,9 +107,8 @@ def describe(error: Exception, report: Path) -> str:
         return system_error(error)
     log = report / LOG
     try:
-        log.parent.mkdir(parents=True, exist_ok=True)
-        with log.open("a", encoding="utf-8", errors="replace") as file:
-            traceback.print_exception(error, file=file)
+        with atomic.appended(log) as file:
+            file.write("".join(traceback.format_exception(error)).encode("utf-8", "replace"))
         more = f" (traceback in {LOG})"
     except OSError:
         more = ""
@@ -128,6 +131,29 @@ def lost_messages(service: PlannedService, messages: int) -> str:
         meaning = "its verdict does not consider them"
     count = f"{messages} message{'s' * (messages != 1)}"
     return f"service '{service.name}' lost {count}, as its receive buffer was full: {meaning}"
+
+
+def flooded(plan: Plan, event: Flooded) -> Finding:
+    """The end of a test that sends more than its recorder takes; it is the application's where only that can have."""
+    names = [service.name for service in plan.services if _may_send(service, event.message)]
+    sender = f"service '{names[0]}' sends" if names else "only the application can have sent"
+    part = f"{event.share:.0%} of it is {event.message}/{event.sender_stamp}, which {sender}"
+    return Finding("failed" if event.too_fast and not names else "error", f"{event.what}: {part}", event.service)
+
+
+def _may_send(service: PlannedService, message: str) -> bool:
+    """Whether a service's manifest has the message; that of a deployment's own service is not known here."""
+    if service.name == RECORDER:
+        return message == FRAMES and any(flag.name == "frames" for flag in service.flags)
+    manifest = load_manifests()[0].get(service.uses)
+    ports = manifest.messages.outputs if manifest else (ANYTHING,)
+    return any(port.rstrip("?").partition("/")[0] in (message, ANYTHING) for port in ports)
+
+
+def memory_taken(event: MemoryTaken) -> Finding:
+    """The end of a test whose application, the reader, keeps one of the test's services from its shared memory."""
+    reason = f"the application keeps service '{event.service}' from its shared memory: {event.how}"
+    return Finding("failed", reason, event.service, is_timed=True)
 
 
 def how_it_ended(code: int) -> str:

@@ -67,6 +67,29 @@ class Late:
 
 
 @dataclass(frozen=True)
+class Flooded:
+    """More is sent than the recorder takes: ``what`` is the limit in a sentence, ``too_fast`` whether it is the rate's.
+
+    ``share`` of it are messages ``message`` of one ``sender_stamp``.
+    """
+
+    service: str
+    what: str
+    message: str
+    sender_stamp: int
+    share: float
+    too_fast: bool
+
+
+@dataclass(frozen=True)
+class MemoryTaken:
+    """A service cannot write its shared memory any more, as a reader of it keeps the lock or has broken it."""
+
+    service: str
+    how: str
+
+
+@dataclass(frozen=True)
 class Noted:
     """A note on the test beside its outcome."""
 
@@ -122,6 +145,8 @@ Event = (
     | Malformed
     | Overrun
     | Late
+    | Flooded
+    | MemoryTaken
     | Noted
     | InputEnded
     | Exited

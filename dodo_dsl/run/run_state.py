@@ -9,15 +9,17 @@ from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.load.judgement import consider
 from dodo_dsl.run.load.response import judged
-from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended, lost_messages, outcome_of
+from dodo_dsl.run.outcomes import Facts, Finding, decide, flooded, how_it_ended, lost_messages, memory_taken, outcome_of
 from dodo_dsl.run.protocol import (
     Backend,
     Event,
     Exited,
+    Flooded,
     InputEnded,
     Late,
     Lost,
     Malformed,
+    MemoryTaken,
     Noted,
     Overrun,
     Ready,
@@ -27,6 +29,8 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
+
+MOST_NOTES = 100
 
 
 class Ended(Exception):
@@ -68,6 +72,10 @@ class RunState:
         self.add_finding(result, reason, service)
         raise Ended
 
+    def _end_with(self, finding: Finding) -> None:
+        self.facts.findings.append(finding)
+        raise Ended
+
     def time_out(self) -> None:
         """The test's time is over, and an evaluator has not ended: raises Ended."""
         late = next(name for name in self.facts.evaluators if name not in self.exits)
@@ -90,6 +98,10 @@ class RunState:
                 self.end("error", f"service '{service}' could not be started: {why}", service)
             case Lost(why):
                 self.end("error", why)
+            case Flooded():
+                self._end_with(flooded(self.plan, event))
+            case MemoryTaken():
+                self._end_with(memory_taken(event))
             case Stopped(kind, reason):
                 self._take_stop(kind, reason)
             case Exited(service, code, out_of_memory):
@@ -107,8 +119,10 @@ class RunState:
                 self.lost[service] = messages
             case Late(service):
                 self.late[service] = event
-            case Noted(text):
+            case Noted(text) if len(self.notes) < MOST_NOTES:
                 self.notes.append(text)
+            case Noted() if len(self.notes) == MOST_NOTES:
+                self.notes.append(f"there are more notes, and only {MOST_NOTES} are kept")
             case InputEnded():
                 self.input_ended = True
             case Time():

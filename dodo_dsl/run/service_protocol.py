@@ -8,11 +8,14 @@ from typing import Any
 
 from dodo_dsl.outcome import Response
 from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.plan.recorder_service import RECORDER
 from dodo_dsl.run.protocol import (
     Event,
+    Flooded,
     InputEnded,
     Late,
     Malformed,
+    MemoryTaken,
     Noted,
     Overrun,
     Ready,
@@ -57,7 +60,19 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
             return Malformed(service, problem)
         passed, evidence = message["outcome"] == "passed", message.get("evidence", {})
         return VerdictEvent(service, passed, message["reason"], tuple(message["checks"]), evidence)
+    if kind == "taken" and _is_text(message.get("text")):
+        return MemoryTaken(service, message["text"])
+    if kind == "flood" and service == RECORDER:
+        return _flood(service, message)
     return _clock_event(kind, message) if service == CLOCK else None
+
+
+def _flood(service: str, message: dict[str, Any]) -> Flooded | None:
+    """Who fills the recording, where the values can be."""
+    what, name, sender, share = (message.get(key) for key in ("what", "message", "sender", "share"))
+    if not (_is_text(what) and _is_text(name) and type(sender) is int and _is_number(share)):
+        return None
+    return Flooded(service, str(what), str(name), sender, float(share or 0.0), message.get("limit") == "rate")
 
 
 def _late(service: str, message: dict[str, Any]) -> Late | None:

@@ -39,6 +39,7 @@ class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
     ``isolation`` is None where the spec leaves it to the rig, ``frames_hz`` is 0 where no frames are recorded.
+    ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``is_whole`` is False where services could not be read, so that missing producers are not reported.
     """
@@ -54,6 +55,7 @@ class Spec:
     isolation: str | None = None
     seed: int = 0
     frames_hz: float = 0.0
+    record_limit_mb: float | None = None
     max_response_s: float | None = None
     response_over: float = 0.0
     uses: tuple[Use, ...] = ()
@@ -169,6 +171,7 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
     response = node.get("response")
     timeout, found = _within(node.get("timeout"), "timeout", "s", (0.1, 86_400), "0.1 s to 24 h")
     longest, more = _within(_part(response, "max"), "max", "s", (0.0001, 3600), "0.1 ms to 1 h")
+    largest, also = _within(_part(node.get("record"), "limit"), "limit", "MB", (1, 100_000), "1 MB to 100 GB")
     over, most = _within(_part(response, "over"), "over", quantity.SHARE, (0, 1), "0 % to 100 %")
     spec = Spec(
         location,
@@ -182,6 +185,7 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         isolation=text("isolation"),
         seed=_seed(node.get("seed")),
         frames_hz=_frames(node.get("record")),
+        record_limit_mb=largest,
         max_response_s=longest,
         response_over=over or 0.0,
         uses=uses,
@@ -189,7 +193,7 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         spans={key: entry.value.span for key, entry in node.entries.items()},
         is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),
     )
-    return spec, [*found, *more, *most]
+    return spec, [*found, *more, *also, *most]
 
 
 def _has_stranger(node: Mapping) -> bool:

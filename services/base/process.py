@@ -1,5 +1,6 @@
 """A service as a process: flags, log, signals, readiness, and its exit code."""
 
+import json
 import logging
 import os
 import signal
@@ -10,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 
 from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, parse
@@ -85,6 +87,8 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
             if service.verdict is not None:
                 print(service.verdict.line(flags["cid"]), flush=True)
     except Exception as error:
+        if isinstance(error, MemoryTakenError):
+            print(json.dumps({"dodo": "taken", "text": str(error)}), flush=True)
         expected = code == USAGE and isinstance(error, ValueError | OSError)
         text = " ".join(str(error).split())
         logging.critical("%s", text if expected else f"{type(error).__name__}: {text}", exc_info=bool(flags["verbose"]))

@@ -7,6 +7,7 @@ from typing import Self
 
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, encode_frame
 from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from services.rec_recorder.traffic import FloodError, Traffic
 
 RECORD, STOP = 1, 2
 
@@ -20,12 +21,14 @@ class RecordingFileError(ValueError):
 class RecordingFile:
     """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and logs that.
 
-    Nothing is buffered in the process: whatever ends it, the file holds all frames written so far.
+    ``traffic`` counts what it takes. Nothing is buffered in the process: whatever ends it, the file holds all frames
+    written so far.
     Raises RecordingError for a file that exists, and where none can be made.
     """
 
-    def __init__(self, path: Path, max_size: int | None = None) -> None:
+    def __init__(self, path: Path, max_size: int | None = None, traffic: Traffic | None = None) -> None:
         self.is_on = True
+        self._traffic = traffic
         self.left_out = 0
         self._max_size = max_size
         try:
@@ -49,7 +52,11 @@ class RecordingFile:
         _log.info("recording %s with %d messages", "resumed" if self.is_on else "stopped", self.frames)
 
     def write(self, envelope: Envelope) -> None:
-        """Append an envelope as it was received; raises RecordingError when the disk takes no more."""
+        """Append an envelope as it was received.
+
+        Raises RecordingFileError when the disk takes no more, and FloodError at the limits of ``traffic``, upon which
+        recording ends.
+        """
         if not self.is_on:
             return
         try:
@@ -60,6 +67,7 @@ class RecordingFile:
         if self._max_size is not None and self._writer.size + len(frame) > self._max_size:
             self._leave_out(f"the recording has its largest size, {self._max_size} bytes")
             return
+        self._count(envelope, len(frame))
         try:
             self._writer.write_frames((frame,))
         except OSError as error:
@@ -79,6 +87,14 @@ class RecordingFile:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _count(self, envelope: Envelope, size: int) -> None:
+        try:
+            if self._traffic is not None:
+                self._traffic.add(envelope, size)
+        except FloodError:
+            self.is_on = False
+            raise
 
     def _leave_out(self, reason: str) -> None:
         if not self.left_out:

@@ -9,6 +9,7 @@ from services.base.recorded.step_marks import RECORDING_END
 from services.base.service import period_of
 from services.rec_recorder.model import RecordingFile
 from services.rec_recorder.source import MemorySpec, Source, parse
+from services.rec_recorder.traffic import Traffic
 
 if TYPE_CHECKING:
     from services.rec_recorder.pictures import Cameras
@@ -61,7 +62,7 @@ def build(context: Context) -> Service:
         if flags[name] and not memories:
             raise ValueError(f"--{name} needs --memories: the names of the shared memories to record")
     max_size = flags["max-size"] and round(flags["max-size"] * MEGABYTE)
-    recording = context.resources.enter_context(RecordingFile(Path(flags["rec"]), max_size))
+    recording = context.resources.enter_context(RecordingFile(Path(flags["rec"]), max_size, _traffic(context)))
     if flags["paused"]:
         recording.is_on = False
     sources = [Source(spec, round(period_of(flags["frames"]))) for spec in memories if flags["frames"]]
@@ -70,6 +71,16 @@ def build(context: Context) -> Service:
     recorder = Recorder(recording, cameras, snapshot, flags["commands"])
     context.resources.callback(_end, recorder, recording, context)
     return recorder
+
+
+def _traffic(context: Context) -> Traffic:
+    session, messages = context.session, context.messages
+
+    def name(id_: int) -> str:
+        return messages.name(id_) if id_ in messages.ids() else f"message {id_}"
+
+    limit = round(context.flags["limit"] * MEGABYTE)
+    return Traffic(limit, context.clock.now, lambda: session.lost if session else 0, name)
 
 
 def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None:

@@ -20,6 +20,7 @@ class SnapshotWriter:
     def __init__(self, source: Source, path: Path) -> None:
         self._source, self._path = source, path
         self._is_wanted = True
+        self._is_ours = False
 
     def begin(self) -> None:
         """The test begins: the next picture replaces what was taken before it."""
@@ -47,5 +48,12 @@ class SnapshotWriter:
         if not done:
             raise OSError(f"a picture of {layout[1]} x {layout[2]} pixels cannot be encoded")
         part = self._path.with_name(f".{self._path.name}.part")
-        part.write_bytes(png.tobytes())
-        part.replace(self._path)
+        with part.open("xb") as file:
+            file.write(png.tobytes())
+        try:
+            if not self._is_ours:
+                self._path.hardlink_to(part)  # what is there already is not this recorder's to replace
+                self._is_ours = True
+            part.replace(self._path)
+        finally:
+            part.unlink(missing_ok=True)

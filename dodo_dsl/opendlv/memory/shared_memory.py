@@ -16,9 +16,9 @@ from dodo_dsl.opendlv.memory import posix_segment, token_file
 from dodo_dsl.opendlv.memory.posix_segment import PosixSegment
 from dodo_dsl.opendlv.memory.semaphore import Result
 from dodo_dsl.opendlv.memory.sysv_segment import Segment
-from dodo_dsl.opendlv.memory.token_file import SharedMemoryError
+from dodo_dsl.opendlv.memory.token_file import MemoryTakenError, SharedMemoryError
 
-__all__ = ["SharedMemory", "SharedMemoryError"]
+__all__ = ["MemoryTakenError", "SharedMemory", "SharedMemoryError"]
 
 LOCK_PATIENCE = 5.0
 MODE = "CLUON_SHAREDMEMORY_POSIX"
@@ -67,11 +67,14 @@ class SharedMemory:
 
     @contextmanager
     def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
-        """Hold the mutex; raises SharedMemoryError when another holds it for ``timeout`` seconds."""
+        """Hold the mutex; raises SharedMemoryError when another holds it for ``timeout`` seconds.
+
+        The creator's error is a MemoryTakenError, here and wherever the memory turns out to be broken.
+        """
         deadline = time.monotonic() + timeout
         while (result := self._take(deadline - time.monotonic())) is not Result.DONE:
             if result is Result.TIMEOUT:
-                raise SharedMemoryError(f"shared memory '{self.name}' was locked by another for {timeout:g} s")
+                raise self._error(f"was locked by another for {timeout:g} s")
         self._locked = True
         try:
             yield
@@ -164,9 +167,12 @@ class SharedMemory:
             errno.ETIMEDOUT: "cannot notify any more: a reader was killed while it waited",
             errno.ENOTRECOVERABLE: "cannot be locked any more: its holder was killed",
         }
-        return SharedMemoryError(
-            f"shared memory '{self.name}' {reasons.get(error.errno or 0, 'was removed by its creator')}"
-        )
+        remover = "another" if self._owner else "its creator"
+        return self._error(reasons.get(error.errno or 0, f"was removed by {remover}"))
+
+    def _error(self, what: str) -> SharedMemoryError:
+        kind = MemoryTakenError if self._owner else SharedMemoryError
+        return kind(f"shared memory '{self.name}' {what}")
 
 
 def _wants_posix() -> bool:

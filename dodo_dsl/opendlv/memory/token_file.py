@@ -17,6 +17,10 @@ class SharedMemoryError(OSError):
     """Shared memory that cannot be made, found or used; one sentence."""
 
 
+class MemoryTakenError(SharedMemoryError):
+    """Shared memory that its creator cannot use any more, as another process keeps its lock, or broke or removed it."""
+
+
 def path_of(name: str) -> Path:
     """The token file: ``foo`` and ``/foo`` are /tmp/foo, what begins with /tmp stays. Raises SharedMemoryError."""
     if not name.strip("/") or "\0" in name:
