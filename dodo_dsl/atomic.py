@@ -1,8 +1,9 @@
 """Files and folders that appear whole or not at all: written beside their place under a hidden name, then renamed.
 
 A reader, another writer and a killed process see the old content or the new, never a part, and a failure leaves no
-temporary file. A symlink in the place of the target is replaced; what it points to stays. A new file has the
-permissions that the umask leaves it, one that is replaced keeps its own.
+temporary file. A file replaces nothing but a file, and a folder nothing but an empty folder of this user: devices,
+FIFOs and sockets stay, and nothing is written into the folders of the kernel. A symlink to a file is replaced; what it
+points to stays. A new file has the permissions that the umask leaves it, one that is replaced keeps its own.
 
 A rename does not wait for the disk. ``durable`` does, before and after it: for what must outlive a loss of power,
 as a recording cut from another or a rig's quarantine. What can be made again is not worth the wait.
@@ -10,6 +11,7 @@ as a recording cut from another or a rig's quarantine. What can be made again is
 
 import contextlib
 import errno
+import io
 import os
 import secrets
 import shutil
@@ -18,8 +20,38 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+_KERNELS = (Path("/dev"), Path("/proc"), Path("/sys"))
+_MEMORY = Path("/dev/shm")
+_KINDS = {
+    stat.S_ISCHR: "a device",
+    stat.S_ISBLK: "a device",
+    stat.S_ISFIFO: "a FIFO",
+    stat.S_ISSOCK: "a socket",
+}
 _MOST_NAME = 40
 """Characters of the target's name in a temporary one, which with the rest stays below the 255 bytes of a name."""
+
+
+class NotReplaceable(OSError):
+    """What is in the place of an output is not replaced, whatever the user says; names it."""
+
+
+def refuse_others(path: Path) -> None:
+    """Raises NotReplaceable where a file cannot become ``path``, IsADirectoryError for a folder, and OSError.
+
+    To be called before the work whose result goes there.
+    """
+    folder = Path(os.path.realpath(path.parent))
+    kernels = next((place for place in _KERNELS if folder.is_relative_to(place)), None)
+    if kernels and not folder.is_relative_to(_MEMORY):
+        raise NotReplaceable(errno.EINVAL, f"{kernels} belongs to the kernel, and takes no output", str(path))
+    with contextlib.suppress(FileNotFoundError):
+        mode = path.stat().st_mode  # of what a symlink points to
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(mode):
+            kind = next((text for is_kind, text in _KINDS.items() if is_kind(mode)), "no file")
+            raise NotReplaceable(errno.EINVAL, f"{kind}, which no output replaces", str(path))
 
 
 @contextmanager
@@ -29,6 +61,7 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
     The folder is made where there is none. Raises OSError that names ``path``, also for what fails in the block with
     the temporary file.
     """
+    refuse_others(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = _beside(path)
     with _naming(path, part):
@@ -37,6 +70,7 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
             _keep_permissions(path, part)
             if durable:
                 _flush(part)
+            refuse_others(path)
             part.replace(path)
         except BaseException:
             part.unlink(missing_ok=True)
@@ -56,15 +90,32 @@ def write_text(path: Path, text: str, durable: bool = False) -> None:
     write_bytes(path, text.encode(), durable)
 
 
+def appended(path: Path) -> io.FileIO:
+    """The file, opened to append without a buffer, new where there is none; its folder is made.
+
+    Raises OSError, also where the name is a symlink, a device or a FIFO: others may write into folders of reports.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+    descriptor = os.open(path, flags, 0o666)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise NotReplaceable(errno.EINVAL, "not a file, and takes no output", str(path))
+    os.set_blocking(descriptor, True)
+    return io.FileIO(descriptor, "ab")
+
+
 @contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
     """An empty folder to fill, which becomes ``path`` when the block ends well.
 
-    Raises FileExistsError where ``path`` is there by then and not an empty folder, and OSError.
+    Raises FileExistsError where ``path`` is there by then and not an empty folder of this user, and OSError.
     """
     with _stage(path) as stage:
         yield stage
         try:
+            if path.is_symlink() or (path.exists() and path.stat().st_uid != os.geteuid()):
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
             stage.rename(path)
         except OSError as error:
             if error.errno in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
@@ -82,6 +133,7 @@ def files_into(target: Path) -> Iterator[Path]:
         yield stage
         for source in sorted(path for path in stage.rglob("*") if path.is_file()):
             place = target / source.relative_to(stage)
+            refuse_others(place)
             place.parent.mkdir(parents=True, exist_ok=True)
             with _naming(place, source):
                 source.replace(place)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from dodo_dsl import atomic
 from dodo_dsl.source import plain, read
 
 FILE = Path(__file__).with_name("catalogue.yml")
@@ -94,4 +95,4 @@ def _sections() -> Iterator[str]:
 
 def write(file: Path) -> None:
     """Generates docs/rules.md."""
-    file.write_text(markdown(), encoding="utf-8")
+    atomic.write_text(file, markdown())

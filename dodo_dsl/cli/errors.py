@@ -41,18 +41,30 @@ def sentence(error: Exception) -> str:
 
 def _usage_errors() -> tuple[type[Exception], ...]:
     """Errors of the user's files and words."""
+    from dodo_dsl.atomic import NotReplaceable
     from dodo_dsl.images.names import NoSuchImage
     from dodo_dsl.opendlv.odvd.parser import OdvdError
     from dodo_dsl.opendlv.recordings.recording import RecordingError
+    from dodo_dsl.opendlv.regular_file import NotAFile
     from dodo_dsl.plan.test_files import FilesError
     from dodo_dsl.rec.coco import LabelError
     from dodo_dsl.rec.excerpt import NothingSelected
     from dodo_dsl.rec.outputs import OutputExists
     from dodo_dsl.rec.truth import TruthError
     from dodo_dsl.report.results import ResultsError
+    from dodo_dsl.spec.registry import RegistryTooLarge
 
-    recordings = (RecordingError, OdvdError, NothingSelected, LabelError, OutputExists, TruthError)
-    return (*recordings, FilesError, NoSuchImage, ResultsError)
+    recordings = (
+        RecordingError,
+        OdvdError,
+        NothingSelected,
+        LabelError,
+        OutputExists,
+        TruthError,
+        NotAFile,
+        NotReplaceable,
+    )
+    return (*recordings, FilesError, NoSuchImage, ResultsError, RegistryTooLarge)
 
 
 def _machine_errors() -> tuple[type[Exception], ...]:

@@ -1,14 +1,16 @@
 """Generated files on disk: written one by one, each as a whole, compared with existing ones, stale ones removed."""
 
 import difflib
+import errno
 import filecmp
 import json
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.emit.render import File, render_plan
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.test_files import FileCopy
 
@@ -22,7 +24,12 @@ def pipeline_folder(out: Path) -> str:
 
 
 def write(compiled: Compiled, pipeline: File, out: Path) -> None:
-    """Writes everything below ``out`` and removes tests of earlier compilations that are no longer there."""
+    """Writes everything below ``out`` and removes tests of earlier compilations that are no longer there.
+
+    Raises NotReplaceable for a symlink in the folder of a test, before anything is written or removed.
+    """
+    for plan in compiled.suite.plans:
+        _refuse_links(out / plan.slug)
     _update(out, [pipeline])
     for plan in compiled.suite.plans:
         folder, files, copies = out / plan.slug, render_plan(plan), compiled.copies[plan.slug]
@@ -33,6 +40,12 @@ def write(compiled: Compiled, pipeline: File, out: Path) -> None:
             _write_new(folder, [(file.path.removeprefix(f"{plan.slug}/"), file.text) for file in files], copies)
     for folder in stale_folders(compiled, out):
         shutil.rmtree(folder)
+
+
+def _refuse_links(folder: Path) -> None:
+    for path in (folder, *folder.rglob("*")):
+        if path.is_symlink():
+            raise atomic.NotReplaceable(errno.ELOOP, "a symlink, which no output follows", str(path))
 
 
 def _update(out: Path, files: Iterable[File]) -> None:
@@ -73,12 +86,16 @@ def _surplus(folder: Path, wanted: Sequence[FileCopy]) -> Iterator[Path]:
 def stale_folders(compiled: Compiled, out: Path) -> list[Path]:
     """Tests of earlier compilations that are not in this one."""
     slugs = {plan.slug for plan in compiled.suite.plans}
-    return [path.parent for path in sorted(out.glob(f"*/{PLAN_FILE}")) if path.parent.name not in slugs and _ours(path)]
+    return [path.parent for path in sorted(out.glob(f"*/{PLAN_FILE}")) if _is_stale(path, slugs)]
+
+
+def _is_stale(path: Path, slugs: Collection[str]) -> bool:
+    return path.parent.name not in slugs and not path.parent.is_symlink() and _ours(path)
 
 
 def _ours(path: Path) -> bool:
     try:
-        return bool(json.loads(path.read_text(encoding="utf-8")).get("dodo") == "plan")
+        return bool(json.loads(regular_file.text(path)).get("dodo") == "plan")
     except (OSError, ValueError, AttributeError):
         return False
 

@@ -1,7 +1,9 @@
-"""Results replace existing files only with ``--force``."""
+"""Results replace existing files only with ``--force``, and nothing else ever."""
 
 from collections.abc import Iterable
 from pathlib import Path
+
+from dodo_dsl import atomic
 
 
 class OutputExists(Exception):
@@ -9,7 +11,11 @@ class OutputExists(Exception):
 
 
 def refuse_existing(paths: Iterable[Path], force: bool) -> None:
-    """Raises OutputExists for the first existing path, unless ``force``."""
+    """Raises OutputExists for the first path that is there, unless it is a file and ``force`` is given."""
     for path in paths:
+        try:
+            atomic.refuse_others(path)
+        except (atomic.NotReplaceable, IsADirectoryError) as error:
+            raise OutputExists(f"'{path}' cannot take the result: {error.strerror}") from None
         if not force and path.exists():
             raise OutputExists(f"'{path}' exists already; --force replaces it")

@@ -9,6 +9,8 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from dodo_dsl.opendlv import numbers, regular_file
+
 if TYPE_CHECKING:
     from dodo_dsl.opendlv.memory.pixels import Picture
 
@@ -36,13 +38,13 @@ class Mark(NamedTuple):
         return " ".join([self.label, *(f"{number:g}" for number in self[1:])])
 
 
-def mark(label: object, numbers: Sequence[object], place: str) -> Mark:
+def mark(label: object, values: Sequence[object], place: str) -> Mark:
     """A box of a class and its four numbers; raises TruthError, which names the place."""
     name = str(label).strip().removeprefix("color:").strip()
     if not name or not name.isprintable():
         raise TruthError(f"{place}: the class is empty or not printable")
     try:
-        x, y, width, height = (float(str(number)) for number in numbers)
+        x, y, width, height = (numbers.number(str(each)) for each in values)
     except ValueError:
         x = y = width = height = math.nan
     if not all(map(math.isfinite, (x, y, width, height))):
@@ -115,12 +117,12 @@ _COLOURS = ((255, 80, 255), (255, 255, 60), (80, 255, 120), (255, 255, 255), (60
 
 def _document(path: Path) -> Any:
     try:
-        document = json.loads(path.read_text(encoding="utf-8")) if path.stat().st_size <= MOST_BYTES else None
+        document = json.loads(regular_file.text(path, MOST_BYTES))
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise TruthError(f"{path}: cannot be read as COCO JSON: {reason}") from None
     if document is None:
-        raise TruthError(f"{path}: is empty, or larger than {MOST_BYTES} bytes")
+        raise TruthError(f"{path}: is empty")
     return document
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from dodo_dsl import atomic
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.video.picture_size import problem_of
 from dodo_dsl.rec import truth
 from dodo_dsl.rec.truth import Mark, TruthError
 
@@ -47,9 +49,7 @@ class TruthFiles:
 def given(path: Path) -> bytes:
     """The bytes of an existing picture; raises TruthError."""
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise TruthError(f"{path}: is larger than {MOST_BYTES} bytes")
-        return path.read_bytes()
+        return regular_file.content(path, MOST_BYTES)
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from None
 
@@ -59,7 +59,9 @@ def decoded(data: bytes, name: str) -> "Picture":
     import cv2
     import numpy as np
 
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
+    if problem := problem_of(data):
+        raise TruthError(f"{name}: {problem}")
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
         raise TruthError(f"{name}: not a picture")
     return np.asarray(picture, np.uint8)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import package_data
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, Outcome, Response, Wait
 
 FILE_NAME = "results.json"
@@ -54,7 +55,7 @@ def _rounded_value(name: str, value: Any) -> Any:
 def load(path: Path) -> list[Outcome]:
     """The outcomes of a ``results.json`` that its schema accepts; raises ResultsError."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(regular_file.text(path))
         if document["dodo"] != "results" or document["version"] != VERSION:
             raise ResultsError(f"{path}: not results of version {VERSION}")
         _validate(document)

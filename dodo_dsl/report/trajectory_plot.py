@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.trajectory import Drive
+from dodo_dsl.terminal import printable
 
 _COLOURS = {"passed": "#1a7f37", "failed": "#cf222e", "error": "#9a6700"}
 _SNAPSHOT_S = 1.0

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from dodo_dsl import atomic
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.state_folder import NoStateFolder, state_path
 
@@ -95,8 +96,8 @@ class History:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if self.path.is_file() and self.path.stat().st_size > _MAX_BYTES:
                 self._shorten()
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(text)
+            with atomic.appended(self.path) as file:
+                file.write(text.encode())
 
     def _shorten(self) -> None:
         lines = self.path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
@@ -112,7 +113,7 @@ def _cores_used(load: MachineLoad | None) -> float | None:
 def _read(path: Path) -> Iterator[PastRun]:
     """The valid lines; one that a killed run left unfinished is skipped."""
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = regular_file.content(path).decode("utf-8", "replace")
     except OSError:
         return
     for line in text.splitlines():

@@ -6,8 +6,11 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
+from dodo_dsl import atomic
+
 _MAX_LINE = 1 << 16
 _MAX_LOG = 64 << 20
+_MAX_LOG_LINES = 500_000
 _TAIL_LINES = 8
 _TAIL_WIDTH = 300
 
@@ -19,10 +22,9 @@ class ServiceOutput:
     """
 
     def __init__(self, log: Path, on_line: Callable[[bytes], bool]) -> None:
-        log.parent.mkdir(parents=True, exist_ok=True)
-        self._log = log.open("ab", buffering=0)
+        self._log = atomic.appended(log)
         self._on_line = on_line
-        self._written = 0
+        self._written = self._lines = 0
         self._rest = b""
         self._skipping = False
         self._tail: deque[bytes] = deque(maxlen=_TAIL_LINES)
@@ -73,8 +75,10 @@ class ServiceOutput:
         """Writes to the log up to its limit; lines of the protocol count beyond it, too."""
         if self._written > _MAX_LOG:
             return
-        if self._written + len(data) > _MAX_LOG:
-            data = f"\n... dodo: the log ends here, at {_MAX_LOG >> 20} MiB\n".encode()
+        self._lines += data.count(b"\n")
+        if self._written + len(data) > _MAX_LOG or self._lines > _MAX_LOG_LINES:
+            limit = f"{_MAX_LOG_LINES} lines" if self._lines > _MAX_LOG_LINES else f"{_MAX_LOG >> 20} MiB"
+            data = f"\n... dodo: the log ends here, at {limit}\n".encode()
             self._written = _MAX_LOG
         self._written += len(data)
         try:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import package_data
+from dodo_dsl import atomic, package_data
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
@@ -139,7 +139,7 @@ def _converts(written: str, unit: str) -> bool:
 def write(file: Path | None = None) -> None:
     """Generates the schema's file from the shipped services."""
     target = file or path()
-    target.write_text(generate(target.read_text(encoding="utf-8"), load_manifests()[0]), encoding="utf-8")
+    atomic.write_text(target, generate(target.read_text(encoding="utf-8"), load_manifests()[0]))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.numbers import number
 from services.beacon.trajectory import Point, TrajectoryError
 
 NEEDED, POSSIBLE = ("x", "y"), ("x", "y", "z", "yaw", "time")
@@ -18,7 +20,7 @@ def read_table(path: Path, height: float) -> list[Point]:
     with #. Raises TrajectoryError with file and line.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = regular_file.text(path, encoding="utf-8-sig")
     except OSError as error:
         raise TrajectoryError(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
@@ -79,7 +81,7 @@ def _from(place: str, values: Mapping[str, float], height: float) -> Point:
 
 def _number(what: str, text: str) -> float:
     try:
-        value = float(text)
+        value = number(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -9,6 +9,8 @@ from typing import Any
 
 import shapely
 
+from dodo_dsl.opendlv import regular_file
+
 NUMBERS = 4
 
 
@@ -23,7 +25,7 @@ def load(path: Path) -> dict[str, shapely.MultiLineString]:
     """
     file = path if path.suffix == ".json" else path / "map.json"
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
+        document = json.loads(regular_file.text(file))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise ObstaclesError(f"{file}: cannot be read as a map: {reason}") from None

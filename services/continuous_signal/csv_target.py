@@ -1,12 +1,15 @@
 """A target from a CSV table: a column `time` in seconds and one of values, a header above them."""
 
 import csv
+import io
 from collections.abc import Iterator, Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 import numpy as np
 
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.numbers import exact
 from services.continuous_signal.target import MICROSECONDS, Target, TargetError
 
 TIME, VALUE = "time", "value"
@@ -19,10 +22,9 @@ def read_table(path: Path, field: str, from_first: bool) -> Target:
     Times count from zero, or `from_first` row on. Raises TargetError.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.reader(file)
-            columns = _columns(next(rows, []), field, path)
-            samples = list(_samples(rows, columns, path))
+        rows = csv.reader(io.StringIO(regular_file.text(path, encoding="utf-8-sig"), newline=""))
+        columns = _columns(next(rows, []), field, path)
+        samples = list(_samples(rows, columns, path))
     except (OSError, UnicodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise TargetError(f"{path}: cannot be read as a CSV table: {reason}") from None
@@ -66,8 +68,8 @@ def _samples(rows: Iterator[list[str]], columns: tuple[int, int, int], path: Pat
 
 def _number(text: str, what: str) -> Decimal:
     try:
-        number = Decimal(text.strip())
-    except InvalidOperation:
+        number = exact(text.strip())
+    except (InvalidOperation, ValueError):
         raise TargetError(f"{what} '{text.strip()}' is not a number") from None
     if not number.is_finite() or abs(float(number)) == float("inf"):
         raise TargetError(f"{what} '{text.strip()}' is not a finite number")

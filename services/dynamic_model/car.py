@@ -9,6 +9,9 @@ from typing import Any
 
 import yaml
 
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.numbers import number
+
 
 class CarError(ValueError):
     """A file that does not describe a car; one sentence with file and line."""
@@ -60,6 +63,7 @@ class Car:
         return ((a + d) / 2 + root) / (2 * rate)
 
 
+MOST_BYTES = 1 << 20
 KIWI = Car()
 KEYS = {field.name.replace("_", "-"): field.name for field in fields(Car)}
 
@@ -71,7 +75,7 @@ _ANY = ("steering-gain",)
 def read_car(path: Path) -> Car:
     """The car of a YAML or JSON file, the Kiwi's for parameters that it omits; raises CarError."""
     try:
-        node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+        node = yaml.compose(regular_file.text(path, MOST_BYTES), Loader=yaml.SafeLoader)
     except OSError as error:
         raise CarError(f"{path} cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
@@ -101,7 +105,7 @@ def _number(node: Any) -> float:
     if not isinstance(node, yaml.ScalarNode) or node.style is not None:
         return math.nan
     try:
-        return float(node.value)
+        return number(node.value)
     except ValueError:
         return math.nan
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from dodo_dsl.opendlv import regular_file
 from services.object_detection.boxes import Box, LabelledBox
 from services.object_detection.frames import FrameKey, plain
 
@@ -41,7 +42,7 @@ class Truth:
 def load(path: Path, frames: Frames) -> Truth:
     """The truth in a file; raises TruthError."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(regular_file.text(path))
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise TruthFileError(f"{path}: cannot be read as COCO JSON: {reason}") from None

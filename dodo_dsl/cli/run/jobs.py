@@ -11,6 +11,7 @@ from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.compiler import NoApplication, plan
 from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.output_folder import PLAN_FILE, write
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import runs
@@ -72,7 +73,7 @@ def _usable(report: Path, slugs: Sequence[str]) -> Path:
 
 def _load_plan(folder: Path, settings: Settings) -> Plan:
     try:
-        return from_json((folder / PLAN_FILE).read_text(encoding="utf-8"), settings)
+        return from_json(regular_file.text(folder / PLAN_FILE), settings)
     except OSError as error:
         raise UsageError(f"there is no compiled test at '{folder}': {error.strerror}") from error
     except (PlanError, UnicodeDecodeError) as error:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.odvd.field_types import Default, default_of
 from dodo_dsl.opendlv.odvd.tokens import OdvdError, TextPlace, Token, tokens
 
@@ -56,15 +57,11 @@ class Definition:
 def load(path: Path) -> tuple[Definition, ...]:
     """Read and parse one file; raises OdvdError."""
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_FILE_BYTES + 1)
-        text = data.decode()
+        text = regular_file.text(path, MAX_FILE_BYTES)
     except OSError as error:
         raise OdvdError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise OdvdError(f"{path}: not UTF-8 text") from None
-    if len(data) > MAX_FILE_BYTES:
-        raise OdvdError(f"{path}: is larger than {MAX_FILE_BYTES} bytes")
     return parse(text, str(path))
 
 

@@ -12,6 +12,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.messages.varints import Marks, Numbers
 from dodo_dsl.opendlv.recordings import frame_table
@@ -47,7 +48,7 @@ def read_envelopes(path: Path, damage: Callable[[Damage], None] | None = None) -
 
     Memory is bounded by the largest frame, 16 MiB. Raises OSError for an unreadable file.
     """
-    with path.open("rb") as stream:
+    with regular_file.opened(path) as stream:
         scanner = Scanner(stream)
         for batch in scanner.batches():
             yield from batch.envelopes()
@@ -66,10 +67,10 @@ class Recording:
     def __init__(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
         """Read all of a file once; ``progress`` gets the number of bytes read.
 
-        Raises OSError for an unreadable file, RecordingError for one without a single message.
+        Raises OSError for an unreadable file and for what is none, RecordingError for one without a single message.
         """
         self.path = path
-        self._stream: BinaryIO = path.open("rb", buffering=0)
+        self._stream: BinaryIO = regular_file.opened(path)
         try:
             self.size = os.fstat(self._stream.fileno()).st_size
             self.damage, self.index = _indexed(self._stream, progress)

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl import atomic
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.trace import traced
@@ -111,7 +112,6 @@ class Compose:
             await process.wait()
             raise
         if log is not None:
-            log.parent.mkdir(parents=True, exist_ok=True)
-            log.write_bytes(out + err)
+            atomic.write_bytes(log, out + err)
         errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
         return process.returncode or 0, out.decode("utf-8", "replace"), errors[-1].strip() if errors else ""

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl import atomic
 from dodo_dsl.run.process.commands import package_path
 from dodo_dsl.run.process.fork_server_client import ForkedSandbox, ForkServer, end
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
@@ -68,7 +69,7 @@ class SandboxClient:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
         self._socket, self._up = ours, asyncio.get_running_loop().create_future()
-        with theirs, log.open("wb") as stderr:
+        with theirs, atomic.appended(log) as stderr:
             if not self._is_forked(theirs, stderr.fileno(), slot):
                 self._process = subprocess.Popen(
                     [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(theirs.fileno()), self._isolation],

@@ -131,7 +131,7 @@ DESK = ("desk", "--picture", "desk.png")
         ),
         ((*DESK, "--boxes", "desk.png"), "desk.png: cannot be read as COCO JSON"),
         (("desk", *BOX, "--picture", "none.png"), "none.png: cannot be read: No such file"),
-        (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: not a picture"),
+        (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: not a readable picture"),
         (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),
         (("desk", *BOX, "--test", "sil-open-straight"), "has no service 'camera'"),
         (("blind", *BOX), "rig 'blind' has no camera in dodo.yml"),

@@ -1,0 +1,49 @@
+"""Input from files, and from nothing else: a FIFO would be waited for, a device may never end, or move something."""
+
+import errno
+import io
+import os
+import stat
+from pathlib import Path
+
+MOST_BYTES = 64 << 20
+"""Of a file that is read at once."""
+_KINDS = {
+    stat.S_ISCHR: "a device",
+    stat.S_ISBLK: "a device",
+    stat.S_ISFIFO: "a FIFO",
+    stat.S_ISSOCK: "a socket",
+}
+
+
+class NotAFile(OSError):
+    """A path of the user that names no regular file; has its name."""
+
+
+def opened(path: Path) -> io.FileIO:
+    """A regular file to read, without a buffer; raises NotAFile, IsADirectoryError and OSError."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return io.FileIO(descriptor, "rb")
+    os.close(descriptor)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    kind = next((text for is_kind, text in _KINDS.items() if is_kind(mode)), "no file")
+    raise NotAFile(errno.EINVAL, f"{kind}, expected a file", str(path))
+
+
+def content(path: Path, most: int = MOST_BYTES) -> bytes:
+    """The bytes of a regular file; raises OSError as ``opened`` does, and where there are more than ``most``."""
+    with opened(path) as file:
+        data = file.read(most + 1)
+        while 0 < len(data) <= most and (more := file.read(most + 1 - len(data))):
+            data += more
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"larger than {most} bytes", str(path))
+    return data
+
+
+def text(path: Path, most: int = MOST_BYTES, encoding: str = "utf-8") -> str:
+    """The text of a regular file; raises OSError as ``content`` does, and UnicodeDecodeError."""
+    return content(path, most).decode(encoding)
