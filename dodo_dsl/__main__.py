@@ -1,10 +1,16 @@
-"""``python -m dodo_dsl`` and ``dodo``: the process exit, and nothing else."""
+"""``python -m dodo_dsl`` and ``dodo``: the process exit and its streams, and nothing else."""
 
+import contextlib
 import io
+import os
 import sys
+
+CLOSED = 3
 
 
 def run() -> None:
+    if sys.stdout is None or sys.stderr is None:
+        sys.exit(_refuse_closed())
     try:
         from dodo_dsl.cli.main import main
 
@@ -13,7 +19,26 @@ def run() -> None:
         code = main(sys.argv[1:], sys.stdout, sys.stderr)
     except KeyboardInterrupt:
         code = 130
-    sys.exit(code)
+    sys.exit(_flushed(code))
+
+
+def _refuse_closed() -> int:
+    """Says that a standard stream is closed, whose number the next file that is opened would get."""
+    if sys.stderr is not None:
+        sys.stderr.write("dodo: standard output is closed, redirect it to /dev/null instead\n")
+    return CLOSED
+
+
+def _flushed(code: int) -> int:
+    """The exit code, another one where the rest of the output cannot be written."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(f"dodo: the output cannot be written: {error.strerror}\n")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return code or CLOSED
+    return code
 
 
 if __name__ == "__main__":

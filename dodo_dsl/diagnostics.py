@@ -3,12 +3,13 @@
 import difflib
 import functools
 import hashlib
-import json
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
+
+from dodo_dsl.terminal import json_text, printable
 
 Severity = Literal["error", "warning"]
 
@@ -84,11 +85,6 @@ def _source_line(span: Span) -> str | None:
     return lines[span.line - 1] if 0 < span.line <= len(lines) else None
 
 
-def printable(text: str) -> str:
-    """The text without control characters, which could move a cursor or command a CI log."""
-    return "".join(c if c.isprintable() else ("→" if c == "\t" else "�") for c in text)
-
-
 def _code_frame(span: Span) -> list[str]:
     line = _source_line(span)
     if line is None:
@@ -103,7 +99,7 @@ def _code_frame(span: Span) -> list[str]:
 
 def _text(diagnostic: Diagnostic) -> str:
     span = diagnostic.span
-    head = f"{shown_path(span.file)}:{span.line}:{span.column}: {diagnostic.severity}[{diagnostic.rule}]: "
+    head = f"{printable(shown_path(span.file))}:{span.line}:{span.column}: {diagnostic.severity}[{diagnostic.rule}]: "
     lines = [head + printable(diagnostic.message), *_code_frame(span)]
     if diagnostic.hint:
         lines.append(f"  hint: {printable(diagnostic.hint)}")
@@ -127,7 +123,7 @@ def format_json(diagnostics: Sequence[Diagnostic]) -> str:
         }
         for d in diagnostics
     ]
-    return json.dumps(rows, indent=2) + "\n"
+    return json_text(rows)
 
 
 def format_gitlab(diagnostics: Sequence[Diagnostic]) -> str:
@@ -148,7 +144,7 @@ def format_gitlab(diagnostics: Sequence[Diagnostic]) -> str:
                 "location": {"path": path, "lines": {"begin": d.span.line}},
             }
         )
-    return json.dumps(rows, indent=2) + "\n"
+    return json_text(rows)
 
 
 FORMATS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {

@@ -2,13 +2,12 @@
 
 import argparse
 import dataclasses
-import json
 from typing import TextIO
 
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.diagnostics import printable
 from dodo_dsl.run.capabilities import examine
 from dodo_dsl.run.work_folder import reap_folders
+from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
   dodo doctor              every finding, and what to do about it
@@ -31,7 +30,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         stderr.writelines(f"cannot be removed: {printable(line)}\n" for line in reaped.left)
     findings = examine.examine()
     if options.json:
-        stdout.write(json.dumps([dataclasses.asdict(f) for f in findings], indent=2) + "\n")
+        stdout.write(json_text([dataclasses.asdict(f) for f in findings]))
     else:
         width = max(len(f.name) for f in findings)
         for finding in findings:

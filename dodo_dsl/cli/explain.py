@@ -1,7 +1,6 @@
 """dodo explain: explain a rule, or how a test is wired and what its application must provide."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TextIO
@@ -11,7 +10,8 @@ from dodo_dsl.check.explanation import Asked, Explanation, Line, explain
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.diagnostics import did_you_mean, format_text, printable
+from dodo_dsl.diagnostics import did_you_mean, format_text
+from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
   dodo explain                       all rules, one line each
@@ -35,7 +35,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         return _rules(options.json, stdout)
     if options.word in rules:
         page = rules[options.word]
-        stdout.write(json.dumps(asdict(page), indent=2) + "\n" if options.json else catalogue.text(page))
+        stdout.write(json_text(asdict(page)) if options.json else catalogue.text(page))
         return Exit.OK
     try:
         checked = selection.select([options.word], (), options.application)
@@ -43,7 +43,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         near = did_you_mean(options.word, rules) if "-" in options.word else ""
         raise UsageError(f"{error}" + (f"; or the rule: {near}" if near else "")) from None
     found = [explain(test) for test in checked.tests]
-    stdout.write(json.dumps([asdict(e) for e in found], indent=2) + "\n" if options.json else _text(found))
+    stdout.write(json_text([asdict(e) for e in found]) if options.json else _text(found))
     stderr.write(selection.left_out(checked) + format_text(checked.diagnostics))
     return Exit.OK if checked.ok else Exit.USAGE
 
@@ -51,7 +51,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 def _rules(as_json: bool, stdout: TextIO) -> int:
     pages = catalogue.pages().values()
     if as_json:
-        stdout.write(json.dumps([asdict(page) for page in pages], indent=2) + "\n")
+        stdout.write(json_text([asdict(page) for page in pages]))
     else:
         stdout.write(_table([[page.name, page.summary] for page in pages], ""))
     return Exit.OK
@@ -69,19 +69,19 @@ def _file(instances: Sequence[Explanation]) -> str:
     first = instances[0]
     parts = [_head(first), _services(first), _wiring(first), _differences(instances)]
     others = {(e.wiring, e.asked): e for e in reversed(instances) if (e.wiring, e.asked) != (first.wiring, first.asked)}
-    parts += [f"{other.name}\n\n{_wiring(other)}" for other in reversed(others.values())]
+    parts += [f"{printable(other.name)}\n\n{_wiring(other)}" for other in reversed(others.values())]
     return "\n".join(part for part in parts if part)
 
 
 def _head(one: Explanation) -> str:
     rig = f", rig {one.rig}" if one.rig else ""
-    return f"{printable(one.name)} ({one.level}, {one.kind}{rig})\n{one.file}\n"
+    return f"{printable(f'{one.name} ({one.level}, {one.kind}{rig})')}\n{printable(one.file)}\n"
 
 
 def _services(one: Explanation) -> str:
     lines = []
     for service in one.services:
-        lines.append(f"{service.layer}: {service.name} ({service.uses})\n")
+        lines.append(printable(f"{service.layer}: {service.name} ({service.uses})") + "\n")
         rows = [
             [a.name, f"{a.value} {a.unit}".strip(), a.origin.replace(f"{one.file}:", "line ")]
             for a in service.arguments

@@ -1,7 +1,6 @@
 """dodo list: list the tests and services."""
 
 import argparse
-import json
 import shlex
 from typing import TextIO
 
@@ -9,7 +8,8 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
-from dodo_dsl.diagnostics import did_you_mean, printable, shown_path
+from dodo_dsl.diagnostics import did_you_mean, shown_path
+from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
@@ -35,7 +35,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     of_services = options.services is not None
     rows = _services(everything) if of_services else _tests(everything)
     if options.json:
-        stdout.write(json.dumps(rows, indent=2) + "\n")
+        stdout.write(json_text(rows))
     else:
         columns = ("name", "layers", "description") if of_services else ("name", "level", "kind", "description")
         _table(rows, columns, stdout)
@@ -79,7 +79,7 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
     manifest = checked.manifests.get(name)
     if manifest is None:
         raise UsageError(f"there is no service '{name}'; {did_you_mean(name, checked.manifests)}")
-    stdout.write(f"{manifest.name} ({', '.join(manifest.layers)}): {manifest.description}\n\nparameters:\n")
+    lines = [f"{manifest.name} ({', '.join(manifest.layers)}): {manifest.description}", "", "parameters:"]
     for parameter in manifest.parameters.values():
         default = "" if parameter.default in (None, []) else f", default {parameter.default}"
         facts = f"{parameter.type}{default}"
@@ -87,13 +87,14 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
             others = [*["another service of the test"] * parameter.shared, *["the rig"] * bool(parameter.rig)]
             facts += f", required unless {' or '.join(others)} provides it" if others else ", required"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
-        stdout.write(f"  {parameter.name}: {facts} {unit}".rstrip() + f"\n      {parameter.help}\n")
+        lines += [f"  {parameter.name}: {facts} {unit}".rstrip(), f"      {parameter.help}"]
     for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):
         for direction, names in (("in", ports.inputs), ("out", ports.outputs)):
             if names:
-                stdout.write(f"{title} {direction}: {', '.join(names)}\n")
+                lines.append(f"{title} {direction}: {', '.join(names)}")
     if manifest.example is not None:
-        stdout.write(f"standalone: {shlex.join([*manifest.process, '--cid=128', *manifest.example])}\n")
+        lines.append(f"standalone: {shlex.join([*manifest.process, '--cid=128', *manifest.example])}")
+    stdout.writelines(f"{printable(line)}\n" for line in lines)
     return Exit.OK
 
 

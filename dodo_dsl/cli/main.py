@@ -21,6 +21,7 @@ from dodo_dsl.cli.new import command as new_command
 from dodo_dsl.cli.rec import command as rec_command
 from dodo_dsl.cli.rig import command as rig_command
 from dodo_dsl.cli.run import command as run_command
+from dodo_dsl.terminal import harmless_stream
 
 COMMANDS: dict[str, ModuleType] = {
     "compile": compile_command,
@@ -72,6 +73,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     """Runs one command. What it cannot do is one sentence here, and an exit code; so is argparse's SystemExit."""
+    stdout, stderr = harmless_stream(stdout), harmless_stream(stderr)
     try:
         options = parser().parse_args(argv)
     except SystemExit as stop:
@@ -87,10 +89,15 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     except Exception as error:
         code = exit_code(error)
         if code is not None:
-            stderr.write(f"dodo {options.command}: {sentence(error)}\n")
+            stderr.write(f"dodo {options.command}: {_indented(sentence(error))}\n")
             return code
         if os.environ.get(DEBUG):
             raise
-        said = f"internal error: {type(error).__name__}: {error}"
+        said = _indented(f"internal error: {type(error).__name__}: {error}")
         stderr.write(f"dodo {options.command}: {said}\n{DEBUG}=1 shows where\n")
         return Exit.ERROR
+
+
+def _indented(text: str) -> str:
+    """A sentence whose further lines, which others may have written, cannot be taken for DoDo's."""
+    return text.replace("\n", "\n  ")

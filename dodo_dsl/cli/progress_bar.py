@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from dodo_dsl.diagnostics import printable
+from dodo_dsl.terminal import printable, unescaped
 
 
 @contextmanager
@@ -17,6 +17,6 @@ def progress_bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[in
     from rich.progress import Progress, TextColumn
 
     columns = (TextColumn("{task.description}", markup=False), *Progress.get_default_columns()[1:])
-    with Progress(*columns, console=Console(file=stream), transient=True) as progress:
+    with Progress(*columns, console=Console(file=unescaped(stream)), transient=True) as progress:
         task = progress.add_task(printable(text), total=total)
         yield lambda done: progress.update(task, completed=done)

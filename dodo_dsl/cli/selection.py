@@ -13,6 +13,7 @@ from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, loa
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.settings import Settings
+from dodo_dsl.terminal import printable
 
 
 class NoSuchTest(UsageError):
@@ -85,7 +86,7 @@ def left_out(checked: Checked) -> str:
     """One line about the shipped tests that were skipped; empty when there are none."""
     if not checked.left_out:
         return ""
-    names = ", ".join(checked.left_out)
+    names = printable(", ".join(checked.left_out))
     return f"skipped shipped tests that need what the application does not send: {names} (see dodo explain NAME)\n"
 
 

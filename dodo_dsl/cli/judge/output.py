@@ -1,15 +1,14 @@
 """A judgement as text and as JSON."""
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
 from dodo_dsl.cli.judge.known_run import KnownRun
-from dodo_dsl.diagnostics import printable
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import VerdictEvent
 from dodo_dsl.run.recorded.judge import Judgement
 from dodo_dsl.run.recorded.test_recording import TestRecording
+from dodo_dsl.terminal import json_text, printable
 
 VERSION = 1
 
@@ -49,7 +48,7 @@ def as_json(plan: Plan, recording: TestRecording, judgement: Judgement, run: Kno
         "notes": _notes(plan, judgement, run),
         "last_lines": judgement.last_lines,
     }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(document)
 
 
 def _notes(plan: Plan, judgement: Judgement, run: KnownRun | None) -> list[str]:

@@ -1,7 +1,6 @@
 """The actions of ``dodo rec``."""
 
 import argparse
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from dodo_dsl.rec.contents_text import contents_text
 from dodo_dsl.rec.excerpt import Excerpt, NothingSelected
 from dodo_dsl.rec.frames import IMAGE
 from dodo_dsl.rec.outputs import refuse_existing
+from dodo_dsl.terminal import json_text, printable
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class _Job:
 
 
 def _tell(stderr: TextIO, text: str) -> None:
-    stderr.write(f"dodo rec: {text}\n")
+    stderr.write(f"dodo rec: {printable(text)}\n")
 
 
 def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
@@ -75,7 +75,7 @@ def _info(job: _Job, version: str) -> None:
         decoding = None if job.options.no_decode else progress
         found = contents.look(job.recording, job.messages, version, decoding, job.tell)
     if job.options.json:
-        job.stdout.write(json.dumps(found.as_json(job.recording), indent=2) + "\n")
+        job.stdout.write(json_text(found.as_json(job.recording)))
     else:
         job.stdout.write(contents_text(found, job.recording))
 

@@ -4,8 +4,8 @@ import time
 from collections.abc import Sequence
 from typing import Any, Self, TextIO
 
-from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.terminal import printable, unescaped
 
 _STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
 
@@ -15,7 +15,7 @@ def summary_line(outcome: Outcome, width: int) -> str:
     times = ""
     if outcome.setup_s is not None and outcome.execution_s is not None:
         times = f" (set-up {outcome.setup_s:.1f} s, ran {outcome.execution_s:.1f} s)"
-    return f"{outcome.outcome.upper():<6}  {outcome.name:<{width}}  {printable(outcome.reason)}{times}"
+    return f"{outcome.outcome.upper():<6}  {printable(outcome.name):<{width}}  {printable(outcome.reason)}{times}"
 
 
 class PlainProgress:
@@ -55,7 +55,9 @@ class LiveProgress:
 
         fields = ("description", "fields[outcome]", "fields[state]")
         columns = [TextColumn(f"{{task.{name}}}", markup=name == "fields[outcome]") for name in fields]
-        self._progress: Any = Progress(SpinnerColumn(), *columns, TimeElapsedColumn(), console=Console(file=stream))
+        self._progress: Any = Progress(
+            SpinnerColumn(), *columns, TimeElapsedColumn(), console=Console(file=unescaped(stream))
+        )
         self._rest: Any = None
         self._tasks = {s: self._add(s, "waiting") for s in slugs}
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import TextIO
 
 from dodo_dsl.cli.run.progress import count, summary_line
-from dodo_dsl.diagnostics import printable
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.terminal import printable
 
 _KINDS = ("passed", "failed", "error")
 
@@ -25,7 +25,9 @@ def write(stream: TextIO, outcomes: Sequence[Outcome], tests: Mapping[str, str],
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in _KINDS}
     stream.write(f"{counts['passed']} passed, {counts['failed']} failed, {counts['error']} in error\n")
     if skipped:
-        stream.write(f"{count(len(skipped))} not started: {', '.join(skipped[:5])}{' ...' * (len(skipped) > 5)}\n")
+        stream.write(
+            f"{count(len(skipped))} not started: {printable(', '.join(skipped[:5]))}{' ...' * (len(skipped) > 5)}\n"
+        )
 
 
 def _rates(outcomes: Sequence[Outcome], tests: Mapping[str, str]) -> list[str]:
@@ -35,5 +37,5 @@ def _rates(outcomes: Sequence[Outcome], tests: Mapping[str, str]) -> list[str]:
         runs = [o.outcome for o in outcomes if tests[o.slug] == test]
         passed = runs.count("passed")
         rate = f" ({passed / len(runs):.1%})" if runs else ""
-        lines.append(f"{test}: {passed} of {len(runs)} passed{rate}")
+        lines.append(f"{printable(test)}: {passed} of {len(runs)} passed{rate}")
     return lines

@@ -7,6 +7,8 @@ import signal
 from collections.abc import Iterable, Iterator
 from typing import Any, TextIO
 
+from dodo_dsl.terminal import unescaped
+
 
 def more_descriptors() -> None:
     """Raises the limit of descriptors as far as allowed: every service has a pipe and a log."""
@@ -36,6 +38,11 @@ class UninterruptedStream:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
+
+    @property
+    def unescaped(self) -> "UninterruptedStream":
+        """The stream for displays that move the cursor, without an end of the run either."""
+        return UninterruptedStream(unescaped(self._stream))
 
     def write(self, text: str) -> int:
         try:
