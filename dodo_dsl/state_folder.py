@@ -4,8 +4,11 @@ The folder is ``dodo`` in the state folder of the XDG Base Directory Specificati
 ``~/.local/state``.
 """
 
+import contextlib
+import errno
 import os
 import pwd
+import stat
 from pathlib import Path
 
 
@@ -21,6 +24,37 @@ def state_path(variable: str, name: str) -> Path:
         return _state_home() / "dodo" / name
     except KeyError:
         raise NoStateFolder(f"user {os.getuid()} has no home folder: set {variable} or XDG_STATE_HOME") from None
+
+
+class UnsafeFolder(OSError):
+    """Others could write into a folder of DoDo's state; the text says what to do."""
+
+
+def secured(folder: Path) -> Path:
+    """The folder, which only its owner can write: this user or root; it is made, with mode 0700, where there is none.
+
+    Of a folder of root the group may write, too, as several users share the state then. Raises UnsafeFolder, also for
+    a symlink, and OSError.
+    """
+    with contextlib.suppress(FileExistsError):  # of a file in its place the next call tells
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(mode=0o700)
+    except FileExistsError:
+        _check(folder)
+    return folder
+
+
+def _check(folder: Path) -> None:
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode):
+        raise UnsafeFolder(errno.ENOTDIR, "not a folder, and DoDo keeps no state where it points to", str(folder))
+    if status.st_uid not in (os.geteuid(), 0):
+        raise UnsafeFolder(errno.EPERM, f"belongs to user {status.st_uid}, who could change DoDo's state", str(folder))
+    if status.st_mode & stat.S_IWOTH:
+        raise UnsafeFolder(errno.EPERM, "all users can write it, and so DoDo's state: chmod 700", str(folder))
+    if status.st_mode & stat.S_IWGRP and status.st_uid != 0:
+        folder.chmod(stat.S_IMODE(status.st_mode) & ~stat.S_IWGRP)
 
 
 def _state_home() -> Path:

@@ -15,11 +15,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.spec.machine import machine
+from dodo_dsl.state_folder import secured
+
 FOLDER_VARIABLE = "DODO_LEASES"
 DEFAULT_PATIENCE_S = 600.0
 RUN, PROJECT = "run-", "docker-"
 ONCE = (RUN, PROJECT)
 """Prefixes of leases with random names: nobody ever waits for one, so their lock files are removed."""
+_LOCKS = Path("/run/lock")
+_MODE = 0o660
 _RETRY_S = 0.2
 _NO_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
 """Raised by reading a record that is damaged or was written by another program."""
@@ -30,16 +36,17 @@ class LeaseTimeout(Exception):
 
 
 def folder() -> Path:
-    """The machine's lease folder, open to all users as ``/run/lock`` is."""
-    wanted = os.environ.get(FOLDER_VARIABLE)
-    path = Path(wanted) if wanted else Path("/run/lock/dodo")
-    if not wanted and not path.is_dir() and not os.access(path.parent, os.W_OK):
-        path = Path("/tmp/dodo-leases")
-    if not path.is_dir():
-        path.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(PermissionError):
-            path.chmod(0o1777)
-    return path
+    """This user's lease folder, into which no other user can write; raises OSError where one can.
+
+    It is the one that the machine's operator named for its rigs, else the one in ``DODO_LEASES``.
+    """
+    if (operators := machine()) is not None and operators.leases is not None:
+        return secured(operators.leases)
+    if wanted := os.environ.get(FOLDER_VARIABLE):
+        return secured(Path(wanted))
+    own = f"dodo-{os.geteuid()}"
+    above = _LOCKS if (_LOCKS / own).exists() or os.access(_LOCKS, os.W_OK) else Path("/tmp")
+    return secured(above / own)
 
 
 @dataclass(frozen=True)
@@ -75,8 +82,8 @@ def _open(name: str) -> int:
             return os.open(_lock_file(name), flags)
         except FileNotFoundError:
             with contextlib.suppress(FileExistsError):
-                descriptor = os.open(_lock_file(name), flags | os.O_CREAT | os.O_EXCL, 0o666)
-                os.fchmod(descriptor, 0o666)
+                descriptor = os.open(_lock_file(name), flags | os.O_CREAT | os.O_EXCL, _MODE)
+                os.fchmod(descriptor, _MODE)
                 return descriptor
 
 
@@ -92,18 +99,28 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
         raise
     record = folder() / f"{name}.{os.getpid()}.json"
     try:
-        record.write_text(json.dumps({"pid": os.getpid(), **about}))
+        _write_new(record, json.dumps({"pid": os.getpid(), **about}))
     except OSError:
         os.close(descriptor)
         raise
     return Lease(name, descriptor, record)
 
 
+def _write_new(record: Path, text: str) -> None:
+    """Writes a record that nobody can have put there, in the place of one that an earlier process of this id left."""
+    record.unlink(missing_ok=True)
+    descriptor = os.open(record, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
+    try:
+        os.write(descriptor, text.encode())
+    finally:
+        os.close(descriptor)
+
+
 def holder(name: str) -> str:
     """Who holds a lease, for a message; its record may be another user's."""
     for record in sorted(folder().glob(f"{name}.*.json")):
         with contextlib.suppress(OSError, *_NO_RECORD):
-            about = json.loads(record.read_text())
+            about = json.loads(regular_file.text(record))
             if _is_alive(int(about["pid"])):
                 return f"test {about.get('test', '?')} of process {about['pid']}"
     return "another process"
@@ -154,7 +171,7 @@ def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
     for record in sorted(folder().glob(f"{prefix}*.json")):
         name = record.name.split(".")[0]
         with contextlib.suppress(OSError):
-            if record.stat().st_uid != os.getuid():
+            if record.lstat().st_uid != os.getuid():
                 continue
             about = _about(record)
             descriptor = _open(name)
@@ -169,7 +186,7 @@ def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
 def _about(record: Path) -> dict[str, Any]:
     """The content of a record; empty when its writer was killed before it was complete."""
     with contextlib.suppress(*_NO_RECORD):
-        about = json.loads(record.read_text())
+        about = json.loads(regular_file.text(record))
         return about if isinstance(about, dict) else {}
     return {}
 
@@ -178,5 +195,5 @@ def forget_dead() -> None:
     """Removes the records of machine leases whose process has ended; their locks ended with it."""
     for record in folder().glob("machine.*.json"):
         with contextlib.suppress(OSError, *_NO_RECORD):
-            if not Path("/proc", str(int(json.loads(record.read_text())["pid"]))).exists():
+            if not Path("/proc", str(int(json.loads(regular_file.text(record))["pid"]))).exists():
                 record.unlink(missing_ok=True)

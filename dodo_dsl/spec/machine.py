@@ -1,0 +1,85 @@
+"""The operator's word on the rigs of a machine: ``/etc/dodo/rigs.yml``, which no test and no job can change.
+
+It says where leases and quarantines are kept, which devices are rigs, how far they may move at most, and the
+repositories whose tests may move them. A repository's ``dodo.yml`` can only be stricter.
+"""
+
+import functools
+import os
+import stat
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dodo_dsl.diagnostics import format_text
+from dodo_dsl.source import Mapping, parse, plain
+from dodo_dsl.spec import quantity
+from dodo_dsl.spec.schema import validate
+
+FILE = Path("/etc/dodo/rigs.yml")
+UNITS = {"x": "m", "y": "m", "yaw": "deg", "speed": "m/s", "yaw-rate": "rad/s"}
+"""Of the limits."""
+
+
+class MachineError(OSError):
+    """The operator's file cannot be used; one sentence."""
+
+
+@dataclass(frozen=True)
+class PermittedRig:
+    """Devices that a rig has, its largest limits in ``UNITS``, and folders of repositories that may move it."""
+
+    name: str
+    devices: tuple[str, ...]
+    repositories: tuple[Path, ...] = ()
+    limits: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The operator's file; a place is None where it names none."""
+
+    rigs: tuple[PermittedRig, ...] = ()
+    leases: Path | None = None
+    quarantine: Path | None = None
+
+
+def machine(file: Path | None = None) -> Machine | None:
+    """What the operator of this machine wrote; None where there is no file. Raises MachineError."""
+    path = file or FILE
+    try:
+        status = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise MachineError(error.errno, error.strerror, str(path)) from None
+    if not stat.S_ISREG(status.st_mode) or status.st_uid not in (0, os.geteuid()) or status.st_mode & 0o022:
+        raise MachineError(None, "expected a file of root that only root can write", str(path))
+    return _read(path, status.st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=4)
+def _read(path: Path, _changed: int) -> Machine:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MachineError(None, f"cannot be read: {error}", str(path)) from None
+    node, found = parse(text, str(path))
+    problems = [*found, *(validate(node, "machine") if node is not None else ())]
+    if problems or not isinstance(node, Mapping):
+        said = format_text(problems[:1]).splitlines()
+        raise MachineError(None, said[0] if said else "is empty, expected 'dodo: 1'", str(path))
+    raw = plain(node)
+    places = {key: Path(raw[key]) if key in raw else None for key in ("leases", "quarantine")}
+    return Machine(tuple(_rig(path, name, rig) for name, rig in (raw.get("rigs") or {}).items()), **places)
+
+
+def _rig(path: Path, name: str, raw: dict[str, object]) -> PermittedRig:
+    written = raw.get("limits") or {}
+    assert isinstance(written, dict)
+    try:
+        limits = {key: float(quantity.convert(value, UNITS[key])) for key, value in written.items()}
+    except quantity.QuantityError as error:
+        raise MachineError(None, f"rig '{name}': {error}", str(path)) from None
+    devices, repositories = raw["devices"], raw.get("repositories") or []
+    assert isinstance(devices, list) and isinstance(repositories, list)
+    return PermittedRig(name, tuple(devices), tuple(map(Path, repositories)), limits)
