@@ -64,8 +64,12 @@ class Processes:
     name = "process"
     _fork_server: ForkServer | None = None
 
-    def __init__(self, cids: Sequence[int], isolation: str | None, descriptors: tuple[int, ...]) -> None:
+    def __init__(
+        self, cids: Sequence[int], isolation: str | None, descriptors: tuple[int, ...], roots: Sequence[Path] = ()
+    ) -> None:
+        """``roots`` are the folders that tests come from, for the permission to use a rig."""
         self._cids = cids
+        self._roots = roots
         self._isolation = isolation
         self._descriptors = descriptors
         self._alone = asyncio.Lock()
@@ -112,7 +116,7 @@ class Processes:
             host_isolation.host_slot(
                 plan, () if is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
             ) as leased,
-            attended(plan, leased.cid, leased.descriptors, say) as descriptors,
+            attended(plan, leased.cid, leased.descriptors, say, self._roots) as descriptors,
         ):
             slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)
@@ -123,8 +127,9 @@ class Containers:
 
     name = "docker"
 
-    def __init__(self, subnets: Sequence[str]) -> None:
+    def __init__(self, subnets: Sequence[str], roots: Sequence[Path] = ()) -> None:
         self._subnets = subnets
+        self._roots = roots
         self._client: Any = None
         self._pulls: Pulls | None = None
         self._problem = ""
@@ -161,7 +166,7 @@ class Containers:
             else:
                 async with (
                     host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
-                    attended(plan, slot.cid, slot.descriptors, say),
+                    attended(plan, slot.cid, slot.descriptors, say, self._roots),
                 ):
                     yield backend
         finally:

@@ -44,6 +44,11 @@ class Rig:
         node = self.node.get("privileged")
         return isinstance(node, Scalar) and node.value is True
 
+    def text(self, key: str) -> str:
+        """The string at a dotted key; empty where there is none."""
+        entry = self.entry(key)
+        return entry.value.text if entry and isinstance(entry.value, Scalar) else ""
+
     def entry(self, key: str) -> Entry | None:
         """The rig's entry at a dotted key such as ``camera.width``."""
         node: Node = self.node

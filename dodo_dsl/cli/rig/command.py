@@ -1,7 +1,6 @@
 """dodo rig: operate a rig manually: its status, motion, calibration, quarantine and camera."""
 
 import argparse
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
@@ -9,15 +8,18 @@ from typing import Any, TextIO
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.numbers import finite, patience
 from dodo_dsl.cli.rig import truth_command
 from dodo_dsl.run.rigs import quarantine
 from dodo_dsl.run.rigs.access import MANUAL, query_exclusively
+from dodo_dsl.run.rigs.permission import LIMIT_FLAGS, refuse_forbidden
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.deployment import FILE_NAME, Deployment
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.values import ValueProblem, convert
+from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
   dodo rig status                       every rig of dodo.yml: quarantine and position
@@ -47,9 +49,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         count = "?" if name == "status" else None
         action.add_argument("rig", nargs=count, metavar="RIG", help="name of a rig in dodo.yml, or emulated")
         for axis, unit in {"x": "m", "y": "m", "yaw": "degrees"}.items() if name == "goto" else ():
-            action.add_argument(axis, type=float, metavar=axis.upper(), help=f"in {unit}, 0 is the middle")
+            action.add_argument(axis, type=finite, metavar=axis.upper(), help=f"in {unit}, 0 is the middle")
         wait = "maximum wait for a busy rig, in s (default: 60)"
-        action.add_argument("--wait", type=float, default=60.0, metavar="S", help=wait)
+        action.add_argument("--wait", type=patience, default=60.0, metavar="S", help=wait)
         action.add_argument("--json", action="store_true", help="output as JSON")
     text = "take a snapshot of the camera and write its truth for object-detection"
     formatter = argparse.RawDescriptionHelpFormatter
@@ -61,18 +63,18 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     def say(text: str) -> None:
-        stderr.write(f"{text}\n")
+        stderr.write(f"{printable(text)}\n")
 
     deployment = selection.checked_deployment()
     chosen = _chosen(options, deployment)
     if options.action == "truth":
         stdout.write(truth_command.make(options, deployment, chosen[0], say) + "\n")
         return Exit.OK
-    results = [_one(options, rig, say) for rig in chosen]
+    results = [_one(options, rig, deployment.root, say) for rig in chosen]
     if options.json:
-        stdout.write(json.dumps(results, indent=2) + "\n")
+        stdout.write(json_text(results))
     else:
-        stdout.writelines(f"{_sentence(result)}\n" for result in results)
+        stdout.writelines(f"{printable(_sentence(result))}\n" for result in results)
         if not results:
             stdout.write(f"{FILE_NAME} has no rigs; every machine has '{EMULATED}': dodo rig status {EMULATED}\n")
     if any(result.get("error") for result in results):
@@ -89,19 +91,24 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Rig]:
     return [rig]
 
 
-def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
-    """The result of the action on one rig; a status includes its fault."""
+def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str], None]) -> dict[str, Any]:
+    """The result of the action on one rig of the repository at ``root``; a status includes its fault."""
     result: dict[str, Any] = {"rig": rig.name, "kind": rig.kind, "quarantine": ""}
+    devices = [text for key in ("serial", "camera.source") if (text := rig.text(key))]
+    if options.action != "status":
+        refuse_forbidden(devices, _limits(rig, options.action), [root])
     if options.action == "clear":
-        quarantine.clear(rig.name)
+        quarantine.clear(rig.name, devices)
         return result
     if not rig.is_emulated:
-        result["quarantine"] = quarantine.quarantined(rig.name)
+        result["quarantine"] = quarantine.quarantined(rig.name, devices)
     if rig.entry("serial") is None:
         if options.action != "status":
             raise UsageError(f"rig '{rig.name}' has no serial port, so it cannot move")
         return result
     try:
+        if options.action == "status":
+            refuse_forbidden(devices, dict.fromkeys(LIMIT_FLAGS, 0.0), [root])
         return {**result, **_moved(options, rig, say)}
     except RigProblem as problem:
         if options.action != "status":
@@ -125,6 +132,15 @@ def _flags(rig: Rig) -> list[str]:
         text = entry.value.text if flag == "serial" else _number(entry.value, flag, unit)
         flags.append(f"--{flag}={text}")
     return flags
+
+
+def _limits(rig: Rig, action: str) -> dict[str, float]:
+    """The limits of an action's motion, as the operator of a machine has them; its speed is the firmware's."""
+    if action == "clear":
+        return dict.fromkeys(LIMIT_FLAGS, 0.0)
+    words = dict(word.removeprefix("--").split("=", 1) for word in _flags(rig))
+    ranges = {name: float(words[flag]) for name, flag in LIMIT_FLAGS.items() if flag in words}
+    return {"speed": 0.0, "yaw-rate": 0.0, **ranges}
 
 
 YAW = ("limits.yaw", "range-yaw", "deg")

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.numbers import patience
 from dodo_dsl.rec import truth
 from dodo_dsl.rec.outputs import refuse_existing
 from dodo_dsl.rec.truth import Mark, TruthError
 from dodo_dsl.rec.truth_files import TruthFiles, decoded, given
 from dodo_dsl.run.rigs import camera
 from dodo_dsl.run.rigs.access import query_exclusively
+from dodo_dsl.run.rigs.permission import LIMIT_FLAGS, refuse_forbidden
+from dodo_dsl.run.rigs.rig_leases import devices_in
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
@@ -46,7 +49,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--picture", metavar="FILE", type=Path, help="picture to use instead of a new snapshot")
     parser.add_argument("--force", action="store_true", help="replace existing files")
     parser.add_argument(
-        "--wait", type=float, default=60.0, metavar="S", help="maximum wait for a busy rig, in s (default: 60)"
+        "--wait", type=patience, default=60.0, metavar="S", help="maximum wait for a busy rig, in s (default: 60)"
     )
 
 
@@ -62,7 +65,7 @@ def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Cal
     has_boxes = is_scene or options.box or options.boxes
     refuse_existing(files.wanted(bool(has_boxes), is_new), options.force)
     marks = [truth.mark(words[0], words[1:], f"--box {' '.join(words)}") for words in options.box]
-    png, answer = _looked(options, rig, manifests, spec, say)
+    png, answer = _looked(options, rig, manifests, spec, deployment.root, say)
     picture = decoded(png, str(options.picture or rig.name))
     height, width = picture.shape[:2]
     marks += truth.read(options.boxes, width, height) if options.boxes else []
@@ -94,6 +97,7 @@ def _looked(
     rig: Rig,
     manifests: dict[str, Manifest],
     spec: Spec | None,
+    root: Path,
     say: Callable[[str], None],
 ) -> tuple[bytes, dict[str, Any]]:
     """The bytes of the picture, and the answer of the camera's program."""
@@ -106,6 +110,7 @@ def _looked(
         path = Path(folder) / "snapshot.png"
         words = [*snapshot.words, f"--output={path}"]
         words += [f"--truth-classes={options.classes}"] if snapshot.is_rendered and "=" in options.classes else []
+        refuse_forbidden(devices_in(words), dict.fromkeys(LIMIT_FLAGS, 0.0), [root])
         answer = query_exclusively(rig.cid, "'dodo rig truth'", (snapshot.program, words), say, options.wait)
         if answer.get("reason"):
             say(f"warning: {answer['reason']}")

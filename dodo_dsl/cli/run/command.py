@@ -15,7 +15,7 @@ from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
-from dodo_dsl.diagnostics import printable
+from dodo_dsl.opendlv.numbers import is_whole, number, whole
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
@@ -28,6 +28,7 @@ from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.model import LEVELS
+from dodo_dsl.terminal import printable
 
 EXAMPLES = """examples:
   dodo run                                     all tests of the deployment
@@ -72,7 +73,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def _seed(text: str) -> int:
-    number = int(text) if text.isdecimal() and len(text) < 12 else -1
+    number = whole(text) if is_whole(text) else -1
     if not 0 <= number < 1 << 32:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 to 4294967295")
     return number
@@ -80,7 +81,7 @@ def _seed(text: str) -> int:
 
 def _seconds(text: str) -> float:
     try:
-        seconds = float(text.removesuffix("s"))
+        seconds = number(text.removesuffix("s"))
     except ValueError:
         seconds = 0.0
     if not 0.0 < seconds <= _MOST_SECONDS:
@@ -89,15 +90,15 @@ def _seconds(text: str) -> float:
 
 
 def _positive(text: str) -> int:
-    number = int(text) if text.isdecimal() else 0
+    number = whole(text) if is_whole(text) else 0
     if number < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return number
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, stop_like_interrupt)
+    for signal_number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(signal_number, stop_like_interrupt)
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
@@ -139,14 +140,20 @@ def _backends(
     if backend == "docker":
         if options.compiled and options.isolation not in (None, plans[0].isolation):
             raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
-        return Containers(subnets(deployment.subnets))
+        return Containers(subnets(deployment.subnets), _roots(options, deployment))
     without = sorted({s.name for p in plans for s in p.application.services if not s.process})
     if without:
         advice = "add for example 'x-dodo-process: [python, main.py]', or run with --backend docker"
         raise UsageError(
             f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
         )
-    return Processes(deployment.cids, options.isolation, (descriptor,))
+    return Processes(deployment.cids, options.isolation, (descriptor,), _roots(options, deployment))
+
+
+def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:
+    """The folders that the tests come from: the deployment's, and those of the command line."""
+    named = [options.compiled] if options.compiled else [Path(word) for word in options.test if Path(word).exists()]
+    return [deployment.root, *named]
 
 
 def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> tuple[list[Outcome], bool]:

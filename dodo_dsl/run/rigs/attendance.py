@@ -1,13 +1,16 @@
 """What the runner does about a real rig during a test: leases, health check and heartbeat."""
 
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
+from pathlib import Path
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.announce import heartbeat
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.health_check import examine
+from dodo_dsl.run.rigs.permission import refuse_test
+from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in, leased
 from dodo_dsl.spec.rig import EMULATED
 
@@ -19,18 +22,23 @@ def is_real(plan: Plan) -> bool:
 
 @contextlib.asynccontextmanager
 async def attended(
-    plan: Plan, cid: int, descriptors: tuple[int, ...], say: Callable[[str], None]
+    plan: Plan, cid: int, descriptors: tuple[int, ...], say: Callable[[str], None], roots: Sequence[Path] = ()
 ) -> AsyncIterator[tuple[int, ...]]:
     """Leases and checks a real rig's devices, and sends a heartbeat within the block; does nothing for other tests.
 
-    ``descriptors`` are those of the lease of its CID; gives all by which a program holds the rig. Raises BackendError
-    when the rig is in use, in quarantine, or fails its health check.
+    ``descriptors`` are those of the lease of its CID; gives all by which a program holds the rig. ``roots`` are the
+    folders of the test's repository, whose tests the machine's operator may not let use it. Raises BackendError then,
+    and when the rig is in use, in quarantine, or fails its health check.
     """
     if not is_real(plan):
         yield descriptors
         return
     devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
     async with contextlib.AsyncExitStack() as stack:
+        try:
+            refuse_test(plan, roots)
+        except RigProblem as problem:
+            raise BackendError(str(problem)) from problem
         try:
             more = await stack.enter_async_context(leased(None, plan.slug, say, devices=devices))
         except leases.LeaseTimeout as error:

@@ -10,6 +10,7 @@ from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.access import query
 from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
 from dodo_dsl.run.rigs.quarantine import quarantine, quarantined
+from dodo_dsl.run.rigs.rig_leases import devices_in
 
 PATIENCE_S, TRIES = 90.0, 2
 """s: from the far corner the rig searches its home position for 20 s, and for most of a minute if it repeats that."""
@@ -39,12 +40,13 @@ async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int
     rig's leases, which the check goes on to hold if this process is killed.
     """
     try:
-        reason = quarantined(plan.rig)
+        devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
+        reason = quarantined(plan.rig, devices)
         if not reason:
             say(f"checking rig '{plan.rig}'")
             reason = await _failure(plan, descriptors)
             if reason:
-                quarantine(plan.rig, reason)
+                quarantine(plan.rig, reason, devices)
     except RigProblem as problem:
         raise BackendError(f"rig '{plan.rig}' cannot be checked: {problem}") from problem
     if reason:

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from pathlib import Path
 
 from dodo_dsl.run import leases
+from dodo_dsl.run.rigs.devices import identity
 
 DEVICE_FLAGS = ("--serial", "--source")
 """Flags of programs and services that name hardware."""
@@ -41,8 +42,11 @@ def devices_in(words: Iterable[str]) -> list[str]:
 
 
 def device_leases(devices: Sequence[str]) -> list[str]:
-    """A lease's name for each device file, by its numbers: two rigs that name one device exclude each other."""
-    names = set()
+    """A lease's name for each device file, by its numbers: two rigs that name one device exclude each other.
+
+    A port of this machine behind a socket is a device, too.
+    """
+    names = {f"device-{identity(device).replace(' ', '-')}" for device in devices if device.startswith("socket://")}
     for device in devices:
         with contextlib.suppress(OSError, ValueError):
             found = Path(device).stat()
