@@ -1,0 +1,291 @@
+"""Inputs that unfold to more than a machine has, and floods: each is refused, or ends with who it was."""
+
+import os
+import struct
+import subprocess
+import sys
+import time
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError, SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.video import decoder
+from dodo_dsl.opendlv.video.decoder import VideoDecoder
+from dodo_dsl.opendlv.video.picture_size import MAX_PIXELS, picture_size
+from dodo_dsl.rec import truth_files
+from dodo_dsl.rec.frames import IMAGE, MOST_DECODERS, decoded
+from dodo_dsl.rec.truth import TruthError
+from dodo_dsl.run.outcomes import Finding
+from dodo_dsl.run.protocol import Flooded, MemoryTaken, Noted
+from dodo_dsl.run.run_state import MOST_NOTES, Ended, RunState
+from dodo_dsl.run.service_protocol import read_line
+from dodo_dsl.spec import registry
+from dodo_dsl.spec.registry import RegistryTooLarge, locate
+from services.camera.files import FileCamera
+from services.rec_recorder import traffic
+from services.rec_recorder.model import RecordingFile
+from services.rec_recorder.traffic import FloodError, Traffic
+from services.virtual_camera.draw import scene
+from services.virtual_camera.image.overlays import load_with_alpha
+from services.virtual_camera.map.json_node import MapError
+from services.virtual_camera.map.meshes import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES, load_obj
+from services.virtual_camera.map.textures import load_picture
+from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, message, record, video
+from tests.run.helpers import Bench
+
+__all__ = ["record"]
+SIDE = 20_000
+
+
+def png(width: int, height: int) -> bytes:
+    """A whole file of one colour and one bit a pixel, which compresses a thousandfold."""
+    packed = zlib.compressobj(9)
+    rows = b"".join(packed.compress(b"\0" * (1 + -(-width // 8))) for _ in range(height)) + packed.flush()
+    parts = ((b"IHDR", struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)), (b"IDAT", rows), (b"IEND", b""))
+    chunks = (struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in parts)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def jpeg(width: int, height: int) -> bytes:
+    """The begin of a file: a comment that looks like a small frame, then the frame's header."""
+    lie = b"\xff\xc0\x00\x0b\x08\x00\x10\x00\x10\x01\x01\x11\x00"
+    comment = b"\xff\xfe" + struct.pack(">H", 2 + len(lie)) + lie
+    return b"\xff\xd8" + comment + b"\xff\xc2\x00\x0b\x08" + struct.pack(">HH", height, width) + b"\x01\x01\x11\x00"
+
+
+BOMBS = {"png": png(SIDE, SIDE), "jpg": jpeg(SIDE, SIDE)}
+TOO_LARGE = f"a picture of {SIDE} x {SIDE} pixels, expected at most {MAX_PIXELS} in all"
+
+
+@pytest.mark.parametrize("kind", BOMBS)
+@pytest.mark.parametrize("read", [load_picture, load_with_alpha, lambda path: FileCamera(path, 640, 480)])
+def test_pictures_that_unfold_are_refused_by_their_header(tmp_path: Path, kind: str, read: Callable[..., Any]) -> None:
+    path = tmp_path / f"bomb.{kind}"
+    path.write_bytes(BOMBS[kind])
+    with pytest.raises(ValueError, match=f"bomb.{kind}: {TOO_LARGE}"):
+        read(path)
+
+
+def test_a_truth_of_such_a_picture_is_refused() -> None:
+    with pytest.raises(TruthError, match=f"desk: {TOO_LARGE}"):
+        truth_files.decoded(BOMBS["png"], "desk")
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x89PNG\r\n\x1a\n", b"\xff\xd8", b"\xff\xd8" + b"\xff" * 50, b"BM" + bytes(60)]
+)
+def test_a_picture_whose_size_cannot_be_read_is_not_decoded(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.png").write_bytes(content)
+    with pytest.raises(MapError, match="not a readable picture, expected PNG or JPEG"):
+        load_picture(tmp_path / "a.png")
+
+
+def test_sizes_in_headers_are_those_of_the_pictures() -> None:
+    import cv2
+
+    for kind in (".png", ".jpg"):
+        for options in ([], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]):
+            _, data = cv2.imencode(kind, np.zeros((123, 457, 3), np.uint8), options if kind == ".jpg" else [])
+            assert picture_size(data.tobytes()) == (457, 123)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * (MAX_TRIANGLES + 1), f"{MAX_TRIANGLES + 1} triangles"),
+        (b" \tv 0 0 0\n" * (MAX_VERTICES + 1), f"{MAX_VERTICES + 1} vertices"),
+        (b"# " + b"x" * MAX_BYTES, f"the OBJ file has {MAX_BYTES + 2} bytes, expected at most {MAX_BYTES}"),
+    ],
+    ids=["faces", "vertices", "bytes"],
+)
+def test_meshes_are_counted_before_they_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, words: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    (tmp_path / "a.obj").write_bytes(content)
+    with pytest.raises(MapError, match=words):
+        load_obj(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize(
+    ("limit", "what"), [("MAX_TRIANGLES", "triangles of models"), ("MAX_TEXTURE_BYTES", "bytes of")]
+)
+def test_what_a_map_takes_in_all_is_limited(monkeypatch: pytest.MonkeyPatch, limit: str, what: str) -> None:
+    shipped = Path(__file__).parents[2] / "tests_registry" / "maps" / "static-rig"
+    scene.load_scene(shipped)
+    monkeypatch.setattr(scene, limit, 10)
+    with pytest.raises(MapError, match=f"map.json: more than 10 {what}"):
+        scene.load_scene(shipped)
+
+
+def test_frames_that_a_message_calls_too_large_are_not_decoded(record: Callable[..., Path]) -> None:
+    size = {"format": "h264", "width": 16_000, "height": 16_000}
+    large = message("opendlv.proxy.ImageReading", BEGIN, 3, data=b"\0\0\1\x65", **size)
+    told: list[str] = []
+    with Recording(record([large, large, *video(1)])) as recording:
+        found = [frame for _, frame in decoded(recording, recording.rows(messages=[IMAGE]), told.append)]
+    assert [frame and (frame.width, frame.height) for frame in found] == [None, None, (WIDTH, HEIGHT)]
+    (sentence,) = told
+    assert sentence.startswith("frames cannot be decoded: a picture of 16000 x 16000 pixels, expected at most")
+
+
+def test_frames_that_lie_about_their_size_are_not_decoded_either(monkeypatch: pytest.MonkeyPatch) -> None:
+    packets = [image.payload for image in video(1)]
+    data = message_data(packets[0])
+    assert VideoDecoder("h264").decode(data) is not None
+    monkeypatch.setattr(decoder, "MAX_PIXELS", WIDTH * HEIGHT - 1)
+    assert VideoDecoder("h264").decode(data) is None
+
+
+def message_data(payload: bytes) -> bytes:
+    from dodo_dsl.opendlv.messages.message_set import MessageSet
+
+    return bytes(MessageSet.standard().decode(IMAGE, payload).data)
+
+
+def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> None:
+    told: list[str] = []
+    cameras = [image._replace(sender_stamp=number) for number in range(40) for image in video(1)]
+    with Recording(record(cameras)) as recording:
+        frames = [frame for _, frame in decoded(recording, recording.rows(messages=[IMAGE]), told.append)]
+    assert [frame is not None for frame in frames] == [True] * MOST_DECODERS + [False] * (40 - MOST_DECODERS)
+    assert told == [f"frames of more than {MOST_DECODERS} cameras and formats are not decoded"]
+
+
+def test_a_registry_is_not_searched_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(30):
+        (tmp_path / str(number)).mkdir()
+    monkeypatch.setattr(registry, "MAX_FOLDERS", 20)
+    with pytest.raises(RegistryTooLarge, match=r"has more than 20 folders: name the folder with the tests"):
+        locate([], [tmp_path])
+
+
+def test_hidden_folders_and_mounts_are_no_part_of_a_registry(small_disk: Path) -> None:
+    for name in ("a", ".hidden/b", "small/c"):
+        spec = small_disk.parent / name / f"{Path(name).name}.dodo.yml"
+        spec.parent.mkdir(parents=True)
+        spec.touch()
+    assert [found.stem for found in locate([], [small_disk.parent])[0]] == ["a"]
+
+
+@pytest.mark.slow
+def test_the_whole_machine_is_no_registry(tmp_path: Path) -> None:
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [/]\n")
+    words = [sys.executable, "-m", "dodo_dsl", "list"]
+    result = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == "dodo list: '/' has more than 10000 folders: name the folder with the tests\n"
+
+
+class Clock:
+    now = 5_000_000
+
+    def __call__(self) -> int:
+        return self.now
+
+
+def envelope(number: int, stamp: int = 0, size: int = 100) -> Envelope:
+    return Envelope(number, bytes(size), 1, 1, 1, stamp)
+
+
+def test_a_recording_ends_at_its_limit_and_names_what_fills_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "test.rec"
+    with RecordingFile(path, None, Traffic(100_000, Clock(), lambda: 0, lambda id_: f"a.M{id_}")) as recording:
+        recording.write(envelope(7))
+        with pytest.raises(FloodError, match=r"the recording would be larger than 0\.1 MB, most of it a\.M9/3"):
+            for _ in range(2000):
+                recording.write(envelope(9, 3))
+        recording.write(envelope(9, 3))
+    assert 99_000 < path.stat().st_size <= 100_000
+    event = read_line("dodo-recorder", False, capsys.readouterr().out.encode())
+    assert isinstance(event, Flooded) and (event.message, event.sender_stamp, event.too_fast) == ("a.M9", 3, False)
+    assert 0.99 < event.share < 1
+
+
+def test_more_messages_than_a_second_may_have_end_the_recording() -> None:
+    clock, lost = Clock(), [0]
+    counter = Traffic(10**9, clock, lambda: lost[0], str)
+    for second in range(3):
+        clock.now = 5_000_000 + second * 1_000_000
+        for _ in range(traffic.MOST_PER_SECOND):
+            counter.add(envelope(5), 10)
+    clock.now += 1_000_000
+    counter.add(envelope(5), 10)
+    lost[0] = traffic.MOST_PER_SECOND
+    with pytest.raises(FloodError, match="more than 20000 messages came within a second, most of it 5/0"):
+        counter.add(envelope(5), 10)
+
+
+def test_senders_without_end_take_no_memory() -> None:
+    counter = Traffic(10**9, Clock(), lambda: 0, str)
+    for stamp in range(traffic.MOST_PER_SECOND):
+        counter.add(envelope(5, stamp), 10)
+    assert len(counter._bytes) <= 1001
+
+
+def state(tmp_path: Path) -> RunState:
+    return RunState(Bench(tmp_path).plan(), time.monotonic)
+
+
+def decided(found: RunState, event: Flooded | MemoryTaken) -> Finding:
+    with pytest.raises(Ended):
+        found.take(event)
+    (finding,) = found.facts.findings
+    return finding
+
+
+def test_a_flood_is_named_and_the_application_s_only_where_no_service_sends_it(tmp_path: Path) -> None:
+    flood = Flooded("dodo-recorder", "more than 20000 messages came within a second", "a.M", 3, 0.981, True)
+    finding = decided(state(tmp_path), flood)
+    words = "more than 20000 messages came within a second: 98% of it is a.M/3, which service 'camera' sends"
+    assert (finding.result, finding.reason) == ("error", words), "what an unknown service sends is not known"
+    known = state(tmp_path)
+    known.plan = Bench(tmp_path).plan()
+    services = tuple(type(s)(**{**vars(s), "uses": "collision"}) for s in known.plan.services)
+    known.plan = type(known.plan)(**{**vars(known.plan), "services": services})
+    finding = decided(known, flood)
+    assert (finding.result, finding.reason.partition("which ")[2]) == ("failed", "only the application can have sent")
+
+
+def test_notes_do_not_grow_without_end(tmp_path: Path) -> None:
+    found = state(tmp_path)
+    for number in range(1000):
+        found.take(Noted(str(number)))
+    assert len(found.notes) == MOST_NOTES + 1
+    assert found.notes[-1] == f"there are more notes, and only {MOST_NOTES} are kept"
+
+
+@pytest.mark.parametrize("posix", [False, True])
+def test_a_lock_that_a_reader_keeps_is_not_the_creator_s_fault(posix: bool) -> None:
+    name = f"dodo-test-{os.getpid()}-{posix}"
+    with SharedMemory.create(name, 64, posix) as ours, SharedMemory.attach(name) as theirs:
+        with (
+            theirs.lock(),
+            pytest.raises(MemoryTakenError, match=r"was locked by another for 0\.05 s"),
+            ours.lock(0.05),
+        ):
+            raise AssertionError("it is locked")
+        with ours.lock(), pytest.raises(SharedMemoryError) as caught, theirs.lock(0.05):
+            raise AssertionError("it is locked")
+        assert not isinstance(caught.value, MemoryTakenError)
+
+
+def test_a_kept_lock_fails_the_application(tmp_path: Path) -> None:
+    line = b'{"dodo": "taken", "text": "shared memory \'video0.argb\' was locked by another for 5 s"}'
+    event = read_line("camera", False, line)
+    assert isinstance(event, MemoryTaken)
+    finding = decided(state(tmp_path), event)
+    assert (finding.result, finding.is_timed) == ("failed", True)
+    assert finding.reason == (
+        "the application keeps service 'camera' from its shared memory: "
+        "shared memory 'video0.argb' was locked by another for 5 s"
+    )
