@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import package_data
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.check import check
@@ -82,13 +83,19 @@ def load(
     found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
     source = None
     if files := application or deployment.application:
-        source, problems = read_application(files)
+        source, problems = read_application(files, access(deployment))
         found.extend(problems)
     specs = (applied(spec, settings) for instances, _ in loaded for spec in instances)
     tests = tuple(resolve(specs, manifests, deployment, source))
     by_rules = check(tests, manifests, deployment, source)
     found.extend(itertools.chain.from_iterable(by_rules.values()))
     return Checked(deployment, manifests, tests, tuple(ordered(found)), settings, source, tuple(empty), by_rules)
+
+
+def access(deployment: Deployment) -> Access:
+    """What the deployment allows its application."""
+    roots = (str(deployment.root),) if deployment.file else ()
+    return Access(roots, tuple(deployment.paths), deployment.environment, deployment.outside)
 
 
 def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Checked:

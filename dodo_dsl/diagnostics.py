@@ -19,7 +19,10 @@ _MAX_FILE = 1 << 20
 
 @dataclass(frozen=True, order=True)
 class Span:
-    """A place in a file; line and column count from 1, ``length`` is what a code frame underlines."""
+    """A place in a file; line and column count from 1, ``length`` is what a code frame underlines.
+
+    There is no frame with a ``length`` of 0, as for lines that hold secrets.
+    """
 
     file: str
     line: int = 1
@@ -86,7 +89,7 @@ def _source_line(span: Span) -> str | None:
 
 
 def _code_frame(span: Span) -> list[str]:
-    line = _source_line(span)
+    line = _source_line(span) if span.length else None
     if line is None:
         return []
     start = max(0, span.column - 1 - _MAX_FRAME_LINE // 2) if len(line) > _MAX_FRAME_LINE else 0

@@ -25,7 +25,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     found: list[Diagnostic] = []
     for service in application.services.values():
         found.extend(problems(Written.of(service, application, volumes or {})))
-        found.extend(_missing_files(service, application.folder))
+        found.extend(_missing_files(service, application))
         found.extend(_missing_program(service, application.folder))
     found.extend(_cycles(application))
     found.extend(_same_variable(application))
@@ -34,10 +34,10 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         yield from _without_cid(application)
 
 
-def _missing_files(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
+def _missing_files(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
     for file in service.env_files:
-        is_local = not file.path.startswith(("/", "~")) and "$" not in file.path
-        if file.required and is_local and not (folder / file.path).is_file():
+        is_local = "$" not in file.path and application.paths.is_own(file.path)
+        if file.required and is_local and not (application.folder / file.path).is_file():
             hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
             yield Diagnostic(file.span, "application-file", f"there is no file '{file.path}'", hint)
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dodo_dsl import source
+from dodo_dsl.application.access.secret_variables import holds_secret
 from dodo_dsl.application.interpolation import dotenv
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar, read
@@ -16,11 +17,12 @@ _MAX_ENV = 1 << 20
 
 
 class ComposeFiles:
-    """Documents by path, ``variables`` of their ``.env`` files and ``problems``."""
+    """Documents by path, ``variables`` of their ``.env`` files and ``problems``; ``secrets`` has files by variable."""
 
     def __init__(self) -> None:
         self.problems: list[Diagnostic] = []
         self.variables: dict[str, str] = {}
+        self.secrets: dict[str, Path] = {}
         self._documents: dict[Path, source.Mapping | None] = {}
         self._nodes = 0
 
@@ -79,6 +81,8 @@ class ComposeFiles:
     def gather(self, file: Path | None, span: Span) -> None:
         """Adds the variables of an ``.env`` file, if there is one."""
         for name, value in variables_of(file).items() if file else ():
+            if file and holds_secret(name, value):
+                self.secrets.setdefault(name, file)
             if self.variables.setdefault(name, value) != value:
                 message = (
                     f"variable '{name}' has another value in '{file.name if file else ''}' than in an earlier file"
@@ -88,7 +92,12 @@ class ComposeFiles:
 
 def variables_of(file: Path) -> Mapping[str, str]:
     """The variables that a regular file sets; symlinks are not followed."""
+    return dotenv(text_of(file))
+
+
+def text_of(file: Path) -> str:
+    """The begin of a regular file; empty where there is none, and for symlinks."""
     if file.is_symlink() or not file.is_file():
-        return {}
+        return ""
     with file.open("rb") as stream:
-        return dotenv(stream.read(_MAX_ENV).decode("utf-8", "replace"))
+        return stream.read(_MAX_ENV).decode("utf-8", "replace")

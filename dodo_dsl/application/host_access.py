@@ -8,16 +8,22 @@ from typing import Any
 
 from dodo_dsl.application.interpolation import split_outside
 
-MACHINE_CAPABILITIES = frozenset(
+CONTAINER_CAPABILITIES = frozenset(
     (
-        *("ALL", "BPF", "DAC_READ_SEARCH", "MKNOD", "PERFMON", "SYSLOG", "SYS_ADMIN", "SYS_BOOT"),
-        *("SYS_MODULE", "SYS_RAWIO", "SYS_TIME", "SYS_TTY_CONFIG", "WAKE_ALARM"),
+        *("AUDIT_WRITE", "CHOWN", "DAC_OVERRIDE", "FOWNER", "FSETID", "IPC_LOCK", "KILL", "NET_BIND_SERVICE"),
+        *("SETFCAP", "SETGID", "SETPCAP", "SETUID", "SYS_CHROOT", "SYS_NICE", "SYS_PTRACE"),
     )
 )
+"""Capabilities that stay within a container; with others it reaches the host, or speaks for other containers."""
 HARDWARE_KEYS = ("devices", "device_cgroup_rules")
 NAMESPACES = ("network_mode", "ipc", "pid")
 
 _PLAIN_DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+_OF_MACHINE = re.compile(
+    r"/dev/(mem|kmem|port|kmsg|(s|h|v|xv)d[a-z]\d*|(nvme|mmcblk|loop|nbd|mtd|zram|ram|vhost|tpm|watchdog)[^/]*"
+    r"|(dm-|md|sr|sg|bsg/)[^/]*|(mapper|disk|block|char|cpu)(/.*)?|kvm|fuse|btrfs-control|snapshot|userfaultfd)"
+)
+"""Devices that are no hardware of a robot: disks, memory and the kernel's own."""
 _WHOLE = ("/", "/run", "/var/run", "/var", "/var/lib/docker")
 _SOCKET = re.compile(r"(docker|podman|containerd|crio)\.sock$")
 
@@ -66,12 +72,30 @@ def is_machine(found: Mount) -> bool:
     return found.source in _WHOLE or is_process_table or bool(_SOCKET.search(found.source))
 
 
-def capability(word: object) -> str:
-    return str(word).upper().removeprefix("CAP_")
+def is_of_machine(device: object) -> bool:
+    """Whether a device file is one of the host's disks, its memory or its kernel; of a short form, its source."""
+    parts = split_outside(str(device or ""), ":")
+    return bool(_OF_MACHINE.fullmatch(_clean(parts[0])))
+
+
+def is_harmless_capability(word: object) -> bool:
+    """Whether a capability stays within the container."""
+    return str(word).upper().removeprefix("CAP_") in CONTAINER_CAPABILITIES
+
+
+def is_confining(option: object) -> bool:
+    """Whether a security option leaves no more access than there is without it."""
+    return re.split("[:=]", str(option))[0] == "no-new-privileges"
 
 
 def is_true(value: object) -> bool:
     return value is True or (isinstance(value, str) and value.lower() not in ("false", ""))
+
+
+def is_external(volume: object) -> bool:
+    """Whether a top-level volume, secret or config is one that exists already."""
+    external = volume.get("external", False) if isinstance(volume, dict) else False
+    return isinstance(external, dict) or is_true(external)
 
 
 def reference(value: object) -> tuple[str, str]:

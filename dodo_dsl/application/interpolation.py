@@ -1,9 +1,16 @@
-"""Variables in compose files, ``${NAME:-default}``, found without substituting them; and ``.env`` files."""
+"""Variables in compose files, ``${NAME:-default}``: found, and filled in as compose does; and ``.env`` files."""
 
 import re
+from collections.abc import Mapping
+from pathlib import Path
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LINE = re.compile(r"\s*(?:export\s+)?(?P<name>[A-Za-z_][A-Za-z0-9_.-]*)[ \t]*[=:][ \t]*")
+_VARIABLE = re.compile(
+    r"\$(?:(?P<escaped>\$)|(?P<bare>[A-Za-z_][A-Za-z0-9_]*)"
+    r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>.*))?\})",
+    re.DOTALL,
+)
 _ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "$": "$$"}
 
 
@@ -49,6 +56,44 @@ def names(text: str) -> set[str]:
     return found
 
 
+class EnvironmentProblem(ValueError):
+    """A required variable (``${NAME:?why}``) is not set, or a user has no home folder."""
+
+
+def interpolate(text: str, known: Mapping[str, str], *, unset: bool = True) -> str:
+    """``$NAME``, ``${NAME}``, ``${NAME:-default}``, ``${NAME:?error}``, ``${NAME:+other}`` and ``$$`` as in compose.
+
+    Defaults may hold variables in turn. Without ``unset``, a variable that is neither known nor has a default raises
+    EnvironmentProblem instead of being empty.
+    """
+    parts, place = [], 0
+    while (dollar := text.find("$", place)) >= 0:
+        end = end_of_variable(text, dollar)
+        match = _VARIABLE.fullmatch(text, dollar, end)
+        parts += [text[place:dollar], _filled(match, known, unset) if match else text[dollar:end]]
+        place = end
+    return "".join([*parts, text[place:]])
+
+
+def _filled(match: re.Match[str], known: Mapping[str, str], unset: bool) -> str:
+    if match["escaped"]:
+        return "$"
+    name = match["bare"] or match["name"]
+    found, word = known.get(name), match["word"] or ""
+    present = bool(found) if match["colon"] else found is not None
+    if match["operator"] == "+":
+        return interpolate(word, known, unset=unset) if present else ""
+    if present:
+        return found or ""
+    if match["operator"] == "?":
+        raise EnvironmentProblem(f"variable {name} is not set: {word or 'it is required'}")
+    if match["operator"] == "-":
+        return interpolate(word, known, unset=unset)
+    if found is None and not unset:
+        raise EnvironmentProblem(f"variable {name} is not set")
+    return found or ""
+
+
 def dotenv(text: str) -> dict[str, str]:
     """The variables of a ``.env`` file as compose reads it; a literal ``$`` is doubled.
 
@@ -62,6 +107,16 @@ def dotenv(text: str) -> dict[str, str]:
             place = line_end + 1
             continue
         found[match["name"]], place = _value(text, match.end(), line_end)
+    return found
+
+
+def dotenv_file(path: Path, known: Mapping[str, str]) -> dict[str, str]:
+    """The variables of a ``.env`` file, interpolated with earlier ones and ``known``; empty when there is no file."""
+    if not path.is_file():
+        return {}
+    found: dict[str, str] = {}
+    for name, value in dotenv(path.read_text(encoding="utf-8", errors="replace")).items():
+        found[name] = interpolate(value, {**found, **known})
     return found
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
+from dodo_dsl.application.access.host_paths import HostPaths, repository
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
 
@@ -57,7 +59,8 @@ class ApplicationSource:
 
     ``services`` are those that start, by name; ``rest`` has every other top-level key. Paths are relative to
     ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the services by their
-    ``container_name``, ``variables`` those of the files' ``.env``.
+    ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set the secret ones
+    among them. ``known`` are all variables whose values are known, ``access`` is what the deployment allows.
     """
 
     path: Path
@@ -66,6 +69,21 @@ class ApplicationSource:
     dropped: Mapping[str, str] = field(default_factory=dict)
     containers: Mapping[str, str] = field(default_factory=dict)
     variables: Mapping[str, str] = field(default_factory=dict)
+    secrets: Mapping[str, Path] = field(default_factory=dict)
+    known: Mapping[str, str] = field(default_factory=dict)
+    access: Access = field(default_factory=Access)
+
+    @property
+    def paths(self) -> HostPaths:
+        """The host's paths as the application may use them."""
+        roots = (*repository(self.folder), *self.other_roots)
+        return HostPaths(self.folder, roots, tuple(map(Path, self.access.paths)))
+
+    @property
+    def other_roots(self) -> tuple[Path, ...]:
+        """The folders beside its repository whose files are the application's own."""
+        own = repository(self.folder)
+        return tuple(root for root in map(Path, self.access.roots) if root not in own)
 
     @property
     def folder(self) -> Path:

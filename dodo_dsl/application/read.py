@@ -1,12 +1,18 @@
 """``read_application``: compose files as DoDo reads them, and their problems."""
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+import os
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.access import filled, secret_problems
+from dodo_dsl.application.access.diagnostics import diagnostic
+from dodo_dsl.application.access.filled import known_variables
+from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.access.shared_findings import shared_findings
 from dodo_dsl.application.application_problems import application_problems
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.interpolation import names
@@ -22,7 +28,10 @@ MAX_SERVICES = 256
 _OURS = ("services", "version", "name", "networks", "include")
 
 
-def read_application(path: Path | Sequence[Path]) -> tuple[ApplicationSource | None, list[Diagnostic]]:
+def read_application(
+    path: Path | Sequence[Path],
+    access: Access = Access(),  # noqa: B008  (it is frozen)
+) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems."""
     paths = [path] if isinstance(path, Path) else list(path)
     files = ComposeFiles()
@@ -39,14 +48,21 @@ def read_application(path: Path | Sequence[Path]) -> tuple[ApplicationSource | N
         found.extend(validate(document, "application"))
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
-    application = _application(paths[0].resolve(), document, services, files.variables)
+    application = _application(paths[0].resolve(), document, services, files, access)
+    found.extend(_shared(document, application))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
+    nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
+    refused = {problem.span for problem in found}
+    withheld = secret_problems.withheld(nodes, files.variables, access.passed)
+    found.extend(problem for problem in withheld if problem.span not in refused)
+    found.extend(secret_problems.left_out(files.secrets))
     return (None if has_errors(found) else application), found
 
 
 def _application(
-    path: Path, document: source.Mapping, services: source.Mapping, variables: Mapping[str, str]
+    path: Path, document: source.Mapping, services: source.Mapping, files: ComposeFiles, access: Access
 ) -> ApplicationSource:
+    variables = files.variables
     dropped = {name: why for name, entry in services.entries.items() if (why := _why_dropped(plain(entry.value)))}
     kept = {
         name: service
@@ -61,7 +77,17 @@ def _application(
         dropped=dropped,
         containers={str(c): n for n, s in kept.items() if (c := plain(s.node).get("container_name"))},
         variables={**variables, **dict.fromkeys(_used_cid_variables(s.node for s in kept.values()), "")},
+        secrets=files.secrets,
+        known=known_variables(variables, os.environ, str(path.parent), access.passed),
+        access=access,
     )
+
+
+def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:
+    """Problems of everything beside the services."""
+    seen = filled.node(document, application.known)
+    for finding in shared_findings(plain(seen), application.paths, application.access.passed):
+        yield diagnostic(finding, document, document.span)
 
 
 def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:

@@ -1,8 +1,4 @@
-"""Problems of a service in a compose file: its name, commands, references, and what cannot be isolated.
-
-``application-isolation``: access to the host that tests would share. ``application-hardware``: hardware, which is left
-out of tests without a rig.
-"""
+"""Problems of a service in a compose file: its name, commands, references, and what cannot be isolated."""
 
 import functools
 from collections.abc import Iterator, Mapping
@@ -11,17 +7,20 @@ from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import host_access, opendlv_flags
+from dodo_dsl.application.access import filled
+from dodo_dsl.application.access.diagnostics import diagnostic, place
+from dodo_dsl.application.access.service_findings import Surroundings, service_findings
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, plain
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
-from dodo_dsl.source import Node, Scalar
-
-_SOCKET_HINT = "give the service a profile, so that it starts with 'docker compose --profile' and not in a test"
-_WITHOUT = "is left out of sil and dil tests, which have no hardware"
+from dodo_dsl.source import Node
 
 
 @dataclass(frozen=True)
 class Written:
-    """A service in its application; ``others`` are all services that start, ``dropped`` has why others do not."""
+    """A service in its application; ``others`` are all services that start, ``dropped`` has why others do not.
+
+    ``filled`` is ``node`` with the known variables filled in.
+    """
 
     name: str
     node: source.Mapping
@@ -29,32 +28,30 @@ class Written:
     others: frozenset[str]
     dropped: Mapping[str, str]
     containers: dict[str, str]
-    volumes: Mapping[str, Any]
+    filled: Node
+    around: Surroundings
 
     @classmethod
     def of(cls, service: ComposeService, application: ApplicationSource, volumes: Mapping[str, Any]) -> "Written":
         """The service among the others of its application; ``volumes`` are the application's named ones."""
         others, containers = frozenset(application.services), dict(application.containers)
-        return cls(service.name, service.node, service.span, others, application.dropped, containers, volumes)
+        around = Surroundings(application.paths, containers, volumes)
+        seen = filled.node(service.node, application.known)
+        return cls(service.name, service.node, service.span, others, application.dropped, containers, seen, around)
 
     @functools.cached_property
     def plain(self) -> dict[str, Any]:
         value: dict[str, Any] = plain(self.node)
         return value
 
-    def place(self, key: str, item: int | None = None) -> Span:
-        """The place of a key's value, or of an item of its list."""
-        entry = self.node.entries[key]
-        if item is None:
-            return entry.value.span if isinstance(entry.value, Scalar) and entry.value.text else entry.key
-        node: Node | None = entry.value.items[item] if isinstance(entry.value, source.Sequence) else None
-        inner = node.get("source") if isinstance(node, source.Mapping) else None
-        return (inner or node or entry.value).span
+    def place(self, key: str) -> Span:
+        """The place of a key's value."""
+        return place(self.node, (key,), self.key)
 
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _words, _references, _namespaces, _mounts, _external, _hardware, _single):
+    for rule in (_name, _words, _references, _access, _single):
         yield from rule(written)
 
 
@@ -100,63 +97,9 @@ def _references(written: Written) -> Iterator[Diagnostic]:
             yield _bad(written.place(key), message, hint)
 
 
-def _namespaces(written: Written) -> Iterator[Diagnostic]:
-    service = written.plain
-    for key in host_access.NAMESPACES:
-        kind, name = host_access.reference(service.get(key))
-        if kind == "container" and name not in written.containers:
-            yield _shared(
-                written.place(key), f"'{key}' joins the container '{name}', which is not part of the application"
-            )
-    if service.get("pid") == "host":
-        yield _shared(written.place("pid"), "'pid: host' gives access to the processes of all tests", "remove it")
-    if host_access.is_true(service.get("use_api_socket", False)):
-        yield _shared(
-            written.place("use_api_socket"), "'use_api_socket' gives access to the Docker engine", _SOCKET_HINT
-        )
-
-
-def _mounts(written: Written) -> Iterator[Diagnostic]:
-    for item, volume in enumerate(written.plain.get("volumes") or ()):
-        found = host_access.mount(volume)
-        place = written.place("volumes", item)
-        about = written.volumes.get(found.source)
-        if host_access.is_machine(found):
-            message = f"'{found.source}' belongs to the host, so tests would share it"
-            yield _shared(place, message, _SOCKET_HINT)
-        elif isinstance(about, dict) and host_access.is_true(about.get("external", False)) and not found.read_only:
-            hint = "mount it read-only (:ro), or remove 'external', so that compose creates it"
-            yield _shared(place, f"volume '{found.source}' is external, so tests would share it", hint)
-
-
-def _external(written: Written) -> Iterator[Diagnostic]:
-    for item, link in enumerate(written.plain.get("external_links") or ()):
-        message = f"'{link}' is a container outside the application"
-        yield _shared(written.place("external_links", item), message, "make it a service of the application")
-    for item, entry in enumerate(written.plain.get("volumes_from") or ()):
-        kind, name, _ = host_access.borrowed(entry)
-        if kind == "container" and name not in written.containers:
-            place = written.place("volumes_from", item)
-            yield _shared(
-                place, f"the container '{name}' is not part of the application", "make it a service of the application"
-            )
-
-
-def _hardware(written: Written) -> Iterator[Diagnostic]:
-    service = written.plain
-    if host_access.is_true(service.get("privileged", False)):
-        yield _absent(written.place("privileged"), f"'privileged' of '{written.name}' {_WITHOUT}")
-    for key in host_access.HARDWARE_KEYS:
-        for item, word in enumerate(service.get(key) or ()):
-            shown = word.get("source") if isinstance(word, dict) else word
-            yield _absent(written.place(key, item), f"device '{shown}' of '{written.name}' {_WITHOUT}")
-    for item, volume in enumerate(service.get("volumes") or ()):
-        found = host_access.mount(volume)
-        if host_access.is_hardware(found):
-            yield _absent(written.place("volumes", item), f"'{found.source}' of '{written.name}' {_WITHOUT}")
-    for item, word in enumerate(service.get("cap_add") or ()):
-        if host_access.capability(word) in host_access.MACHINE_CAPABILITIES:
-            yield _absent(written.place("cap_add", item), f"capability '{word}' of '{written.name}' {_WITHOUT}")
+def _access(written: Written) -> Iterator[Diagnostic]:
+    for finding in service_findings(written.name, plain(written.filled), written.around):
+        yield diagnostic(finding, written.node, written.key)
 
 
 def _single(written: Written) -> Iterator[Diagnostic]:
@@ -170,11 +113,3 @@ def _single(written: Written) -> Iterator[Diagnostic]:
 
 def _bad(span: Span, message: str, hint: str = "") -> Diagnostic:
     return Diagnostic(span, "application-file", message, hint)
-
-
-def _shared(span: Span, message: str, hint: str = "") -> Diagnostic:
-    return Diagnostic(span, "application-isolation", message, hint)
-
-
-def _absent(span: Span, message: str) -> Diagnostic:
-    return Diagnostic(span, "application-hardware", message, "test it on a rig (level hil)", "warning")

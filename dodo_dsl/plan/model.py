@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.spec import model as spec_model
 from dodo_dsl.spec.sandbox import SandboxLimits
 
@@ -61,7 +62,8 @@ class Application:
     """The application; ``folder`` is its compose file's folder, relative to the compiled test's.
 
     ``variables`` are those of its ``.env``, as compose interpolates them. ``hidden`` are folders of tests within its
-    own, relative to it.
+    own, relative to it. ``secrets`` are other variables, each with the file that sets it, relative to the compiled
+    test's folder as the roots of ``access`` are.
     """
 
     folder: str
@@ -71,6 +73,8 @@ class Application:
     variables: dict[str, str] = field(default_factory=dict)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     hidden: tuple[str, ...] = ()
+    secrets: dict[str, str] = field(default_factory=dict)
+    access: Access = field(default_factory=Access)
 
 
 @dataclass(frozen=True)

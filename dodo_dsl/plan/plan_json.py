@@ -7,6 +7,7 @@ from typing import Any, get_args
 
 import orjson
 
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.plan.model import (
     LAYERS,
     Application,
@@ -51,6 +52,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         application["hidden"] = tuple(application["hidden"])
         reads = tuple(application["limits"]["reads"])
         application["limits"] = SandboxLimits(**{**application["limits"], "reads": reads})
+        application["access"] = _access(application["access"])
         raw["application"] = Application(**application)
         if settings.seed is not None:
             raw["seed"] = settings.seed
@@ -91,9 +93,21 @@ def _problem(plan: Plan) -> str:
         and all(isinstance(w, str) for s in plan.application.services for w in s.command),
         "environment": all(isinstance(s.environment, dict) for s in plan.application.services),
         "variable": all(isinstance(v, str) for v in plan.application.variables.values()),
+        "secret": all(isinstance(text, str) for pair in plan.application.secrets.items() for text in pair),
+        "access": _is_access(plan.application.access),
         "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
+
+
+def _access(raw: dict[str, Any]) -> Access:
+    return Access(**{**raw, **{key: tuple(raw[key]) for key in ("roots", "paths", "passed")}})
+
+
+def _is_access(access: Access) -> bool:
+    texts = (*access.roots, *access.paths, *access.passed)
+    flags = (access.outside, access.devices, access.privileged)
+    return all(isinstance(text, str) for text in texts) and all(isinstance(flag, bool) for flag in flags)
 
 
 def _is_lockstep(lockstep: Lockstep) -> bool:

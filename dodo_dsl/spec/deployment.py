@@ -1,6 +1,8 @@
 """The deployment: ``dodo.yml`` at the root of a user's repository."""
 
 import ipaddress
+import os
+import posixpath
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -25,7 +27,11 @@ DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 @dataclass(frozen=True)
 class Deployment:
-    """Where tests and application are; ``root`` is the folder of ``dodo.yml``, or the working folder without one."""
+    """Where tests and application are; ``root`` is the folder of ``dodo.yml``, or the working folder without one.
+
+    ``environment`` names variables of DoDo's own environment that the application gets, ``paths`` are files and folders
+    of the host that it may mount, and ``outside`` tells whether it may reach other networks than its test's.
+    """
 
     root: Path
     file: Path | None = None
@@ -38,6 +44,9 @@ class Deployment:
     cids: tuple[int, ...] = tuple(range(128, 255))
     subnets: ipaddress.IPv4Network = DEFAULT_SUBNETS
     gates: bool = True
+    environment: tuple[str, ...] = ()
+    paths: tuple[str, ...] = ()
+    outside: bool = False
     rigs: dict[str, Rig] = field(default_factory=dict)
     sandbox: SandboxLimits = field(default_factory=SandboxLimits)
 
@@ -84,6 +93,9 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
         cids=tuple(cid for cid in _cids(node.entries.get("cids"), problems) if cid not in reserved),
         subnets=_subnets(node.entries.get("subnets"), problems),
         gates=raw.get("gates", True),
+        environment=tuple(raw.get("environment", ())),
+        paths=_host_paths(node.entries.get("paths"), problems),
+        outside=raw.get("outside", False),
         rigs=rigs,
         sandbox=sandbox_limits(node.entries.get("sandbox")),
     )
@@ -119,6 +131,18 @@ def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple
         else:
             problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'", _FROM_HERE))
     return tuple(files)
+
+
+def _host_paths(entry: Entry | None, problems: list[Diagnostic]) -> tuple[str, ...]:
+    paths = []
+    for item in _texts(entry):
+        path = posixpath.normpath(os.path.expanduser(item.text))  # noqa: PTH111  (it never raises)
+        if not path.startswith("/") or path.strip("/") == "":
+            message = f"'{item.text}' is not the whole path of a file or folder"
+            problems.append(Diagnostic(item.span, "wrong-value", message, "for example /etc/ros"))
+        else:
+            paths.append(path)
+    return tuple(paths)
 
 
 def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnostic]) -> None:

@@ -77,6 +77,29 @@ def test_borrowed_volumes(entry: str, expected: tuple[str, str, str]) -> None:
     assert host_access.borrowed(entry) == expected
 
 
+@pytest.mark.parametrize(
+    "device",
+    [
+        "/dev/mem",
+        "/dev/sda",
+        "/dev/sda1:/dev/x",
+        "/dev//nvme0n1p1",
+        "/dev/../dev/loop0",
+        "/dev/mapper",
+        "/dev/block/8:0",
+    ],
+)
+def test_devices_of_the_machine(device: str) -> None:
+    assert host_access.is_of_machine(device)
+
+
+@pytest.mark.parametrize(
+    "device", ["/dev/ttyACM0", "/dev/video0:/dev/x", "/dev/sensors", "/dev/null", "", "/dev/ramen/x"]
+)
+def test_devices_of_robots(device: str) -> None:
+    assert not host_access.is_of_machine(device)
+
+
 def test_services_that_a_service_needs() -> None:
     service = {
         "network_mode": "service:a",
@@ -97,7 +120,19 @@ def test_services_that_a_service_needs() -> None:
 
 
 def test_words() -> None:
-    assert host_access.capability("cap_sys_admin") == "SYS_ADMIN"
+    assert not host_access.is_harmless_capability("cap_sys_admin")
+    assert host_access.is_harmless_capability("cap_sys_nice")
+    assert [host_access.is_confining(o) for o in ("no-new-privileges:true", "no-new-privileges=1", "label:x")] == [
+        True,
+        True,
+        False,
+    ]
+    assert [host_access.is_external(v) for v in ({"external": True}, {"external": {"name": "x"}}, {}, None)] == [
+        True,
+        True,
+        False,
+        False,
+    ]
     assert [host_access.is_true(v) for v in (True, "true", "${P}", False, "false", "", None)] == [True] * 3 + [
         False
     ] * 4

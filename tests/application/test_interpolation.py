@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.application import interpolation
-from dodo_dsl.run.process.environment import dotenv, interpolate
 from tests.application.composed import config
 
 DOTENV = r"""
@@ -52,7 +51,8 @@ def test_dotenv_files_are_read_as_compose_reads_them(tmp_path: Path) -> None:
     (tmp_path / "c.yml").write_text(yaml.safe_dump({"services": {"a": service}}))
     (tmp_path / ".env").write_text(DOTENV)
     expected = config(tmp_path, "-f", "c.yml")["a"]["environment"]
-    assert dotenv(tmp_path / ".env", {}) == {name: value.replace("$$", "$") for name, value in expected.items()}
+    read = interpolation.dotenv_file(tmp_path / ".env", {})
+    assert read == {name: value.replace("$$", "$") for name, value in expected.items()}
     (tmp_path / ".env").write_text("".join(interpolation.dotenv_line(*pair) + "\n" for pair in READ.items()))
     assert config(tmp_path, "-f", "c.yml")["a"]["environment"] == expected
 
@@ -68,7 +68,7 @@ def test_dotenv_lines_are_read_back(values: dict[str, str]) -> None:
     [("${A:-${B:-c}}", "c"), ("${A:-${S}}!", "set!"), ("${S:+${A:-x}y}", "xy"), ("$${S}$S}", "${S}set}"), ("${", "${")],
 )
 def test_variables_nest(text: str, expected: str) -> None:
-    assert interpolate(text, {"S": "set"}) == expected
+    assert interpolation.interpolate(text, {"S": "set"}) == expected
 
 
 def test_parts_outside_of_variables() -> None:

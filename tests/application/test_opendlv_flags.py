@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.run.process.environment import interpolate
+from dodo_dsl.application.interpolation import interpolate
 from tests.application.composed import config
 
 COMMANDS = {

@@ -45,6 +45,7 @@ def test_everything(tmp_path: Path) -> None:
         tmp_path,
         "registry: [tests, 'dodo:']\nservices: [tests]\nmessages: [my.odvd]\napplication: [compose.yml]\n"
         "images: {prefix: own, tag: '7'}\ncids: 110-130\nsubnets: 10.1.0.0/24\ngates: false\n"
+        "environment: [DISPLAY, LICENSE_KEY]\npaths: [/etc/ros/, ~/maps]\noutside: true\n"
         "rigs: {kiwi: {kind: static, cid: 120}}\n",
     )
     assert problems == []
@@ -52,6 +53,8 @@ def test_everything(tmp_path: Path) -> None:
     assert (deployment.services, deployment.messages) == ((tmp_path / "tests",), (tmp_path / "my.odvd",))
     assert deployment.application == (tmp_path / "compose.yml",)
     assert (deployment.image_prefix, deployment.image_tag, deployment.gates) == ("own", "7", False)
+    assert (deployment.environment, deployment.outside) == (("DISPLAY", "LICENSE_KEY"), True)
+    assert deployment.paths == ("/etc/ros", str(Path("~/maps").expanduser()))
     assert set(deployment.cids) == set(range(110, 131)) - {111, 112, 120}
     assert deployment.subnets == ipaddress.IPv4Network("10.1.0.0/24")
     assert deployment.rig("kiwi") is deployment.rigs["kiwi"]

@@ -1,19 +1,13 @@
 """Removes a service's access to the host: hardware, privileges, names, ports, restarts."""
 
+from collections.abc import Collection
+from typing import Any
+
 from dodo_dsl.application import host_access
+from dodo_dsl.application.access.compose_keys import BUILD, SERVICE, removed
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
-_REMOVED = {
-    "container_name": "compose names the container",
-    "restart": "containers are not restarted",
-    "ports": "tests publish none",
-    "cgroup_parent": "",
-    "cgroup": "",
-    "pull_policy": "DoDo manages images",
-    "develop": "",
-    "profiles": "",
-    "extends": "",
-}
+_REMOVED = {key: why for key, why in removed(SERVICE).items() if key != "scale"}
 _DEPLOY = ("replicas", "mode", "restart_policy", "placement", "update_config", "rollback_config")
 
 
@@ -21,6 +15,9 @@ def remove_machine_settings(copy: ServiceCopy) -> None:
     """Removes names, ports and policies; each service of a test runs once."""
     for key, why in _REMOVED.items():
         copy.remove(key, why)
+    build = copy.service.get("build")
+    if isinstance(build, dict):
+        _remove_from_build(copy, build, removed(BUILD))
     scale, deploy = copy.service.pop("scale", None), copy.service.get("deploy")
     if isinstance(deploy, dict):
         scale = deploy.get("replicas", scale)
@@ -34,27 +31,32 @@ def remove_machine_settings(copy: ServiceCopy) -> None:
         copy.note(f"starts once, not {scale} times")
 
 
+def _remove_from_build(copy: ServiceCopy, build: dict[str, Any], keys: Collection[str]) -> None:
+    taken = [key for key in build if key in keys]
+    if taken:
+        copy.service["build"] = {key: value for key, value in build.items() if key not in keys}
+        copy.note(f"{', '.join(taken)} removed from build")
+
+
 def remove_hardware(copy: ServiceCopy) -> None:
     """Removes devices without a rig, and privileges unless the rig allows them."""
     service, setting = copy.service, copy.setting
-    allowed = setting.hil and setting.privileged_allowed
-    if not allowed:
+    if not setting.keeps_privileges:
         if host_access.is_true(service.get("privileged", False)):
             copy.remove("privileged")
         service.pop("privileged", None)
         _remove_capabilities(copy)
         _remove_unconfined(copy)
         build = service.get("build")
-        if isinstance(build, dict) and "privileged" in build:
-            service["build"] = {key: value for key, value in build.items() if key != "privileged"}
-            copy.note("privileged removed from build")
+        if isinstance(build, dict):
+            _remove_from_build(copy, build, ("privileged",))
     if setting.hil:
         return
     for key in host_access.HARDWARE_KEYS:
         copy.remove(key, "the test has no hardware")
     kept = []
     for volume in service.get("volumes") or ():
-        found = host_access.mount(volume)
+        found = host_access.mount(copy.filled(volume))
         if host_access.is_hardware(found):
             copy.note(f"{found.source} removed, the test has no hardware")
         else:
@@ -64,15 +66,15 @@ def remove_hardware(copy: ServiceCopy) -> None:
 
 def _remove_capabilities(copy: ServiceCopy) -> None:
     words = copy.service.get("cap_add") or []
-    taken = [w for w in words if host_access.capability(w) in host_access.MACHINE_CAPABILITIES]
-    copy.keep_items("cap_add", [w for w in words if w not in taken])
-    if taken:
-        copy.note(f"capabilities removed: {', '.join(map(str, taken))}")
+    kept = [word for word in words if host_access.is_harmless_capability(copy.filled(word))]
+    copy.keep_items("cap_add", kept)
+    if taken := [str(word) for word in words if word not in kept]:
+        copy.note(f"capabilities removed: {', '.join(taken)}")
 
 
 def _remove_unconfined(copy: ServiceCopy) -> None:
     words = copy.service.get("security_opt") or []
-    kept = [w for w in words if "unconfined" not in str(w)]
+    kept = [word for word in words if host_access.is_confining(copy.filled(word))]
     copy.keep_items("security_opt", kept)
     if len(kept) < len(words):
         copy.note("security_opt keeps the engine's confinement")

@@ -2,13 +2,14 @@
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, environment, plain, text
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.plan.rewrite import cid_and_image, removals, service_namespaces, volumes
+from dodo_dsl.plan.rewrite import cid_and_image, confinement, removals, service_namespaces, variables, volumes
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 from dodo_dsl.source import Node
 
@@ -16,11 +17,11 @@ _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
     cid_and_image.assign_image,
     removals.remove_machine_settings,
     removals.remove_hardware,
+    confinement.confine,
     service_namespaces.own_namespaces,
     volumes.own_mounts,
     service_namespaces.own_dependencies,
 )
-_NOT_CARRIED = ("COMPOSE_", "DODO_")
 
 
 def plan_application(
@@ -37,9 +38,10 @@ def plan_application(
 
     Devices stay only with ``hil``, privileges only with ``privileged_allowed`` as well.
     """
-    base = Path(os.path.relpath(application.folder, folder)).as_posix()
+    base = _relative(application.folder, folder)
     names = frozenset(application.services)
-    setting = Setting(cid, isolation, after, names, application.containers, hil, privileged_allowed)
+    known = application.known
+    setting = Setting(cid, isolation, after, names, application.containers, hil, privileged_allowed, known)
     changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
     path_variables: set[str] = set()
 
@@ -52,11 +54,26 @@ def plan_application(
         for name, service in application.services.items()
     }
     rest = {key: plain(node) for key, node in compose_paths.mapped_rest(application.rest, change).items()}
+    for key in ("secrets", "configs"):
+        if isinstance(rest.get(key), dict):
+            rest[key] = {name: volumes.without_name(about) for name, about in rest[key].items()}
     if "volumes" in rest:
         rest["volumes"] = volumes.own_volumes(rest["volumes"], changes)
     planned = tuple(_planned(service, cid) for service in application.services.values())
-    carried = _carried(application, cid, base, path_variables)
-    return Application(base, planned, {"services": services, **rest}, tuple(changes), carried)
+    carried = variables.carried(application, cid, base, path_variables)
+    secrets = {name: _relative(file, folder) for name, file in application.secrets.items()}
+    access = replace(
+        application.access,
+        roots=tuple(_relative(root, folder) for root in application.other_roots),
+        devices=hil,
+        privileged=hil and privileged_allowed,
+    )
+    compose = {"services": services, **rest}
+    return Application(base, planned, compose, tuple(changes), carried, secrets=secrets, access=access)
+
+
+def _relative(path: Path, folder: Path) -> str:
+    return Path(os.path.relpath(path, folder)).as_posix()
 
 
 def _copied(service: ComposeService, node: Node, setting: Setting, changes: list[str]) -> dict[str, Any]:
@@ -90,14 +107,3 @@ def _planned(service: ComposeService, cid: int) -> ApplicationService:
         takes_memory=opendlv_flags.takes_memory(words),
         env_files=tuple(file.path for file in service.env_files),
     )
-
-
-def _carried(application: ApplicationSource, cid: int, base: str, path_variables: set[str]) -> dict[str, str]:
-    """The variables of the application's own ``.env``, with the test's CID, and paths relative to the test."""
-    carried = {}
-    for name, value in application.variables.items():
-        if name.startswith(_NOT_CARRIED):
-            continue
-        is_path = name in path_variables and (value in (".", "..") or value.startswith(("./", "../")))
-        carried[name] = compose_paths.rebased(value, base) if is_path else value
-    return {**carried, **{name: str(cid) for name in opendlv_flags.CID_VARIABLES if name in carried}}

@@ -1,15 +1,18 @@
 """One service of the copy: its content, the properties of its test, and the changes made."""
 
 from collections.abc import Mapping, MutableSequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
+
+from dodo_dsl.application.access import filled
 
 
 @dataclass(frozen=True)
 class Setting:
     """Properties of a test; ``waits`` are the services of DoDo after which the application starts.
 
-    ``names`` are the application's services that start, ``containers`` their names by ``container_name``.
+    ``names`` are the application's services that start, ``containers`` their names by ``container_name``, ``known`` the
+    variables whose values are known.
     """
 
     cid: int
@@ -19,10 +22,15 @@ class Setting:
     containers: Mapping[str, str]
     hil: bool = False
     privileged_allowed: bool = False
+    known: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def own_network(self) -> bool:
         return self.isolation == "network"
+
+    @property
+    def keeps_privileges(self) -> bool:
+        return self.hil and self.privileged_allowed
 
 
 @dataclass(frozen=True)
@@ -33,6 +41,10 @@ class ServiceCopy:
     service: dict[str, Any]
     setting: Setting
     changes: MutableSequence[str]
+
+    def filled(self, value: Any) -> Any:
+        """A value of the service with its variables filled in, as far as they are known."""
+        return filled.value(value, self.setting.known)
 
     def note(self, change: str) -> None:
         line = "".join(c if c.isprintable() else "?" for c in f"{self.name}: {change}")

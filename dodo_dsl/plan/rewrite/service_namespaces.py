@@ -35,8 +35,6 @@ def _own_network(copy: ServiceCopy) -> None:
     if not stays:
         copy.remove("network_mode", "the test has a network of its own")
     _own_names(copy, stays)
-    for key in ("userns_mode", "uts"):
-        copy.remove(key)
     if service.get("ipc") is not None:
         copy.note("ipc is the test's own")
     service["ipc"] = f"service:{SANDBOX}"
@@ -62,7 +60,7 @@ def _host_network(copy: ServiceCopy) -> None:
         copy.note("network_mode is host, as the rig's")
     if service["network_mode"] != "host":
         return
-    for key in ("networks", "links", "mac_address"):
+    for key in ("networks", "links"):
         copy.remove(key, "the network is the host's")
     sysctls = service.get("sysctls")
     if sysctls:

@@ -57,14 +57,19 @@ def _own(copy: ServiceCopy, volume: Any) -> Any:
     return {"type": "volume", "source": "tmp", "target": target, **read_only, "volume": {"nocopy": True}}
 
 
+def without_name(about: Any) -> Any:
+    """A volume, secret or config without the name that all of the host would share."""
+    return {key: value for key, value in about.items() if key != "name"} if isinstance(about, dict) else about
+
+
 def own_volumes(volumes: Any, changes: MutableSequence[str]) -> dict[str, Any]:
     """Top-level ``volumes``: each test has its own, so names that all of the host would share are removed."""
     found = {}
     for name, about in (volumes or {}).items():
-        is_external = isinstance(about, dict) and host_access.is_true(about.get("external", False))
+        is_external = host_access.is_external(about)
         if isinstance(about, dict) and "name" in about and not is_external:
             changes.append(f"volume {renamed(name)}: name removed, each test has its own")
-            found[renamed(name)] = {key: value for key, value in about.items() if key != "name"}
+            found[renamed(name)] = without_name(about)
         else:
             found[renamed(name)] = about
     return found

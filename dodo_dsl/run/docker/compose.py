@@ -9,9 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import atomic
+from dodo_dsl.application.access import secret_variables
+from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
+from dodo_dsl.application.access.model import Finding
+from dodo_dsl.application.interpolation import EnvironmentProblem
+from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.trace import traced
+from dodo_dsl.run.application_files import application_paths, env_file_findings, secrets_of
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.protocol import BackendError
 
@@ -30,13 +36,37 @@ class Compose:
         self.project = project
         self.services: dict[str, Any] = {}
         self._say = say
+        self._paths = application_paths(plan.application, folder)
+        outside = secret_variables.visible(os.environ, plan.application.access.passed)
+        self._outside = {**secrets_of(plan.application, folder, outside), **outside}
 
     async def read(self) -> None:
-        """Fills ``services``; raises BackendError."""
+        """Fills ``services``; raises BackendError, also where the test has what no test may have."""
+        try:
+            self._refuse(env_file_findings(self.plan.application, self._paths, self._outside))
+        except EnvironmentProblem as error:
+            raise BackendError(str(error)) from error
         code, out, problem = await self._run("config", "--format", "json")
         if code:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
-        self.services = json.loads(out)["services"]
+        config = json.loads(out)
+        self._refuse(compiled_findings(config, self._test))
+        self.services = config["services"]
+
+    @property
+    def _test(self) -> CompiledTest:
+        plan = self.plan
+        images = {service.image for service in plan.services} | {plan.sandbox_image}
+        names = {service.name for service in plan.services} | {SANDBOX}
+        own_network = plan.isolation == "network"
+        application = {service.name for service in plan.application.services}
+        return CompiledTest(application, names, images, own_network, plan.application.access, self._paths)
+
+    @staticmethod
+    def _refuse(findings: Iterable[Finding]) -> None:
+        if found := list(findings):
+            others = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+            raise BackendError(f"the application may not have {shown(found[0].steps)}: {found[0].message}{others}")
 
     def has_healthcheck(self, name: str) -> bool:
         check = self.services.get(name, {}).get("healthcheck")
@@ -94,7 +124,7 @@ class Compose:
         self, *words: str, subnet: str = "", log: Path | None = None, project: str = ""
     ) -> tuple[int, str, str]:
         """Exit code, standard output and the last line of standard error of a compose command."""
-        environment = {**os.environ, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
+        environment = {**self._outside, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
             environment.pop(name, None)  # the test's own .env sets them
         environment[RUNNER_VARIABLE] = "dodo"

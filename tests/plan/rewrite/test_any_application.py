@@ -27,6 +27,8 @@ KEYS = {
     "profiles": st.sampled_from([[], ["p"], None]),
     "deploy": st.sampled_from([{"replicas": 0}, {"mode": "global"}, {}, None]),
     "cap_add": st.lists(st.text(max_size=4), max_size=2),
+    "pids_limit": st.sampled_from([-1, 0, 10, "${P:-0}", None]),
+    "logging": st.sampled_from([{"driver": "syslog"}, {"driver": "json-file"}, {}, None]),
     "security_opt": st.lists(st.sampled_from(["seccomp:unconfined", "seccomp=./p.json", "x"])),
     "sysctls": st.sampled_from([{"net.a": 1}, ["net.a=1", "b=2"], {}, None]),
     "container_name": st.sampled_from(["c", None]),
@@ -34,7 +36,7 @@ KEYS = {
     "extends": st.sampled_from(["b", {"service": "b"}]),
     "x-dodo": st.sampled_from([{}, {"in": ["a.B/1"], "done": "a.C", "readers": 2}]),
     "labels": st.dictionaries(st.text(max_size=4), st.text(max_size=4), max_size=2),
-    "anything": st.recursive(
+    "x-anything": st.recursive(
         st.none() | st.text() | st.integers(), lambda x: st.lists(x) | st.dictionaries(st.text(), x)
     ),
 }

@@ -14,9 +14,9 @@ def test_names_ports_and_policies() -> None:
     assert own.service == {"image": "x"}
     assert own.changes == [
         "a: container_name removed, compose names the container",
-        "a: restart removed, containers are not restarted",
         "a: ports removed, tests publish none",
-        "a: profiles removed",
+        "a: profiles removed, a service with a profile does not start",
+        "a: restart removed, containers are not restarted",
     ]
 
 
@@ -42,13 +42,17 @@ def test_each_service_runs_once(service: dict[str, Any], changed: dict[str, Any]
 
 FULL = {
     "privileged": True,
-    "cap_add": ["NET_RAW", "SYS_ADMIN"],
-    "security_opt": ["seccomp:unconfined", "label:x"],
+    "cap_add": ["NET_RAW", "SYS_NICE", "${C:-SYS_ADMIN}"],
+    "security_opt": ["seccomp:unconfined", "no-new-privileges:true"],
     "build": {"context": ".", "privileged": True},
     "devices": ["/dev/video0"],
     "volumes": ["/dev/bus:/dev/bus", "./a:/a"],
 }
-UNPRIVILEGED = {"cap_add": ["NET_RAW"], "security_opt": ["label:x"], "build": {"context": "."}}
+UNPRIVILEGED = {
+    "cap_add": ["SYS_NICE"],
+    "security_opt": ["no-new-privileges:true"],
+    "build": {"context": "."},
+}
 
 
 def test_without_a_rig() -> None:
@@ -57,7 +61,7 @@ def test_without_a_rig() -> None:
     assert own.service == {**UNPRIVILEGED, "volumes": ["./a:/a"]}
     assert own.changes == [
         "a: privileged removed",
-        "a: capabilities removed: SYS_ADMIN",
+        "a: capabilities removed: NET_RAW, ${C:-SYS_ADMIN}",
         "a: security_opt keeps the engine's confinement",
         "a: privileged removed from build",
         "a: devices removed, the test has no hardware",

@@ -45,6 +45,7 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> 
 
 def test_own_network(tmp_path: Path) -> None:
     application = planned(tmp_path)
+    confined = {"pids_limit": 2048, "mem_limit": "4g", "cap_drop": ["NET_RAW", "MKNOD"]}
     waits = {"sandbox": {"condition": "service_started"}, "track": {"condition": "service_healthy"}}
     assert application.folder == "../../team"
     assert application.compose == {
@@ -56,12 +57,14 @@ def test_own_network(tmp_path: Path) -> None:
                 "volumes": ["tmp:/tmp:nocopy", "../../team/weights:/weights:ro"],
                 "command": "--cid=140 --name=video0.argb --threshold=${THRESHOLD:-3}",
                 "depends_on": waits,
+                **confined,
             },
             "steering": {
                 "image": "${DODO_IMAGE_STEERING:-registry.example.org/team/steering:latest}",
                 "environment": ["OD4SESSION_CID=140", "GAIN=2"],
                 "depends_on": {"perception": {"condition": "service_started"}, **waits},
                 "ipc": "service:sandbox",
+                **confined,
             },
         }
     }

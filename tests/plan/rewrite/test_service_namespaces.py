@@ -14,7 +14,7 @@ SANDBOX = {"ipc": "service:sandbox"}
     ("service", "changed"),
     [
         ({}, SANDBOX),
-        ({"network_mode": "host", "ipc": "host", "uts": "host"}, SANDBOX),
+        ({"network_mode": "host", "ipc": "host"}, SANDBOX),
         ({"network_mode": "none"}, {**SANDBOX, "network_mode": "none"}),
         ({"network_mode": "service:eyes"}, {**SANDBOX, "network_mode": "service:eyes"}),
         ({"network_mode": "container:camera"}, {**SANDBOX, "network_mode": "service:eyes"}),

@@ -1,0 +1,1 @@
+"""What an application may use of its host: keys, paths and variables, checked with their values filled in."""

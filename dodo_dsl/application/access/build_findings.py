@@ -1,0 +1,82 @@
+"""What the build of a service's image may not use."""
+
+import posixpath
+from collections.abc import Iterator
+from typing import Any
+
+from dodo_dsl.application import host_access
+from dodo_dsl.application.access.compose_keys import BUILD
+from dodo_dsl.application.access.host_paths import ASK, HostPaths
+from dodo_dsl.application.access.model import Finding, key_findings
+
+NETWORKS = ("", "default", "none")
+_SCHEMES = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
+_OURS = "dodo/"
+_WITHOUT = "is left out of sil and dil tests, which have no hardware"
+
+
+def build_findings(name: str, service: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+    """Files of the host, its network, privileges, and the names of DoDo's own images."""
+    build = service["build"]
+    image = str(service.get("image") or "")
+    if image.startswith(_OURS):
+        message = f"the image '{image}' of '{name}' would replace one of DoDo's own"
+        yield Finding((), message, "give the image another name")
+    if isinstance(build, str):
+        build = {"context": build}
+        yield from (Finding((), f.message, f.hint, f.kind) for f in _context(build, paths))
+        return
+    if not isinstance(build, dict):
+        return
+    yield from key_findings(f"the build of '{name}'", BUILD, build)
+    yield from _context(build, paths)
+    yield from _others(name, build, paths)
+
+
+def _is_remote(text: str) -> bool:
+    return text.startswith(_SCHEMES)
+
+
+def _context(build: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+    context = build.get("context")
+    context = context if isinstance(context, str) and context else "."
+    if _is_remote(context) or "$" in context:
+        return
+    if problem := _folder_problem(context, paths):
+        yield Finding(("context",), problem, ASK)
+        return
+    file = build.get("dockerfile")
+    if isinstance(file, str) and file and (problem := paths.file_problem(posixpath.join(context, file), file)):
+        yield Finding(("dockerfile",), problem, ASK)
+
+
+def _folder_problem(text: str, paths: HostPaths) -> str:
+    if "://" in text:
+        return f"'{text}' is of a kind that may be a file of the host"
+    return paths.file_problem(text)
+
+
+def _others(name: str, build: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+    contexts = build.get("additional_contexts")
+    for step, text in _pairs(contexts):
+        if text and not _is_remote(text) and "$" not in text and (problem := _folder_problem(text, paths)):
+            yield Finding(("additional_contexts", step), problem, ASK)
+    for step, text in _pairs(build.get("ssh")):
+        if text and (problem := paths.file_problem(text)):
+            yield Finding(("ssh", step), problem, ASK)
+    network = str(build.get("network") or "")
+    if "$" not in network and network not in NETWORKS:
+        message = f"a build of '{name}' on the network '{network}' reaches services of the host"
+        yield Finding(("network",), message, "remove it")
+    if host_access.is_true(build.get("privileged", False)):
+        yield Finding(("privileged",), f"'privileged' of the build of '{name}' {_WITHOUT}", kind="privilege")
+
+
+def _pairs(written: Any) -> Iterator[tuple[str | int, str]]:
+    """The values of a mapping, or of a list of ``name=value``, each with its key or number."""
+    if isinstance(written, dict):
+        yield from ((str(key), str(value or "")) for key, value in written.items())
+    elif isinstance(written, list):
+        yield from ((item, str(text).partition("=")[2]) for item, text in enumerate(written))
+    elif isinstance(written, str):
+        yield 0, written.partition("=")[2]

@@ -1,0 +1,63 @@
+"""A compiled test as the engine would see it: what its services may not have, and no rule of a test has removed."""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dodo_dsl.application import host_access
+from dodo_dsl.application.access.host_paths import HostPaths
+from dodo_dsl.application.access.model import Access, Finding, Steps
+from dodo_dsl.application.access.service_findings import Surroundings, service_findings
+from dodo_dsl.application.access.shared_findings import shared_findings
+
+_SERVICES = "services"
+_DRIVERS = ("json-file", "local", "")
+
+
+@dataclass(frozen=True)
+class CompiledTest:
+    """``application`` and ``own`` are the names of its services and of DoDo's; ``images`` are those of DoDo."""
+
+    application: Collection[str]
+    own: Collection[str]
+    images: Collection[str]
+    own_network: bool
+    access: Access
+    paths: HostPaths
+
+
+def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator[Finding]:
+    """Findings in what ``docker compose config --format json`` prints, each of which refuses the test."""
+    rest = {key: value for key, value in config.items() if key != _SERVICES}
+    yield from shared_findings(rest, test.paths, test.access.passed)
+    around = Surroundings(test.paths, {}, rest.get("volumes") or {}, compiled=True)
+    for name, service in config.get(_SERVICES, {}).items():
+        if name in test.application:
+            found = [*service_findings(name, service, around), *_of_others(name, service, test)]
+            yield from (f.below(_SERVICES, name) for f in found if not _is_allowed(f, test.access))
+        elif name not in test.own:
+            yield Finding((_SERVICES, name), f"the test has no service '{name}'")
+
+
+def _is_allowed(finding: Finding, access: Access) -> bool:
+    if finding.kind == "hardware":
+        return access.devices
+    return finding.kind in ("privilege", "left out") and access.devices and access.privileged
+
+
+def _of_others(name: str, service: Mapping[str, Any], test: CompiledTest) -> Iterator[Finding]:
+    """What the copy has otherwise: the test's own network and memory, and logs that DoDo reads."""
+    for key in ("network_mode", "ipc") if test.own_network else ():
+        mode = str(service.get(key) or "")
+        if mode in ("host", "bridge") or host_access.reference(mode)[0] == "container":
+            yield Finding((key,), f"'{mode}' of '{name}' is not the test's own")
+    driver = str((service.get("logging") or {}).get("driver") or "")
+    if driver not in _DRIVERS:
+        yield Finding(("logging", "driver"), f"DoDo cannot read logs of '{driver}'")
+    if service.get("build") is not None and service.get("image") in test.images:
+        yield Finding(("image",), f"the image '{service['image']}' of '{name}' would replace one of DoDo's own")
+
+
+def shown(steps: Steps) -> str:
+    """The steps as people write them: ``services.driver.volumes[0]``."""
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps).removeprefix(".")

@@ -1,0 +1,213 @@
+"""Every key of the compose specification, and what becomes of it in a test's copy of a compose file.
+
+A key without a row is unknown, and refused until somebody decides. The tests compare the tables with the
+specification's schema, and docs/compose-keys.md shows them.
+"""
+
+from typing import Literal
+
+Treatment = Literal["kept", "rewritten", "removed", "refused"]
+Rows = dict[str, tuple[Treatment, str]]
+
+TOP: Rows = {
+    "services": ("rewritten", "see the keys of a service"),
+    "volumes": ("rewritten", "each test has its own"),
+    "secrets": ("kept", "from files of the repository, and from variables that are passed"),
+    "configs": ("kept", "from files of the repository, and from variables that are passed"),
+    "networks": ("removed", "each test has a network of its own"),
+    "include": ("rewritten", "DoDo merges the files itself"),
+    "name": ("removed", "each test is a project of its own"),
+    "version": ("removed", "compose ignores it"),
+    "models": ("refused", "the engine's model runner is shared by all tests"),
+    "jobs": ("refused", "a test starts services and no schedules"),
+}
+
+SERVICE: Rows = {
+    "annotations": ("removed", "runtimes take settings of the host from them"),
+    "attach": ("removed", "DoDo collects the output"),
+    "blkio_config": ("kept", "limits"),
+    "build": ("rewritten", "see the keys of 'build'"),
+    "cap_add": ("rewritten", "keeps what stays within the container"),
+    "cap_drop": ("rewritten", "with NET_RAW and MKNOD added"),
+    "cgroup": ("removed", "each container has its own"),
+    "cgroup_parent": ("removed", "it would evade the engine's limits"),
+    "command": ("rewritten", "with the test's CID"),
+    "configs": ("kept", "what the top-level 'configs' name"),
+    "container_name": ("removed", "compose names the container"),
+    "cpu_count": ("kept", "a limit"),
+    "cpu_percent": ("kept", "a limit"),
+    "cpu_period": ("kept", "a limit"),
+    "cpu_quota": ("kept", "a limit"),
+    "cpu_rt_period": ("kept", "a limit"),
+    "cpu_rt_runtime": ("kept", "a limit"),
+    "cpu_shares": ("kept", "a limit"),
+    "cpus": ("kept", "a limit"),
+    "cpuset": ("kept", "a limit"),
+    "credential_spec": ("refused", "it is a file of a Windows host"),
+    "depends_on": ("rewritten", "waits for DoDo's services, too"),
+    "deploy": ("rewritten", "keeps resources and labels"),
+    "develop": ("removed", "a test watches no files"),
+    "device_cgroup_rules": ("rewritten", "character devices, in hil tests only"),
+    "devices": ("rewritten", "in hil tests only, and no disks or memory"),
+    "dns": ("kept", "a name server"),
+    "dns_opt": ("kept", "options of the resolver"),
+    "dns_search": ("kept", "options of the resolver"),
+    "domainname": ("kept", "a name in the container"),
+    "entrypoint": ("rewritten", "with the test's CID"),
+    "env_file": ("rewritten", "files of the repository"),
+    "environment": ("rewritten", "with the test's CID, and without secrets that are not passed"),
+    "expose": ("kept", "documents a port"),
+    "extends": ("rewritten", "DoDo merges the services itself"),
+    "external_links": ("refused", "they name containers outside the application"),
+    "extra_hosts": ("kept", "names of addresses"),
+    "gpus": ("kept", "tests share graphics processors as they share the processor"),
+    "group_add": ("kept", "groups in the container"),
+    "healthcheck": ("rewritten", "with the test's CID"),
+    "hostname": ("kept", "a name in the container"),
+    "image": ("rewritten", "a pipeline can set another one"),
+    "init": ("kept", "a process in the container"),
+    "ipc": ("rewritten", "the test's own"),
+    "isolation": ("removed", "it is for Windows"),
+    "label_file": ("removed", "labels do nothing in a test"),
+    "labels": ("kept", "without those of compose and DoDo"),
+    "links": ("kept", "names of services"),
+    "logging": ("rewritten", "keeps json-file and local, which DoDo reads"),
+    "mac_address": ("removed", "the engine gives one"),
+    "mem_limit": ("rewritten", "4 GB where none is set"),
+    "mem_reservation": ("removed", "a test has limits only"),
+    "mem_swappiness": ("kept", "a limit"),
+    "memswap_limit": ("kept", "a limit"),
+    "models": ("refused", "the engine's model runner is shared by all tests"),
+    "network_mode": ("rewritten", "the test's own"),
+    "networks": ("rewritten", "the test's own, with the aliases"),
+    "oom_kill_disable": ("removed", "the limit of memory must hold"),
+    "oom_score_adj": ("removed", "it would let the kernel end others first"),
+    "pid": ("rewritten", "other services' only"),
+    "pids_limit": ("rewritten", "2048 where none is set"),
+    "platform": ("kept", "which image is pulled"),
+    "ports": ("removed", "tests publish none"),
+    "post_start": ("removed", "DoDo runs no hooks"),
+    "pre_start": ("removed", "DoDo runs no hooks"),
+    "pre_stop": ("removed", "DoDo runs no hooks"),
+    "privileged": ("rewritten", "in hil tests only, where the rig allows it"),
+    "profiles": ("removed", "a service with a profile does not start"),
+    "provider": ("refused", "it starts a program on the host"),
+    "pull_policy": ("removed", "DoDo manages images"),
+    "pull_refresh_after": ("removed", "DoDo manages images"),
+    "read_only": ("kept", "less access"),
+    "restart": ("removed", "containers are not restarted"),
+    "runtime": ("kept", "nvidia, runc and runsc only"),
+    "scale": ("removed", "each service runs once"),
+    "secrets": ("kept", "what the top-level 'secrets' name"),
+    "security_opt": ("rewritten", "keeps no-new-privileges"),
+    "shm_size": ("kept", "a limit; under network isolation the memory is the test's own"),
+    "stdin_open": ("kept", "nobody types"),
+    "stop_grace_period": ("kept", "DoDo waits 2 s"),
+    "stop_signal": ("kept", "a signal to the container"),
+    "storage_opt": ("kept", "a limit"),
+    "sysctls": ("kept", "the engine allows those of the container's namespaces only"),
+    "tmpfs": ("kept", "memory within the limit"),
+    "tty": ("kept", "a terminal in the container"),
+    "ulimits": ("kept", "limits"),
+    "umask": ("kept", "permissions of new files in the container"),
+    "use_api_socket": ("refused", "it gives access to the Docker engine"),
+    "user": ("kept", "a user in the container"),
+    "userns_mode": ("removed", "the engine's own"),
+    "uts": ("removed", "the container's own"),
+    "volumes": ("rewritten", "see the keys of a mount"),
+    "volumes_from": ("rewritten", "of the application's services"),
+    "working_dir": ("kept", "a folder in the container"),
+}
+
+BUILD: Rows = {
+    "additional_contexts": ("rewritten", "folders of the repository, images and URLs"),
+    "args": ("kept", "without secrets that are not passed"),
+    "cache_from": ("removed", "the engine has its own cache"),
+    "cache_to": ("removed", "it would write to the host or to a registry"),
+    "context": ("rewritten", "a folder of the repository, or a URL"),
+    "dockerfile": ("kept", "a file of the repository"),
+    "dockerfile_inline": ("kept", "a file"),
+    "entitlements": ("refused", "a build with them reaches the host"),
+    "extra_hosts": ("kept", "names of addresses"),
+    "isolation": ("removed", "it is for Windows"),
+    "labels": ("kept", "labels of the image"),
+    "network": ("kept", "default and none only"),
+    "no_cache": ("kept", "builds anew"),
+    "no_cache_filter": ("kept", "builds stages anew"),
+    "platforms": ("kept", "which image is built"),
+    "privileged": ("rewritten", "in hil tests only, where the rig allows it"),
+    "provenance": ("kept", "what is said of the image"),
+    "pull": ("kept", "which base images are pulled"),
+    "sbom": ("kept", "what is said of the image"),
+    "secrets": ("kept", "what the top-level 'secrets' name"),
+    "shm_size": ("kept", "a limit"),
+    "ssh": ("kept", "the default agent only, and no key files"),
+    "tags": ("removed", "they could replace other tests' images"),
+    "target": ("kept", "a stage of the file"),
+    "ulimits": ("kept", "limits"),
+}
+
+MOUNT: Rows = {
+    "bind": ("rewritten", "without propagation"),
+    "consistency": ("kept", "Linux ignores it"),
+    "image": ("kept", "a folder of an image"),
+    "read_only": ("kept", "less access"),
+    "source": ("rewritten", "see docs/applications.md"),
+    "target": ("kept", "a path in the container"),
+    "tmpfs": ("kept", "memory within the limit"),
+    "type": ("kept", "bind, volume, tmpfs and image only"),
+    "volume": ("kept", "options of a volume"),
+}
+
+VOLUME: Rows = {
+    "driver": ("kept", "local only"),
+    "driver_opts": ("rewritten", "tmpfs, or a folder that may be mounted"),
+    "external": ("kept", "where services mount it read-only"),
+    "labels": ("kept", "without those of compose and DoDo"),
+    "name": ("removed", "each test has its own"),
+}
+
+NETWORK: Rows = {
+    "attachable": ("removed", "each test has a network of its own"),
+    "driver": ("removed", "each test has a network of its own"),
+    "driver_opts": ("removed", "each test has a network of its own"),
+    "enable_ipv4": ("removed", "each test has a network of its own"),
+    "enable_ipv6": ("removed", "each test has a network of its own"),
+    "external": ("removed", "each test has a network of its own"),
+    "internal": ("removed", "a test's network is internal unless dodo.yml allows the outside"),
+    "ipam": ("removed", "each test has a network of its own"),
+    "labels": ("removed", "each test has a network of its own"),
+    "name": ("removed", "each test has a network of its own"),
+}
+
+SECRET: Rows = {
+    "driver": ("refused", "a program of the engine would provide it"),
+    "driver_opts": ("refused", "a program of the engine would provide it"),
+    "environment": ("kept", "variables that are passed"),
+    "external": ("refused", "the engine's secrets are not the application's"),
+    "file": ("rewritten", "a file of the repository"),
+    "labels": ("kept", "they do nothing in a test"),
+    "name": ("removed", "compose names it"),
+    "template_driver": ("refused", "a program of the engine would provide it"),
+}
+
+CONFIG: Rows = {
+    "content": ("kept", "a text"),
+    **{key: SECRET[key] for key in ("environment", "external", "file", "labels", "name", "template_driver")},
+}
+
+TABLES = {
+    "the whole file": TOP,
+    "a service": SERVICE,
+    "`build`": BUILD,
+    "a mount (`volumes` of a service)": MOUNT,
+    "a volume": VOLUME,
+    "a network": NETWORK,
+    "a secret": SECRET,
+    "a config": CONFIG,
+}
+
+
+def removed(rows: Rows) -> dict[str, str]:
+    """The keys that a copy does not have, with the reasons."""
+    return {key: why for key, (treatment, why) in rows.items() if treatment == "removed"}

@@ -1,0 +1,59 @@
+"""What an application may use of its host, and what was found that it may not."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from dodo_dsl.application.access.compose_keys import Rows
+from dodo_dsl.diagnostics import did_you_mean
+
+Steps = tuple[str | int, ...]
+Kind = Literal["refused", "unknown", "hardware", "privilege", "left out"]
+
+
+@dataclass(frozen=True)
+class Access:
+    """What a test's application may use of its host.
+
+    ``roots`` are folders whose files are the application's own, beside those of its repository, ``paths`` others that
+    it may mount, ``passed`` variables of DoDo's own environment. ``outside`` tells whether it may reach other networks,
+    ``devices`` and ``privileged`` what its rig allows.
+    """
+
+    roots: tuple[str, ...] = ()
+    paths: tuple[str, ...] = ()
+    passed: tuple[str, ...] = ()
+    outside: bool = False
+    devices: bool = False
+    privileged: bool = False
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A key or value that a test may not have; ``steps`` lead to it from where the search began.
+
+    ``hardware`` and ``privilege`` stay on rigs that allow them; they and what is ``left out`` are not in the copy.
+    """
+
+    steps: Steps
+    message: str
+    hint: str = ""
+    kind: Kind = "refused"
+
+    def below(self, *steps: str | int) -> "Finding":
+        return Finding((*steps, *self.steps), self.message, self.hint, self.kind)
+
+
+def key_findings(what: str, rows: Rows, written: Mapping[str, Any], compiled: bool = False) -> Iterator[Finding]:
+    """Keys without a row, and those that are refused; in a ``compiled`` file also those that are removed."""
+    for key, value in written.items():
+        if str(key).startswith("x-"):
+            continue
+        if key not in rows:
+            yield Finding((key,), f"unknown key '{key}' in {what}", did_you_mean(str(key), rows), "unknown")
+            continue
+        treatment, why = rows[key]
+        if value in (None, False, "", "false", [], {}):
+            continue
+        if treatment == "refused" or (compiled and treatment == "removed"):
+            yield Finding((key,), f"'{key}' of {what} cannot be isolated: {why}", "remove it")

@@ -1,0 +1,64 @@
+"""Limits and confinement of a service: what it has unless its file says so, and what it never has."""
+
+from typing import Any
+
+from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
+
+PIDS = 2048
+MEMORY = "4g"
+DROPPED = ("NET_RAW", "MKNOD")
+"""Capabilities that engines give by default: to send as another container, and to make device files."""
+_DRIVERS = ("json-file", "local")
+_RESERVED_LABELS = ("com.docker.", "dodo.")
+_UNLIMITED = ("", "0", "-1")
+
+
+def confine(copy: ServiceCopy) -> None:
+    """Limits of processes and memory, fewer capabilities, logs that DoDo reads, and labels of the service's own."""
+    _limit(copy, "pids_limit", "pids", PIDS)
+    _limit(copy, "mem_limit", "memory", MEMORY)
+    if not copy.setting.keeps_privileges:
+        _drop_capabilities(copy)
+    logging = copy.filled(copy.service.get("logging"))
+    if isinstance(logging, dict) and logging.get("driver", "json-file") not in _DRIVERS:
+        copy.remove("logging", "DoDo reads the logs")
+    _own_labels(copy)
+
+
+def _limit(copy: ServiceCopy, key: str, word: str, default: int | str) -> None:
+    """A limit as the file has it, also below ``deploy``, else the default."""
+    deploy: Any = copy.service.get("deploy")
+    for part in ("resources", "limits"):
+        deploy = deploy.get(part) if isinstance(deploy, dict) else None
+    below = deploy.get(word) if isinstance(deploy, dict) else None
+    own = copy.service.get(key)
+    if _is_limit(copy.filled(own)) or (own is None and _is_limit(copy.filled(below))):
+        return
+    if own is not None:
+        copy.note(f"{key} is {default}")
+    if below is not None:
+        deploy.pop(word)
+    copy.service[key] = default
+
+
+def _is_limit(value: Any) -> bool:
+    return value is not None and str(value).strip() not in _UNLIMITED
+
+
+def _drop_capabilities(copy: ServiceCopy) -> None:
+    dropped = [str(word) for word in copy.service.get("cap_drop") or ()]
+    taken = {word.upper().removeprefix("CAP_") for word in dropped}
+    copy.service["cap_drop"] = [*dropped, *(name for name in DROPPED if not taken & {name, "ALL"})]
+
+
+def _own_labels(copy: ServiceCopy) -> None:
+    labels = copy.service.get("labels")
+    if isinstance(labels, dict):
+        kept: Any = {key: value for key, value in labels.items() if not str(key).startswith(_RESERVED_LABELS)}
+    elif isinstance(labels, list):
+        kept = [label for label in labels if not str(label).startswith(_RESERVED_LABELS)]
+    else:
+        return
+    if len(kept) < len(labels):
+        copy.note("labels of compose and DoDo removed")
+        copy.keep_items("labels", kept)

@@ -1,0 +1,31 @@
+"""Files of the application that a compiled test reads where they are: their paths, and the secrets that they hold."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from dodo_dsl.application.access.host_paths import HostPaths, repository
+from dodo_dsl.application.access.model import Finding
+from dodo_dsl.application.interpolation import dotenv_file, interpolate
+from dodo_dsl.plan.model import Application
+
+
+def application_paths(application: Application, folder: Path) -> HostPaths:
+    """Its repository and what the deployment allows; ``folder`` is the compiled test's."""
+    own = (folder / application.folder).resolve()
+    roots = (*repository(own), *((folder / root).resolve() for root in application.access.roots))
+    return HostPaths(own, roots, tuple(map(Path, application.access.paths)))
+
+
+def secrets_of(application: Application, folder: Path, outside: Mapping[str, str]) -> dict[str, str]:
+    """The secrets of its ``.env`` files that are there, with the variables ``outside`` filled in."""
+    files = {path: dotenv_file(folder / path, outside) for path in set(application.secrets.values())}
+    return {name: files[path][name] for name, path in application.secrets.items() if name in files[path]}
+
+
+def env_file_findings(application: Application, paths: HostPaths, known: Mapping[str, str]) -> Iterator[Finding]:
+    """Files of ``env_file`` that are not the application's; raises EnvironmentProblem for a variable without value."""
+    variables = {**application.variables, **dotenv_file(paths.folder / ".env", known), **known}
+    for service in application.services:
+        for item, path in enumerate(service.env_files):
+            if problem := paths.file_problem(interpolate(path, variables)):
+                yield Finding(("services", service.name, "env_file", item), problem)

@@ -1,0 +1,98 @@
+"""A compiled test as compose shows it, judged before anything is created."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
+from dodo_dsl.application.access.host_paths import HostPaths
+from dodo_dsl.application.access.model import Access
+
+FOLDER = Path("/builds/team")
+NOTHING = Access()
+
+
+def found(service: dict[str, Any], access: Access = NOTHING, own_network: bool = True, **rest: Any) -> list[str]:
+    """The places of what is refused in a test of two services."""
+    test = CompiledTest(["driver"], ["judge"], ["dodo/judge:1"], own_network, access, HostPaths(FOLDER, (FOLDER,)))
+    own = {"privileged": True, "volumes": [{"type": "bind", "source": "/", "target": "/host"}]}
+    config = {"name": "dodo-t", "services": {"driver": {"image": "x", **service}, "judge": own}, **rest}
+    return [shown(finding.steps) for finding in compiled_findings(config, test)]
+
+
+SHOWN = {
+    "command": None,
+    "entrypoint": None,
+    "networks": {"default": None},
+    "ipc": "service:sandbox",
+    "pids_limit": 2048,
+    "mem_limit": "4294967296",
+    "cap_drop": ["NET_RAW"],
+    "volumes": [
+        {"type": "volume", "source": "tmp", "target": "/tmp", "volume": {}},
+        {"type": "bind", "source": "/builds/team/maps", "target": "/maps", "bind": {"create_host_path": True}},
+    ],
+    "build": {"context": "/builds/team", "dockerfile": "Dockerfile"},
+    "configs": [{"source": "limits", "target": "/limits"}],
+}
+TMP = {"name": "dodo-t_tmp", "driver_opts": {"type": "tmpfs", "device": "tmpfs", "o": "size=256m,mode=1777"}}
+
+
+def test_what_compose_shows_of_a_good_test() -> None:
+    rest = {
+        "networks": {"default": {"name": "dodo-t_default", "ipam": {}, "internal": True}},
+        "volumes": {"tmp": TMP},
+        "configs": {"limits": {"name": "dodo-t_limits", "file": "/builds/team/limits.json"}},
+    }
+    assert found(SHOWN, **rest) == []
+
+
+@pytest.mark.parametrize(
+    ("service", "places"),
+    [
+        ({"privileged": True}, ["services.driver.privileged"]),
+        ({"network_mode": "host"}, ["services.driver.network_mode"]),
+        ({"network_mode": "bridge"}, ["services.driver.network_mode"]),
+        ({"ipc": "host"}, ["services.driver.ipc"]),
+        ({"uts": "host"}, ["services.driver.uts"]),
+        ({"restart": "always", "container_name": "x"}, ["services.driver.restart", "services.driver.container_name"]),
+        ({"logging": {"driver": "syslog"}}, ["services.driver.logging.driver"]),
+        ({"devices": [{"source": "/dev/ttyACM0", "target": "/dev/x"}]}, ["services.driver.devices[0].source"]),
+        ({"new": 1}, ["services.driver.new"]),
+    ],
+)
+def test_what_is_refused(service: dict[str, Any], places: list[str]) -> None:
+    assert found(service) == places
+
+
+def test_images_of_dodo_are_not_built() -> None:
+    places = found({"build": {"context": "/builds/team"}, "image": "dodo/judge:1"})
+    assert places == ["services.driver.build", "services.driver.image"]
+
+
+HARDWARE = {"devices": [{"source": "/dev/ttyACM0"}], "network_mode": "host", "ipc": "host"}
+
+
+def test_a_rig_s_devices_and_network() -> None:
+    assert found(HARDWARE, Access(devices=True), own_network=False) == []
+    assert found({"cap_add": ["SYS_RAWIO"]}, Access(devices=True)) == ["services.driver.cap_add[0]"]
+
+
+def test_privileges_need_a_rig_that_allows_them() -> None:
+    service = {"privileged": True, "cap_add": ["SYS_RAWIO"], "security_opt": ["seccomp:unconfined"]}
+    assert len(found(service, Access(privileged=True))) == 3
+    assert found(service, Access(devices=True, privileged=True)) == []
+
+
+def test_rigs_do_not_give_disks_or_the_host() -> None:
+    every = Access(devices=True, privileged=True)
+    assert found({"devices": [{"source": "/dev/sda"}], "pid": "host"}, every) == [
+        "services.driver.pid",
+        "services.driver.devices[0].source",
+    ]
+
+
+def test_services_that_the_test_does_not_have() -> None:
+    test = CompiledTest([], [], [], True, Access(), HostPaths(FOLDER, (FOLDER,)))
+    assert [f.message for f in compiled_findings({"services": {"x": {}}}, test)] == ["the test has no service 'x'"]

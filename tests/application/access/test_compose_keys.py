@@ -1,0 +1,55 @@
+"""The tables of compose's keys have every key of its schema and no other, and their page is up to date."""
+
+from pathlib import Path
+from typing import Any
+
+import check_jsonschema
+import orjson
+import pytest
+
+from dodo_dsl.application.access import compose_keys
+from tests.application.access import keys_page
+
+VENDORED = Path(check_jsonschema.__file__).parent / "builtin_schemas" / "vendor" / "compose-spec.json"
+PAGE = Path(__file__).parents[3] / "docs" / "compose-keys.md"
+
+
+def schema() -> dict[str, Any]:
+    read: dict[str, Any] = orjson.loads(VENDORED.read_bytes())
+    return read
+
+
+def keys(*names: str) -> set[str]:
+    return {key for name in names for key in schema()["$defs"][name]["properties"]}
+
+
+def of_object(definition: str, key: str) -> set[str]:
+    """The keys of the long form of a value."""
+    about = schema()["$defs"][definition]["properties"][key]
+    forms = about.get("oneOf") or about["items"]["oneOf"]
+    return {name for form in forms for name in form.get("properties", ())}
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        (compose_keys.TOP, set(schema()["properties"])),
+        (compose_keys.SERVICE, keys("service", "container_spec", "workload_spec")),
+        (compose_keys.BUILD, of_object("workload_spec", "build")),
+        (compose_keys.MOUNT, of_object("container_spec", "volumes")),
+        (compose_keys.VOLUME, keys("volume")),
+        (compose_keys.NETWORK, keys("network")),
+        (compose_keys.SECRET, keys("secret")),
+        (compose_keys.CONFIG, keys("config")),
+    ],
+    ids=list(compose_keys.TABLES),
+)
+def test_each_key_has_a_row(rows: compose_keys.Rows, expected: set[str]) -> None:
+    assert set(rows) == expected
+    assert all(why for _, why in rows.values())
+
+
+def test_the_page_is_up_to_date(update_goldens: bool) -> None:
+    if update_goldens:
+        PAGE.write_text(keys_page.text())
+    assert PAGE.read_text() == keys_page.text(), "make goldens brings it up to date"

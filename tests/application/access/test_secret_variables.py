@@ -1,0 +1,39 @@
+"""Which variables look like secrets."""
+
+import pytest
+
+from dodo_dsl.application.access import secret_variables
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("CI_JOB_TOKEN", "CI_COMMIT_TAG", "GITHUB_TOKEN", "DB_PASSWORD", "MY_SECRET_2", "AWS_ACCESS_KEY_ID"),
+        *("api_key", "Token", "PGPASSWORD", "DB_PASS", "GOOGLE_APPLICATION_CREDENTIALS", "DOCKER_AUTH_CONFIG"),
+        *("DODO_IMAGES_TOKEN", "DODO_DEPLOY_KEY"),
+    ],
+)
+def test_secrets(name: str) -> None:
+    assert secret_variables.is_secret(name)
+
+
+@pytest.mark.parametrize("name", ["CI", "PATH", "PASSENGERS", "DODO_IMAGE_KEYBOARD", "OD4SESSION_CID", "HOME"])
+def test_others(name: str) -> None:
+    assert not secret_variables.is_secret(name)
+
+
+def test_the_pipeline_s_own() -> None:
+    assert secret_variables.is_of_pipeline("CI_JOB_TOKEN")
+    assert not secret_variables.is_of_pipeline("MY_TOKEN")
+
+
+def test_values_that_hold_secrets() -> None:
+    assert secret_variables.holds_secret("BACKEND", "postgres://team:pw@db/x")
+    assert secret_variables.holds_secret("PEM", "-----BEGIN RSA PRIVATE KEY-----")
+    assert not secret_variables.holds_secret("SITE", "https://example.org:8080/a@b")
+
+
+def test_what_is_visible() -> None:
+    variables = {"A": "1", "A_KEY": "2", "CI_JOB_TOKEN": "3"}
+    assert secret_variables.visible(variables) == {"A": "1"}
+    assert secret_variables.visible(variables, ("A_KEY", "NOT_SET")) == {"A": "1", "A_KEY": "2"}

@@ -1,0 +1,127 @@
+"""Attacks by compose files: refused, left out, or stopped at run time, as the table beside this file has it."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from dodo_dsl.application.read import read_application
+from dodo_dsl.diagnostics import Diagnostic, has_errors
+from dodo_dsl.emit.render import render_plan
+from dodo_dsl.plan.model import Application, Plan, PlannedService
+from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.protocol import BackendError
+from tests.emit.readers import compose
+
+TABLE: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load((Path(__file__).parent / "compose_files.yml").read_text())
+SECRET = "s3cr3t"
+JUDGE = PlannedService("evaluation", "judge-of-test", "collision", "dodo/collision:1", (), (), True)
+
+
+def attacks(group: str) -> list[Any]:
+    return [pytest.param(attack, id=name) for name, attack in TABLE[group].items()]
+
+
+def written(attack: dict[str, Any], folder: Path) -> Path:
+    """The attack as the compose file of a repository."""
+    repository = folder / "team"
+    repository.mkdir()
+    (repository / "dodo.yml").write_text("dodo: 1\n")
+    (repository / ".env").write_text(attack.get("env", ""))
+    for name, target in attack.get("links", {}).items():
+        (repository / name).symlink_to(target)
+    service = {"image": "team/driver", "command": "--cid=111", **attack.get("service", {})}
+    file = repository / "docker-compose.yml"
+    file.write_text(yaml.safe_dump({"services": {"driver": service}, **attack.get("file", {})}))
+    return file
+
+
+def found(attack: dict[str, Any], folder: Path, way: str = "network") -> tuple[Application | None, list[Diagnostic]]:
+    source, problems = read_application(written(attack, folder))
+    if source is None:
+        return None, problems
+    return plan_application(source, 140, way, folder / "generated" / "t", (JUDGE.name,)), problems
+
+
+def plan(application: Application) -> Plan:
+    common = ("", "sil", "closed-loop", 10.0, "realtime", "network", 1, 140, "10.213.0.0/28", "sil", "dodo/sandbox:1")
+    return Plan("t", "t", "t.dodo.yml", *common, (JUDGE,), application)
+
+
+@pytest.mark.parametrize("attack", attacks("refused"))
+def test_what_is_refused(attack: dict[str, Any], tmp_path: Path) -> None:
+    application, problems = found(attack, tmp_path)
+    assert application is None
+    errors = [problem for problem in problems if problem.severity == "error"]
+    assert {problem.rule for problem in errors} <= {"application-isolation", "unknown-key"}
+    for problem in errors:
+        assert Path(problem.span.file).name == "docker-compose.yml"
+        assert problem.hint or problem.rule == "application-isolation"
+
+
+@pytest.mark.parametrize("attack", attacks("left out"))
+def test_what_is_left_out(attack: dict[str, Any], tmp_path: Path) -> None:
+    application, problems = found(attack, tmp_path)
+    assert not has_errors(problems)
+    assert {problem.severity for problem in problems} == {"warning"}
+    gone(attack, application)
+
+
+@pytest.mark.parametrize("attack", attacks("removed"))
+def test_what_is_removed(attack: dict[str, Any], tmp_path: Path) -> None:
+    application, problems = found(attack, tmp_path)
+    assert problems == []
+    gone(attack, application)
+
+
+def gone(attack: dict[str, Any], application: Application | None) -> None:
+    assert application is not None
+    text = yaml.safe_dump(application.compose) + yaml.safe_dump(application.variables)
+    assert [word for word in attack["gone"] if word in text] == []
+    assert not [file.path for file in render_plan(plan(application)) if SECRET in file.text]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attack", attacks("at run time"))
+def test_what_is_stopped_at_run_time(attack: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compose()
+    monkeypatch.delenv("X", raising=False)
+    application, problems = found(attack, tmp_path)
+    assert application is not None, problems
+    for file in render_plan(plan(application)):
+        path = tmp_path / "generated" / file.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(file.text)
+    folder, report = tmp_path / "generated" / "t", tmp_path / "report"
+    for name, value in attack["set"].items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(BackendError, match="the application may not have ") as refused:
+        asyncio.run(Compose(plan(application), folder, report, "dodo-t", print).read())
+    assert str(refused.value).startswith(f"the application may not have {attack['says']}: "), refused.value
+
+
+def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
+    application, problems = found({}, tmp_path)
+    assert application is not None
+    assert problems == []
+
+
+@pytest.mark.slow
+def test_without_the_attack_the_engine_gets_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Secrets of the team's own ``.env`` come to the containers, and the pipeline's do not."""
+    compose()
+    monkeypatch.setenv("CI_JOB_TOKEN", "pipeline")
+    monkeypatch.setenv("API_KEY", "pipeline")
+    variables = {"A": "${API_KEY}", "B": "${CI_JOB_TOKEN:-none}", "CI_JOB_TOKEN": None}
+    application, _ = found({"service": {"environment": variables}, "env": f"API_KEY={SECRET}"}, tmp_path)
+    assert application is not None
+    for file in render_plan(plan(application)):
+        path = tmp_path / "generated" / file.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(file.text)
+    test = Compose(plan(application), tmp_path / "generated" / "t", tmp_path / "report", "dodo-t", print)
+    asyncio.run(test.read())
+    assert test.services["driver"]["environment"] == {"A": SECRET, "B": "none", "CI_JOB_TOKEN": None}

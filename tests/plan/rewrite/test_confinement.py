@@ -1,0 +1,48 @@
+"""Limits and confinement of copied services."""
+
+from typing import Any
+
+import pytest
+
+from dodo_dsl.plan.rewrite.confinement import confine
+from tests.plan.rewrite.copies import copy
+
+DEFAULTS = {"pids_limit": 2048, "mem_limit": "4g", "cap_drop": ["NET_RAW", "MKNOD"]}
+
+
+@pytest.mark.parametrize(
+    ("service", "changed"),
+    [
+        ({}, DEFAULTS),
+        ({"pids_limit": 10, "mem_limit": "1g"}, {"pids_limit": 10, "mem_limit": "1g"}),
+        ({"pids_limit": -1, "mem_limit": "0"}, {}),
+        ({"mem_limit": "${M:-0}"}, {}),
+        ({"mem_limit": "${M:-8g}"}, {"mem_limit": "${M:-8g}"}),
+        ({"mem_limit": "${M}"}, {"mem_limit": "${M}"}),
+        ({"cap_drop": ["all"]}, {"cap_drop": ["all"]}),
+        ({"cap_drop": ["CAP_NET_RAW", "CHOWN"]}, {"cap_drop": ["CAP_NET_RAW", "CHOWN", "MKNOD"]}),
+        ({"logging": {"driver": "json-file"}}, {"logging": {"driver": "json-file"}}),
+        ({"logging": {"driver": "${D:-syslog}"}}, {}),
+        ({"labels": {"dodo.test": "x", "team": "a"}}, {"labels": {"team": "a"}}),
+        ({"labels": ["com.docker.compose.project=x"]}, {}),
+    ],
+)
+def test_what_a_service_gets(service: dict[str, Any], changed: dict[str, Any]) -> None:
+    own = copy(service)
+    confine(own)
+    assert own.service == {**DEFAULTS, **changed}
+
+
+def test_limits_below_deploy_are_limits() -> None:
+    own = copy({"deploy": {"resources": {"limits": {"memory": "1g", "pids": 0}}}})
+    confine(own)
+    assert own.service["deploy"] == {"resources": {"limits": {"memory": "1g"}}}
+    assert own.service["pids_limit"] == 2048
+    assert "mem_limit" not in own.service
+
+
+def test_on_a_rig_that_allows_privileges_capabilities_stay() -> None:
+    own = copy({"privileged": True}, hil=True, privileged=True)
+    confine(own)
+    assert "cap_drop" not in own.service
+    assert own.service["pids_limit"] == 2048
