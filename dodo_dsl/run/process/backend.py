@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import begin_frame
@@ -13,7 +14,7 @@ from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes
 from dodo_dsl.run.process.confined.confinement import confinement
-from dodo_dsl.run.process.environment import EnvironmentProblem
+from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Slot
@@ -117,7 +118,7 @@ class ProcessBackend:
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module}
         message = {"do": "start", "id": command.name, "confined": self._confined(command), **words}
         try:
-            self._sandbox.send({**message, "env": changes(os.environ, command.environment)}, (output.writer,))
+            self._sandbox.send({**message, "env": changes(own_environment(), command.environment)}, (output.writer,))
         except ValueError as error:
             self._events.put_nowait(Unstartable(command.name, str(error)))
         output.release_writer()

@@ -6,10 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
+from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.plan.model import ApplicationService, Flag, Plan, PlannedService
-from dodo_dsl.run.process.environment import base_environment, dotenv, expanded, interpolate
+from dodo_dsl.run.application_files import application_paths
+from dodo_dsl.run.process.environment import (
+    application_environment,
+    base_environment,
+    expanded,
+    own_environment,
+)
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 
 OWN_VARIABLES = ("PYTHONPATH", SLOT_VARIABLE)
@@ -45,7 +52,7 @@ class Commands:
 
     def _own(self, service: PlannedService) -> Command:
         environment = {
-            **base_environment(),
+            **base_environment(self.plan.application.access.passed),
             "PYTHONPATH": package_path(),
             "DODO_SERVICE": service.name,
             "DODO_READY_FILE": ready_file(self.slot.name, service.name),
@@ -69,15 +76,22 @@ class Commands:
 
     def _application(self, service: ApplicationService) -> Command:
         folder = (self.folder / self.plan.application.folder).resolve()
-        inherited = base_environment()
+        passed = self.plan.application.access.passed
+        inherited = application_environment(passed)
+        outside = {**own_environment(passed), **inherited}
         cids = {name: str(self.slot.cid) for name in CID_VARIABLES}
-        variables = {**dotenv(folder / ".env", inherited), **inherited}
+        variables = {**dotenv_file(folder / ".env", outside), **outside}
         variables.update({name: cid for name, cid in cids.items() if name in self.plan.application.variables})
         own: dict[str, str] = {}
+        paths = application_paths(self.plan.application, self.folder)
         for path in service.env_files:
-            own.update(dotenv(folder / expanded(interpolate(path, variables)), variables))
+            file = interpolate(path, variables)
+            if problem := paths.file_problem(file):
+                raise EnvironmentProblem(f"env_file of '{service.name}': {problem}")
+            own.update(dotenv_file(folder / expanded(file), variables))
         for name, value in service.environment.items():
-            own[name] = variables.get(name, "") if value is None else interpolate(value, variables)
+            if value is not None or name in variables:
+                own[name] = variables[name] if value is None else interpolate(value, variables)
         own = {name: cids.get(name, with_cid_text(value, self.slot.cid)) for name, value in own.items()}
         pairs = ((word, interpolate(word, variables)) for word in service.command)
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))
@@ -103,8 +117,9 @@ def ready_file(slot: str, service: str) -> str:
 
 def changes(base: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str | None]:
     """The variables to set, or with None to remove, to turn ``base`` into ``wanted``: the sandbox has ``base``."""
-    different: dict[str, str | None] = {name: value for name, value in wanted.items() if base.get(name) != value}
-    return {**different, **{name: wanted.get(name) for name in OWN_VARIABLES}}
+    removed: dict[str, str | None] = {name: None for name in base if name not in wanted}
+    different = {name: value for name, value in wanted.items() if base.get(name) != value}
+    return {**removed, **different, **{name: wanted.get(name) for name in OWN_VARIABLES}}
 
 
 def package_path() -> str:

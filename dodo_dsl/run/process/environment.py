@@ -1,67 +1,36 @@
-"""Environment variables of services under test, and compose's interpolation of them in commands."""
+"""Environment variables of a test's processes: those of DoDo's own services, and those that an application gets."""
 
 import os
-import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection
 from pathlib import Path
 
-from dodo_dsl.application import interpolation
+from dodo_dsl.application.access import secret_variables
+from dodo_dsl.application.interpolation import EnvironmentProblem
 
-_VARIABLE = re.compile(
-    r"\$(?:(?P<escaped>\$)|(?P<bare>[A-Za-z_][A-Za-z0-9_]*)"
-    r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>.*))?\})",
-    re.DOTALL,
-)
-
-
-class EnvironmentProblem(ValueError):
-    """A required variable (``${NAME:?why}``) is not set, or a user has no home folder."""
+_FOR_APPLICATIONS = ("PATH", "HOME", "USER", "LANG", "TZ", "TERM")
+_FOR_PROGRAMS = ("VIRTUAL_ENV", "LD_LIBRARY_PATH", "PYTHONPATH", "CLUON_SHAREDMEMORY_POSIX")
+"""Where programs and libraries are, and how libcluon shares memory: set once for DoDo and all that it starts."""
+_LOCALE = "LC_"
 
 
-def interpolate(text: str, known: Mapping[str, str]) -> str:
-    """``$NAME``, ``${NAME}``, ``${NAME:-default}``, ``${NAME:?error}``, ``${NAME:+other}`` and ``$$`` as in compose.
-
-    Defaults may hold variables in turn.
-    """
-    parts, place = [], 0
-    while (dollar := text.find("$", place)) >= 0:
-        end = interpolation.end_of_variable(text, dollar)
-        match = _VARIABLE.fullmatch(text, dollar, end)
-        parts += [text[place:dollar], _value(match, known) if match else text[dollar:end]]
-        place = end
-    return "".join([*parts, text[place:]])
+def own_environment(passed: Collection[str] = ()) -> dict[str, str]:
+    """DoDo's own environment for its sandboxes and services, without secrets but for those that ``dodo.yml`` passes."""
+    return secret_variables.visible(os.environ, passed)
 
 
-def _value(match: re.Match[str], known: Mapping[str, str]) -> str:
-    if match["escaped"]:
-        return "$"
-    name = match["bare"] or match["name"]
-    found, word = known.get(name), match["word"] or ""
-    present = bool(found) if match["colon"] else found is not None
-    if match["operator"] == "+":
-        return interpolate(word, known) if present else ""
-    if present:
-        return found or ""
-    if match["operator"] == "?":
-        raise EnvironmentProblem(f"variable {name} is not set: {word or 'it is required'}")
-    return interpolate(word, known) if match["operator"] == "-" else found or ""
-
-
-def dotenv(path: Path, known: Mapping[str, str]) -> dict[str, str]:
-    """The variables of a ``.env`` file, interpolated with earlier ones and ``known``; empty when there is no file."""
-    if not path.is_file():
-        return {}
-    found: dict[str, str] = {}
-    for name, value in interpolation.dotenv(path.read_text(encoding="utf-8", errors="replace")).items():
-        found[name] = interpolate(value, {**found, **known})
-    return found
-
-
-def base_environment() -> dict[str, str]:
-    """DoDo's own environment, with the folder of its interpreter first in ``PATH`` and unbuffered Python."""
+def base_environment(passed: Collection[str] = ()) -> dict[str, str]:
+    """The same with the folder of DoDo's interpreter first in ``PATH``, and unbuffered Python."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
-    return {**os.environ, "PATH": path, "PYTHONUNBUFFERED": "1"}
+    return {**own_environment(passed), "PATH": path, "PYTHONUNBUFFERED": "1"}
+
+
+def application_environment(passed: Collection[str] = ()) -> dict[str, str]:
+    """What a process of the application gets of DoDo's own environment: what it needs to run, and what is passed."""
+    names = {*_FOR_APPLICATIONS, *_FOR_PROGRAMS, "PYTHONUNBUFFERED", *passed}
+    return {
+        name: value for name, value in base_environment(passed).items() if name in names or name.startswith(_LOCALE)
+    }
 
 
 def expanded(path: str) -> Path:

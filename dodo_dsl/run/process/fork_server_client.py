@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 from dodo_dsl.run.process.commands import package_path
+from dodo_dsl.run.process.environment import own_environment
 
 END_S = 10.0
 
@@ -27,7 +28,7 @@ class ForkServer:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,
-                env={**os.environ, "PYTHONPATH": package_path()},
+                env={**own_environment(), "PYTHONPATH": package_path()},
             )
 
     def fork(self, channel: socket.socket, log: int, slot: str) -> None:

@@ -3,7 +3,6 @@
 import asyncio
 import errno
 import json
-import os
 import select
 import socket
 import subprocess
@@ -15,6 +14,7 @@ from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.run.process.commands import package_path
+from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkedSandbox, ForkServer, end
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
@@ -78,7 +78,7 @@ class SandboxClient:
                     stdout=subprocess.DEVNULL,
                     stderr=stderr,
                     start_new_session=True,
-                    env={**os.environ, "PYTHONPATH": package_path(), SLOT_VARIABLE: slot.name},
+                    env={**own_environment(), "PYTHONPATH": package_path(), SLOT_VARIABLE: slot.name},
                 )
         asyncio.get_running_loop().add_reader(ours, self._receive)
         return await self._up

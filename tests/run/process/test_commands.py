@@ -1,13 +1,15 @@
 """What the process backend makes of an application's service: its words, its variables, and where they come from."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.run.process.commands import Commands
+from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
 
 COMPOSE = """\
@@ -19,25 +21,36 @@ services:
     environment:
       LEVEL: debug
       FROM_OUTSIDE:
+      NOWHERE:
+      LEAK: ${CI_JOB_TOKEN}
+      CI_JOB_TOKEN:
+      LICENSE: ${LICENSE_KEY:-none}
       FLAGS: --cid=111 --rate=${RATE:-${NOTHING:-3}}
     x-dodo-process: [python, planner.py]
 """
 
 
-def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FROM_OUTSIDE", "here")
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *passed: str) -> Command:
+    """The command of the compose file above."""
+    for name in ("FROM_OUTSIDE", "CI_JOB_TOKEN", "LICENSE_KEY", "UNNAMED"):
+        monkeypatch.setenv(name, "here")
     (tmp_path / "docker-compose.yml").write_text(COMPOSE)
     (tmp_path / ".env").write_text("CID=111\nRATE=20\nGREETING='costs $5'\n")
     (tmp_path / "car.env").write_text("WHEELBASE=0.257\nLEVEL=info\nOD4SESSION_CID=111\nTWICE=${RATE}${RATE}\n")
     source, problems = read_application(tmp_path / "docker-compose.yml")
     assert source is not None, problems
     folder = tmp_path / "generated" / "t"
-    application = plan_application(source, 140, "host", folder, ())
+    application = replace(plan_application(source, 140, "host", folder, ()), access=Access(passed=passed))
     common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox", ())
     plan = Plan("t", "t", "t.dodo.yml", *common, application)
     commands = Commands(plan, folder, tmp_path / "report", Slot(150))
-    (command,) = [commands.of(service) for service in application.services]
-    assert command.argv == (
+    (made,) = [commands.of(service) for service in application.services]
+    return made
+
+
+def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = command(tmp_path, monkeypatch)
+    assert made.argv == (
         *("python", "planner.py", "run", "--cid=150", "--rate=20", "--greeting=costs $5"),
         "session=150",
     )
@@ -48,6 +61,14 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         "WHEELBASE": "0.257",
         "OD4SESSION_CID": "150",
         "TWICE": "2020",
+        "LEAK": "",
+        "LICENSE": "none",
     }
-    assert {name: command.environment.get(name) for name in expected} == expected
-    assert command.folder == tmp_path
+    assert {name: made.environment.get(name) for name in expected} == expected
+    assert not {"NOWHERE", "CI_JOB_TOKEN", "UNNAMED"} & set(made.environment)
+    assert made.folder == tmp_path
+
+
+def test_variables_that_the_deployment_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = command(tmp_path, monkeypatch, "LICENSE_KEY", "UNNAMED")
+    assert [made.environment[name] for name in ("LICENSE", "LICENSE_KEY", "UNNAMED", "LEAK")] == ["here"] * 3 + [""]
