@@ -56,9 +56,17 @@ def build(
     def rewritten(
         cid: int, isolated: str, evaluators: tuple[str, ...], hardware: bool, privileged: bool
     ) -> Application:
-        kept = {"hil": hardware, "privileged_allowed": privileged}
-        planned = plan_application(application, cid, isolated, out / "test", evaluators, **kept)
-        return replace(planned, limits=_limits(application, deployment), hidden=_hidden(application, deployment))
+        planned = plan_application(
+            application,
+            cid,
+            isolated,
+            out / "test",
+            evaluators,
+            hil=hardware,
+            privileged_allowed=privileged,
+            limits=_limits(application, deployment),
+        )
+        return replace(planned, hidden=_hidden(application, deployment))
 
     builders = [
         _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten)

@@ -4,8 +4,6 @@ from typing import Any
 
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
-PIDS = 2048
-MEMORY = "4g"
 DROPPED = ("NET_RAW", "MKNOD")
 """Capabilities that engines give by default: to send as another container, and to make device files."""
 _DRIVERS = ("json-file", "local")
@@ -15,8 +13,9 @@ _UNLIMITED = ("", "0", "-1")
 
 def confine(copy: ServiceCopy) -> None:
     """Limits of processes and memory, fewer capabilities, logs that DoDo reads, and labels of the service's own."""
-    _limit(copy, "pids_limit", "pids", PIDS)
-    _limit(copy, "mem_limit", "memory", MEMORY)
+    limits = copy.setting.limits
+    _limit(copy, "pids_limit", "pids", limits.processes)
+    _limit(copy, "mem_limit", "memory", limits.memory)
     if not copy.setting.keeps_privileges:
         _drop_capabilities(copy)
     logging = copy.filled(copy.service.get("logging"))
@@ -25,7 +24,7 @@ def confine(copy: ServiceCopy) -> None:
     _own_labels(copy)
 
 
-def _limit(copy: ServiceCopy, key: str, word: str, default: int | str) -> None:
+def _limit(copy: ServiceCopy, key: str, word: str, default: int) -> None:
     """A limit as the file has it, also below ``deploy``, else the default."""
     deploy: Any = copy.service.get("deploy")
     for part in ("resources", "limits"):

@@ -12,6 +12,7 @@ from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.plan.rewrite import cid_and_image, confinement, removals, service_namespaces, variables, volumes
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 from dodo_dsl.source import Node
+from dodo_dsl.spec.sandbox import SandboxLimits
 
 _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
     cid_and_image.assign_image,
@@ -33,6 +34,7 @@ def plan_application(
     *,
     hil: bool = False,
     privileged_allowed: bool = False,
+    limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
 ) -> Application:
     """The application as a test runs it; ``folder`` is the compiled test's, ``after`` the services it waits for.
 
@@ -40,8 +42,8 @@ def plan_application(
     """
     base = _relative(application.folder, folder)
     names = frozenset(application.services)
-    known = application.known
-    setting = Setting(cid, isolation, after, names, application.containers, hil, privileged_allowed, known)
+    containers, known = application.containers, application.known
+    setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits)
     changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
     path_variables: set[str] = set()
 
@@ -69,7 +71,7 @@ def plan_application(
         privileged=hil and privileged_allowed,
     )
     compose = {"services": services, **rest}
-    return Application(base, planned, compose, tuple(changes), carried, secrets=secrets, access=access)
+    return Application(base, planned, compose, tuple(changes), carried, limits, secrets=secrets, access=access)
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.application.access import filled
+from dodo_dsl.spec.sandbox import SandboxLimits
 
 
 @dataclass(frozen=True)
@@ -12,7 +13,7 @@ class Setting:
     """Properties of a test; ``waits`` are the services of DoDo after which the application starts.
 
     ``names`` are the application's services that start, ``containers`` their names by ``container_name``, ``known`` the
-    variables whose values are known.
+    variables whose values are known, and ``limits`` what a service gets that sets none.
     """
 
     cid: int
@@ -23,6 +24,7 @@ class Setting:
     hil: bool = False
     privileged_allowed: bool = False
     known: Mapping[str, str] = field(default_factory=dict)
+    limits: SandboxLimits = field(default_factory=SandboxLimits)
 
     @property
     def own_network(self) -> bool:

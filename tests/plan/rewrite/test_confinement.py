@@ -7,7 +7,7 @@ import pytest
 from dodo_dsl.plan.rewrite.confinement import confine
 from tests.plan.rewrite.copies import copy
 
-DEFAULTS = {"pids_limit": 2048, "mem_limit": "4g", "cap_drop": ["NET_RAW", "MKNOD"]}
+DEFAULTS = {"pids_limit": 1024, "mem_limit": 2_000_000_000, "cap_drop": ["NET_RAW", "MKNOD"]}
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ def test_limits_below_deploy_are_limits() -> None:
     own = copy({"deploy": {"resources": {"limits": {"memory": "1g", "pids": 0}}}})
     confine(own)
     assert own.service["deploy"] == {"resources": {"limits": {"memory": "1g"}}}
-    assert own.service["pids_limit"] == 2048
+    assert own.service["pids_limit"] == 1024
     assert "mem_limit" not in own.service
 
 
@@ -45,4 +45,4 @@ def test_on_a_rig_that_allows_privileges_capabilities_stay() -> None:
     own = copy({"privileged": True}, hil=True, privileged=True)
     confine(own)
     assert "cap_drop" not in own.service
-    assert own.service["pids_limit"] == 2048
+    assert own.service["pids_limit"] == 1024

@@ -45,7 +45,7 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> 
 
 def test_own_network(tmp_path: Path) -> None:
     application = planned(tmp_path)
-    confined = {"pids_limit": 2048, "mem_limit": "4g", "cap_drop": ["NET_RAW", "MKNOD"]}
+    confined = {"pids_limit": 1024, "mem_limit": 2_000_000_000, "cap_drop": ["NET_RAW", "MKNOD"]}
     waits = {"sandbox": {"condition": "service_started"}, "track": {"condition": "service_healthy"}}
     assert application.folder == "../../team"
     assert application.compose == {
