@@ -8,8 +8,11 @@ import socket
 import struct
 from collections.abc import Iterable, Iterator
 
+from dodo_dsl.opendlv.bus.address import Address
+
 _SO_ATTACH_FILTER = 26  # Linux: asm-generic/socket.h
-_LOAD = {1: 0x30, 2: 0x28}  # BPF_LD | BPF_ABS, a byte or two
+_LOAD = {1: 0x30, 2: 0x28, 4: 0x20}  # BPF_LD | BPF_ABS, a byte, two or four
+_SOURCE_PORT, _SOURCE_HOST = 0, 0xFFF0_0000 + 12  # in the UDP header; behind SKF_NET_OFF, in the IP header
 _IF_EQUAL, _RETURN = 0x15, 0x06
 _ALL, _NOTHING = 0xFFFFFFFF, 0
 _UDP_HEADER, _FRAME_HEADER = 8, 5
@@ -21,12 +24,15 @@ _MOST = 4096
 Instruction = tuple[int, int, int, int]
 
 
-def attach(receiver: socket.socket, ids: Iterable[int]) -> bool:
+def attach(
+    receiver: socket.socket, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = ()
+) -> bool:
     """Passes only messages with these ids, and datagrams that do not begin with an id; False where the kernel cannot.
 
-    Dropped datagrams count as lost in the kernel's counter of the socket.
+    Messages with ids ``of_others`` pass unless they come from addresses in ``than``. Dropped datagrams count as lost in
+    the kernel's counter of the socket.
     """
-    program = [*_program(ids)]
+    program = [*_program(ids, of_others, than)]
     if len(program) > _MOST:
         return False
     code = ctypes.create_string_buffer(b"".join(_INSTRUCTION.pack(*each) for each in program))
@@ -39,11 +45,19 @@ def attach(receiver: socket.socket, ids: Iterable[int]) -> bool:
     return True
 
 
-def _program(ids: Iterable[int]) -> Iterator[Instruction]:
+def _program(ids: Iterable[int], of_others: Iterable[int], than: Iterable[Address]) -> Iterator[Instruction]:
     yield _LOAD[1], 0, 0, _TAG
     yield _IF_EQUAL, 1, 0, _ID_TAG
     yield _RETURN, 0, 0, _ALL
     for id_ in sorted(ids):
+        yield from _passing(_varint(id_))
+    for host, port in sorted(than):
+        yield _LOAD[2], 0, 0, _SOURCE_PORT
+        yield _IF_EQUAL, 0, 3, port
+        yield _LOAD[4], 0, 0, _SOURCE_HOST
+        yield _IF_EQUAL, 0, 1, int.from_bytes(socket.inet_aton(host), "big")
+        yield _RETURN, 0, 0, _NOTHING
+    for id_ in sorted(of_others):
         yield from _passing(_varint(id_))
     yield _RETURN, 0, 0, _NOTHING
 

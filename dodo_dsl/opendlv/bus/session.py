@@ -51,16 +51,18 @@ class Session:
         self.lost = 0
         self.is_member = True
         self._only: frozenset[int] | None = None
+        self.address: Address = ("", 0)
+        """Host and port from which this session's datagrams come."""
         self.source: Address = ("", 0)
         """Host and port from which the last datagram came."""
         bus = group(cid)
         try:
             self._receiver = _receiver(bus)
-            self._sender = _sender(bus, self._receiver)
+            self._sender, self.address = _sender(bus, self._receiver)
         except OSError as error:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
-        self._own_address = self._sender.getsockname()
+        self._bus = bus
         self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
         self._view = memoryview(self._buffer)
         self._poll = select.poll()
@@ -84,7 +86,7 @@ class Session:
                 f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
             )
         try:
-            self._sender.send(frame)
+            self._sender.sendto(frame, self._bus)
         except OSError as error:
             raise SessionError(f"the bus does not take a message: {error.strerror}") from None
         return frame
@@ -112,13 +114,17 @@ class Session:
         """The file descriptor to select on for reading."""
         return self._receiver.fileno()
 
-    def hear_only(self, ids: Iterable[int]) -> None:
-        """Receive messages with these ids from now on; where the kernel can, this process is not woken for others.
+    def hear_only(
+        self, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = frozenset()
+    ) -> None:
+        """Receive messages with ``ids`` from now on; where the kernel can, this process is not woken for others.
 
+        Those ``of_others`` come only from other addresses ``than`` these.
         Losses are not counted any more, as the kernel counts the others with them.
         """
-        self._only = frozenset(ids)
-        kernel_filter.attach(self._receiver, self._only)
+        passing, of_others, than = frozenset(ids), frozenset(of_others), frozenset(than)
+        self._only = passing | of_others
+        kernel_filter.attach(self._receiver, passing, of_others, than)
 
     def deafen(self) -> None:
         """Stops receiving, so that messages no longer wake this process; sending goes on."""
@@ -131,7 +137,7 @@ class Session:
     @property
     def port(self) -> int:
         """From which this session's datagrams come."""
-        return int(self._own_address[1])
+        return self.address[1]
 
     def close(self) -> None:
         """Leave the bus."""
@@ -150,7 +156,7 @@ class Session:
         size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES)
         if len(ancillary) > 1 and self._only is None:
             self.lost = _lost(ancillary)
-        if address == self._own_address:
+        if address == self.address:
             return None
         if self._only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self._only:
             return None
@@ -193,18 +199,25 @@ def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
     return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
 
 
-def _sender(bus: Address, receiver: socket.socket) -> socket.socket:
-    """Connected, so that the address its datagrams carry is known; time to live 1, loop on."""
+def _sender(bus: Address, receiver: socket.socket) -> tuple[socket.socket, Address]:
+    """Time to live 1, loop on; with the address that its datagrams carry.
+
+    It has its port at all addresses of this machine: were it connected, another program could have the same port at
+    another address, and put the first one into its datagrams (``IP_PKTINFO``).
+    """
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        sender.connect(bus)
+        sender.bind(("", 0))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect(bus)
+            host = str(probe.getsockname()[0])
     except OSError:
         receiver.close()
         sender.close()
         raise
-    return sender
+    return sender, (host, int(sender.getsockname()[1]))
 
 
 def _receiver(bus: Address) -> socket.socket:

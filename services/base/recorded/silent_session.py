@@ -12,7 +12,7 @@ class SilentSession(Session):
         self.cid, self.messages = cid, messages
         self.garbage = self.lost = 0
         self.is_member = False
-        self.source = ("", 0)
+        self.address = self.source = ("", 0)
 
     def send_envelope(self, envelope: Envelope) -> bytes:
         return encode_frame(envelope)
@@ -22,10 +22,6 @@ class SilentSession(Session):
 
     def deafen(self) -> None:
         """There is nothing to hear."""
-
-    @property
-    def port(self) -> int:
-        return 0
 
     def close(self) -> None:
         """Nothing is open."""

@@ -47,3 +47,14 @@ def test_what_does_not_begin_with_an_id_passes(pair: tuple[socket.socket, socket
 
 def test_more_ids_than_a_filter_holds_are_left_to_the_process(pair: tuple[socket.socket, socket.socket]) -> None:
     assert not kernel_filter.attach(pair[0], range(1, 3000))
+
+
+@given(st.sets(IDS, max_size=5), st.sets(IDS, max_size=5), st.booleans())
+def test_some_pass_only_from_others(
+    pair: tuple[socket.socket, socket.socket], ids: set[int], of_others: set[int], is_one: bool
+) -> None:
+    host, port = pair[1].getsockname()
+    than = [("127.0.0.2", port), (host, port + 1 if port < 65_535 else 1)] + ([(host, port)] if is_one else [])
+    assert kernel_filter.attach(pair[0], ids, of_others, than)
+    for id_ in ids | of_others:
+        assert passed(pair, encode_frame(Envelope(id_, b"", 1, 2, 3, 4))) == (id_ in ids or not is_one), id_

@@ -180,3 +180,18 @@ def test_a_machine_without_a_route_for_multicast() -> None:
     done = subprocess.run([*alone, sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("the bus 225.0.0.130:12175 cannot be joined: ")
     assert done.stdout.endswith(" (is there a route to 224.0.0.0/4?)\n")
+
+
+def test_nobody_has_a_session_s_port_at_another_local_address(cid: int) -> None:
+    """Its address could else be put into datagrams."""
+    with Session(cid) as session, socket.socket(type=socket.SOCK_DGRAM) as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with pytest.raises(OSError, match="Address already in use"):
+            other.bind(("127.0.0.2", session.port))
+
+
+def test_a_session_knows_the_address_that_others_see(cid: int) -> None:
+    with Session(cid) as session, Session(cid) as other:
+        session.send(STEERING())
+        assert other.receive(5.0) is not None
+        assert other.source == session.address
