@@ -64,6 +64,7 @@ def _from_application(wiring: Wiring) -> list[End]:
         if end.port.kind == "message"
         and end.port.name != ANYTHING
         and end.port.can_be_required
+        and not wiring.is_truth(end.port)
         and not any(end.port.consumes(other.port) for other in wiring.produced if other.port.name != ANYTHING)
     ]
 

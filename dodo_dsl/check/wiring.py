@@ -13,8 +13,8 @@ from dodo_dsl.spec.manifest import Ports
 Kind = Literal["message", "memory"]
 
 ANYTHING = "*"
-NOT_OF_THE_APPLICATION = ("opendlv.sim.", "dodo.")
-"""Packages of messages that only a simulation sends, so that they are never required of an application."""
+NOT_OF_THE_APPLICATION = ("opendlv.sim.", "dodo.", "cluon.data.")
+"""Packages of messages that only a simulation, or who controls it, sends: they are never required of an application."""
 
 _PARAMETER = re.compile(r"\{(?P<name>[^{}]+)\}")
 _STAMP = re.compile(r"[0-9]{1,10}")
@@ -24,13 +24,15 @@ _STAMP = re.compile(r"[0-9]{1,10}")
 class Port:
     """A message or memory that a service produces or consumes, or only may where it is ``optional``.
 
-    ``stamp`` is a message's sender stamp; with None a service consumes any.
+    ``stamp`` is a message's sender stamp; with None a service consumes any. A service judges the application by what it
+    consumes as ``truth``.
     """
 
     kind: Kind
     name: str
     stamp: int | None = None
     optional: bool = False
+    truth: bool = False
 
     def __str__(self) -> str:
         return self.name if self.stamp is None else f"{self.name}/{self.stamp}"
@@ -79,6 +81,10 @@ class Wiring:
         """The test's services that produce what a port consumes."""
         return [end for end in self.produced if port.consumes(end.port)]
 
+    def is_truth(self, port: Port) -> bool:
+        """Whether the application is judged by it, and services of the test produce it."""
+        return port.truth and bool(self.producers(port))
+
     def application_may_produce(self, port: Port) -> bool:
         """Whether the application declares it, or could produce it because it does not declare everything."""
         if not port.can_be_required:
@@ -109,18 +115,19 @@ def _ports(kind: Kind, written: Sequence[str], values: Mapping[str, str], stamp:
         names = {m["name"] for m in _PARAMETER.finditer(text)}
         if not names <= values.keys():
             continue  # an optional parameter without a value: no such port
-        optional = text.endswith("?")
-        filled = _PARAMETER.sub(lambda m: values[m["name"]], text.removesuffix("?"))
+        truth = text.endswith("!")
+        optional = text.removesuffix("!").endswith("?")
+        filled = _PARAMETER.sub(lambda m: values[m["name"]], text.rstrip("?!"))
         if kind == "memory":
             yield Port(kind, filled.removeprefix("/"), None, optional)
         else:  # a list has commas
-            yield from (message(each, stamp, optional) for each in filled.split(",") if each)
+            yield from (message(each, stamp, optional, truth) for each in filled.split(",") if each)
 
 
-def message(text: str, stamp: int | None, optional: bool = False) -> Port:
+def message(text: str, stamp: int | None, optional: bool = False, truth: bool = False) -> Port:
     """The port of ``name`` or ``name/senderStamp``; ``stamp`` is that of a name alone."""
     name, _, number = text.partition("/")
-    return Port("message", name, int(number) if _STAMP.fullmatch(number) else stamp, optional)
+    return Port("message", name, int(number) if _STAMP.fullmatch(number) else stamp, optional, truth)
 
 
 def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | None) -> Wiring:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.senders import senders, truth_delay_s, withheld_truth
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses, clock_service, recorder_service
 from dodo_dsl.plan.clock_service import lockstep
@@ -183,6 +184,9 @@ class _Builder:
             lockstep=lockstep(spec, self.application.declared, self.settings.wall_timeout_s),
             rig=rig.name if rig else "",
             messages=messages,
+            senders=senders(self.test),
+            truth=(truth := withheld_truth(self.test)),
+            truth_delay_s=truth_delay_s(self.test) if truth else 0.0,
             source_map=self.places,
         )
 

@@ -105,7 +105,8 @@ class Plan:
     """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation.
 
     ``lockstep`` is None in real time, ``rig`` empty below level hil; ``messages`` are ODVD files of the deployment,
-    relative to ``files/``.
+    relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
+    ``truth`` are messages by which evaluators judge; in real time they come to the bus ``truth_delay_s`` late.
     """
 
     name: str
@@ -127,13 +128,18 @@ class Plan:
     lockstep: Lockstep | None = None
     rig: str = ""
     messages: tuple[str, ...] = ()
+    senders: tuple[str, ...] = ()
+    truth: tuple[str, ...] = ()
+    truth_delay_s: float = 0.0
     source_map: dict[str, Place] = field(default_factory=dict)
 
     @property
     def variables(self) -> dict[str, str]:
-        """Environment variables that give the test's services their clock and their rig."""
+        """Environment variables that give the test's services their clock, their rig, and who may send what."""
         stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
-        return {**stepped, **({"DODO_RIG": self.rig} if self.rig else {})}
+        rig = {"DODO_RIG": self.rig} if self.rig else {}
+        truth = {"DODO_TRUTH": " ".join([f"{self.truth_delay_s:g}", *self.truth])} if self.truth else {}
+        return {**stepped, **rig, **({"DODO_SENDERS": " ".join(self.senders)} if self.senders else {}), **truth}
 
     def layer(self, name: str) -> tuple[PlannedService, ...]:
         return tuple(s for s in self.services if s.layer == name)

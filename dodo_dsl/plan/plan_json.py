@@ -59,7 +59,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         if settings.wall_timeout_s is not None and raw["lockstep"]:
             raw["lockstep"]["wall_timeout_s"] = settings.wall_timeout_s
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
-        raw["messages"] = tuple(raw["messages"])
+        raw |= {key: tuple(raw[key]) for key in ("messages", "senders", "truth")}
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
         plan = Plan(**raw)
         problem = _problem(plan)
@@ -84,6 +84,8 @@ def _problem(plan: Plan) -> str:
         "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
         "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
+        "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in (*plan.senders, *plan.truth)),
+        "truth_delay_s": isinstance(plan.truth_delay_s, int | float) and 0 <= plan.truth_delay_s <= 86_400,
         "service name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "service layer": all(s.layer in LAYERS for s in plan.services),
         "flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),

@@ -22,7 +22,7 @@ def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> Pl
     A test on a rig always has a snapshot of its first camera.
     """
     spec = test.spec
-    flags = [Flag("rec", RECORDING, "report")]
+    flags = [Flag("rec", RECORDING, "report"), Flag("commands", "false")]  # the application could stop it
     flags += [Flag("limit", f"{spec.record_limit_mb:g}")] if spec.record_limit_mb else []
     wanted = [Flag("frames", f"{spec.frames_hz:g}")] if spec.frames_hz else []
     wanted += [Flag("snapshot", SNAPSHOT, "report")] if spec.level == "hil" else []

@@ -18,7 +18,7 @@ from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.process.slot import Slot, new_key
 from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.attendance import attended, is_real
 
@@ -116,7 +116,7 @@ class Processes:
             host_isolation.host_slot(
                 plan, () if is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
             ) as leased,
-            attended(plan, leased.cid, leased.descriptors, say, self._roots) as descriptors,
+            attended(plan, leased.cid, leased.descriptors, say, leased.key, self._roots) as descriptors,
         ):
             slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)
@@ -159,14 +159,15 @@ class Containers:
         lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"
         subnets = other_subnets(plan.subnet, self._subnets)
-        backend = DockerBackend(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say)
+        key = new_key()
+        backend = DockerBackend(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say, key)
         try:
             if plan.isolation == "network" and not is_real(plan):
                 yield backend
             else:
                 async with (
                     host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
-                    attended(plan, slot.cid, slot.descriptors, say, self._roots),
+                    attended(plan, slot.cid, slot.descriptors, say, key, self._roots),
                 ):
                     yield backend
         finally:

@@ -9,7 +9,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run.load.meter import LoadMeter, add_up
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Late, Noted, Overrun
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Foreign, Late, Noted, Overrun
 from dodo_dsl.run.run_state import Ended, RunState
 
 READY_PATIENCE_S = READY_S
@@ -84,8 +84,13 @@ class Engine:
         return await self.backend.close(keep)
 
     async def _collect_losses(self) -> None:
-        """Losses, lateness and notes that were reported during teardown; other events no longer count then."""
+        """Losses, lateness and notes that were reported during teardown; other events no longer count then.
+
+        But for what the application must not send: only when all is read is it known that nothing was.
+        """
         while (event := await self._next(0.0)) is not None:
+            if isinstance(event, Foreign):
+                self.state.add_finding("failed", event.reason)
             if isinstance(event, Overrun | Late | Noted):
                 self.state.take(event)
 

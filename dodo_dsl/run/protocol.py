@@ -97,6 +97,13 @@ class Noted:
 
 
 @dataclass(frozen=True)
+class Foreign:
+    """The application sent what only others may send; one sentence."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class InputEnded:
     """A source is at its end: an application may end, too."""
 
@@ -148,6 +155,7 @@ Event = (
     | Flooded
     | MemoryTaken
     | Noted
+    | Foreign
     | InputEnded
     | Exited
     | Unstartable

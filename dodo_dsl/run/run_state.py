@@ -15,6 +15,7 @@ from dodo_dsl.run.protocol import (
     Event,
     Exited,
     Flooded,
+    Foreign,
     InputEnded,
     Late,
     Lost,
@@ -102,6 +103,8 @@ class RunState:
                 self._end_with(flooded(self.plan, event))
             case MemoryTaken():
                 self._end_with(memory_taken(event))
+            case Foreign(reason):
+                self.end("failed", reason, self._first_application())
             case Stopped(kind, reason):
                 self._take_stop(kind, reason)
             case Exited(service, code, out_of_memory):

@@ -12,6 +12,7 @@ from dodo_dsl.plan.recorder_service import RECORDER
 from dodo_dsl.run.protocol import (
     Event,
     Flooded,
+    Foreign,
     InputEnded,
     Late,
     Malformed,
@@ -51,6 +52,8 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return InputEnded(service)
     if kind == "note" and _is_text(message.get("text")):
         return Noted(f"service '{service}': {message['text']}")
+    if kind == "foreign" and _is_text(message.get("reason")):
+        return Foreign(message["reason"])
     if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
         return Overrun(service, message["messages"])
     if kind == "late":

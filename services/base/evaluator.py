@@ -11,6 +11,9 @@ from services.base.clock import MICROSECONDS
 from services.base.service import Output, Service
 from services.base.verdict import Verdict
 
+EARLY = MICROSECONDS // 10
+"""How much later than its arrival the time of a sample may be, in us, as clocks differ: nobody answers the future."""
+
 
 class UnjudgeableError(Exception):
     """There is nothing to judge the application by: the test itself is at fault."""

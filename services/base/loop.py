@@ -2,19 +2,22 @@
 
 import json
 import logging
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.clock import Clock
 from services.base.evaluator import UnjudgeableError
+from services.base.identity.members import Members
 from services.base.lateness import Lateness
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 from services.base.stamps import HeardStamps, with_strangers
+from services.base.withheld import WithheldTruth
 
 TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
 REPORT_PERIOD = 1_000_000
@@ -38,12 +41,15 @@ class Loop:
     session: Session
     clock: Clock
     sender_stamp: int
+    members: Members | None = None
+    """In real time: the services of the test, whose messages others must not send."""
     _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
     _stamps: HeardStamps = field(init=False)
     _has_begun: bool = False
     _reported: int = 0
     _report_after: int = 0
     _lateness: Lateness = field(init=False)
+    _truth: WithheldTruth = field(init=False)
 
     def __post_init__(self) -> None:
         ids = self.session.messages.id
@@ -52,6 +58,7 @@ class Loop:
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
         self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)
+        self._truth = WithheldTruth.load(self.session.messages)
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Until the service is done, or ``stopped`` by a signal.
@@ -64,6 +71,8 @@ class Loop:
             raise UnjudgeableError(with_strangers(str(error), self._stamps.strangers())) from None
         if self.service.finished and self.service.verdict is None:
             print(json.dumps({"dodo": "end-of-input"}), flush=True)
+            for envelope in self._truth.due():
+                self.session.send_envelope(envelope)
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close(stopped if self._has_begun else lambda: True)
         self._tell_strangers()
@@ -84,6 +93,8 @@ class Loop:
                 for output in service.update(now):
                     self._send(output, now)
                 self._lateness.add(now, self.clock.now())
+            for envelope in self._truth.due(now):
+                self.session.send_envelope(envelope)
             if now >= self._report_after:
                 self._report(now)
             if service.finished and not self.clock.has_new_picture:
@@ -112,6 +123,8 @@ class Loop:
         """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored."""
         if not self.clock.relays and self.service.observe is not None:
             self.service.observe(envelope)
+        if self.members is not None and not self.members.admits(envelope):
+            return
         self.service.arrived = self.clock.now() if self.clock.relays else envelope.received
         if envelope.data_type in self._handlers:
             self._stamps.take(envelope)
@@ -148,8 +161,15 @@ class Loop:
             print(json.dumps({"dodo": "late", **late}), flush=True)
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
-        if isinstance(output, Envelope):
-            self.clock.sent(self.session.send_envelope(output))
-            return
+        envelope = output if isinstance(output, Envelope) else self._envelope(output, now)
+        if not self._truth.holds(envelope):
+            self.clock.sent(self.session.send_envelope(envelope))
+        elif self.clock.relays:
+            self.clock.sent(encode_frame(envelope))
+        else:
+            self._truth.keep(envelope, now)
+
+    def _envelope(self, output: Message | Output, now: int) -> Envelope:
         message, stamp = output if isinstance(output, Output) else (output, self.sender_stamp)
-        self.clock.sent(self.session.send(message, now, stamp))
+        messages = self.session.messages
+        return Envelope(messages.id(message), messages.encode(message), time.time_ns() // 1000, 0, now, stamp)

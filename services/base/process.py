@@ -15,11 +15,15 @@ from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, parse
+from services.base.identity.key import take_key
+from services.base.identity.members import Members
+from services.base.identity.senders import SenderTable
 from services.base.log_messages import published
 from services.base.loop import Loop
 from services.base.manifest import load_manifest
 from services.base.service import Build, Context
 from services.base.usage import help_text
+from services.base.withheld import WithheldTruth
 
 READY = '{"dodo": "ready"}'
 DONE, BROKEN, USAGE = 0, 1, 2
@@ -77,11 +81,14 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
         with ExitStack() as resources:
             session = resources.enter_context(_session(flags["cid"]))
             resources.enter_context(published(session, flags["log-id"]))
-            clock = clock or _clock(session, role)
+            key = take_key()
+            clock = clock or _clock(session, role, key)
             on_rig = bool(os.environ.get("DODO_RIG"))
-            service = build(Context(name, flags, session.messages, resources, clock, session, on_rig))
+            late = 0 if clock.relays else WithheldTruth.load(session.messages).delay
+            service = build(Context(name, flags, session.messages, resources, clock, session, key, late, on_rig))
             code = BROKEN
-            loop = Loop(role, service, session, clock, flags["id"])
+            members = resources.enter_context(_membership(session, role, key))
+            loop = Loop(role, service, session, clock, flags["id"], members)
             resources.enter_context(_readiness(ready))
             (service.drive or loop.run)(stop)
             if service.verdict is not None:
@@ -114,7 +121,7 @@ def _session(cid: int) -> Session:
     return SilentSession(cid, _messages())
 
 
-def _clock(session: Session, role: str) -> Clock:
+def _clock(session: Session, role: str, key: bytes) -> Clock:
     """The test's clock, by ``DODO_CLOCK``."""
     if (recording := _recording()) is not None:
         from services.base.recorded.clock import clock_of
@@ -124,7 +131,20 @@ def _clock(session: Session, role: str) -> Clock:
         return RealTimeClock()
     from services.base.lockstep.lockstep_clock import LockstepClock
 
-    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1))
+    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1), key=key)
+
+
+@contextmanager
+def _membership(session: Session, role: str, key: bytes) -> Iterator[Members | None]:
+    """The test's services in real time, as long as this is one of them; in lockstep the clock knows them."""
+    senders = SenderTable.load(session.messages, key)
+    if os.environ.get("DODO_CLOCK") or not senders.by_message:
+        yield None
+        return
+    members = Members(session, role, senders)
+    members.join()
+    yield members
+    members.leave()
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from services.base import Context, Service, run
 from services.base.clock import MICROSECONDS
+from services.base.identity.senders import SenderTable
 from services.base.lockstep.channel import Channel
 from services.base.service import period_of
 from services.clock.answers import Answers, filters
@@ -19,13 +20,15 @@ def build(context: Context) -> Service:
     answers = Answers(filters(flags["answers"], ids), filters(flags["hears"], ids), done[0] if done else None)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"
-    context.session.hear_only([*(each.data_type for each in answers.filters), *(ids[name] for name in CONSUMED)])
-    channel = Channel(context.session.cid, context.messages)
+    senders = SenderTable.load(context.messages, context.key)
+    answering = (each.data_type for each in answers.filters)
+    context.session.hear_only([*answering, *senders.ids, *(ids[name] for name in CONSUMED)])
+    channel = Channel(context.session.cid, context.messages, context.key)
     context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])
     period, limit = period_of(flags["freq"]), flags["max-response"]
-    return ClockService(context.session, channel, roles, answers, period, timeout, patience, limit)
+    return ClockService(context.session, channel, roles, answers, period, timeout, patience, limit, senders)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
+from services.base.identity.senders import SenderTable
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.datagrams import STEP, STEP_DONE, EncodedEnvelope, Reassembly, decode, split
 
@@ -52,10 +53,17 @@ class _Pending:
 
 
 class Exchange:
-    """Commands the services; messages of all others on the bus go to ``take``."""
+    """Commands the services; messages of all others on the bus go to ``take``, if ``senders`` let them send those."""
 
-    def __init__(self, session: Session, channel: Channel, take: Callable[[Envelope], None]) -> None:
+    def __init__(
+        self,
+        session: Session,
+        channel: Channel,
+        take: Callable[[Envelope], None],
+        senders: SenderTable | None = None,
+    ) -> None:
         self._session, self._channel, self._take_other = session, channel, take
+        self._senders = senders or SenderTable(session.messages)
         self._step = session.messages.type(STEP)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._number = 0
@@ -111,11 +119,27 @@ class Exchange:
         envelope = self._session.receive(0.0)
         if envelope is None:
             return False
-        if envelope.data_type == self._done_id:
-            self._take(envelope, None)
-        elif envelope.data_type != self._step_id and self._session.source not in self._own:
-            self._take_other(envelope)
+        self.hear(envelope, self._session.source)
         return True
+
+    def hear(self, envelope: Envelope, source: Address) -> None:
+        """Take a message from the bus; the addresses of all services are known."""
+        if envelope.data_type in (self._step_id, self._done_id):
+            if not self._channel.believes(envelope):
+                name = STEP if envelope.data_type == self._step_id else STEP_DONE
+                self._senders.report(f"the application sent {name}, which only services of the test may send")
+            elif envelope.data_type == self._done_id:
+                self._take(envelope, None)
+        elif source not in self._own and self._senders.is_of_runner(envelope):
+            producers = self._senders.producers(envelope)
+            if producers is None:
+                self._take_other(envelope)
+            else:
+                self._senders.report(producers.reason)
+
+    def ignore_services(self, ids: Iterable[int]) -> None:
+        """Not be woken by messages with these ids that services send on the bus: all of them are known now."""
+        self._session.hear_only((self._step_id, self._done_id), ids, self._own)
 
     def _repeat(self) -> None:
         """Each time begins with other parts, as a receive buffer may hold only a few of them."""
@@ -144,7 +168,7 @@ class Exchange:
             if pending is None or pending.number != done.number:
                 return
             if address is not None:
-                self._addresses[done.service] = address
+                self._addresses.setdefault(done.service, address)  # who repeats an answer is not the service
                 self._own.add((address[0], done.port))
             data = self._reassembly.setdefault(done.service, Reassembly()).take(
                 done.number, done.part, done.parts, done.frames

@@ -56,6 +56,7 @@ class Gantry(Service):
         self._state, self._rejected = Velocity(), 0
         self._last_state: float | None = None
         self._alive: float | None = None
+        self._alive_time = 0
         self.telemetry = LinkTelemetry(self._turn / MICROSECONDS)
         self._at: Position | None = None
         self._blind = 0
@@ -152,8 +153,10 @@ class Gantry(Service):
         if self._rejected == 1:
             self._log.warning("ignored a KinematicState of %s, and will ignore all that are not finite", velocity)
 
-    def _take_sign_of_life(self, _message: Any, _sample_time: int) -> None:
-        self._alive = self._wall()
+    def _take_sign_of_life(self, message: Any, _sample_time: int) -> None:
+        """One that somebody repeats says nothing of the runner."""
+        if message.time > self._alive_time:
+            self._alive_time, self._alive = message.time, self._wall()
 
 
 def place(at: Position) -> str:

@@ -14,6 +14,7 @@ from dodo_dsl.run.protocol import (
     BackendError,
     Event,
     Exited,
+    Foreign,
     InputEnded,
     Late,
     Lost,
@@ -310,6 +311,18 @@ def test_several_evaluators_end_and_the_worst_verdict_counts() -> None:
     found = outcome(ScriptedBackend(tested, stages, tails={"signal": ["it is far", "off"]}))
     assert (found.outcome, found.reason, found.last_lines) == ("failed", "far off", ("it is far", "off"))
     assert ([check["name"] for check in found.checks], found.execution_s) == (["mean", "recall"], 3.0)
+
+
+def test_what_the_application_must_not_send_fails_the_test_whenever_it_is_read() -> None:
+    reason = "the application sent opendlv.sim.Frame/0, which only 'pose' may send"
+    begun, *rest = drives()["begin"]
+    for stages in (
+        {**drives(), "begin": [begun, (begun[0], Foreign(reason)), *rest]},
+        {**drives(), "application": [*drives().get("application", []), (0.0, Foreign(reason))]},
+        {**drives(), "close": [(0.0, Foreign(reason))]},
+    ):
+        found = outcome(ScriptedBackend(plan(), stages))
+        assert (found.outcome, found.reason) == ("failed", reason)
 
 
 def test_the_last_lines_are_those_of_the_service_that_decided() -> None:

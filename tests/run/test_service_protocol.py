@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from dodo_dsl.outcome import Response
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.run.protocol import (
+    Foreign,
     InputEnded,
     Late,
     Malformed,
@@ -41,6 +42,11 @@ def test_losses_are_taken_from_every_service() -> None:
     assert read_line("recorder", False, b'{"dodo": "lost", "messages": 12}\n') == Overrun("recorder", 12)
     for count in (b"0", b"-1", b"true", b"1.5", b'"12"', b"null", b"1" * 30):
         assert read_line("track", True, b'{"dodo": "lost", "messages": ' + count + b"}") is None
+
+
+def test_what_the_application_must_not_send_is_taken_from_every_service() -> None:
+    assert read_line("pose", False, b'{"dodo": "foreign", "reason": "so"}') == Foreign("so")
+    assert read_line("pose", False, b'{"dodo": "foreign", "reason": ""}') is None
 
 
 def test_lateness_is_taken_from_every_service() -> None:

@@ -39,8 +39,11 @@ class DockerBackend:
         project: str,
         subnets: Iterable[str],
         say: Say,
+        key: bytes,
     ) -> None:
+        """``key`` is that of the test."""
         self.plan = plan
+        self._key = key
         self.cid = plan.cid
         self.report = report
         self.project = project
@@ -60,7 +63,7 @@ class DockerBackend:
     async def open(self) -> None:
         await self._compose.read()
         await self._compose.provide_images(self._pulls)
-        await self._compose.create(self._subnets)
+        await self._compose.create(self._subnets, self._key)
         await self._start_watching()
 
     async def _start_watching(self) -> None:
@@ -143,7 +146,7 @@ class DockerBackend:
         return await self._events.get()
 
     async def begin(self) -> None:
-        await announce_begin(self.cid, self.plan.seed, self._containers.get(SANDBOX))
+        await announce_begin(self.cid, self.plan.seed, self._containers.get(SANDBOX), self._key)
 
     async def load(self) -> Snapshot | None:
         return await asyncio.to_thread(self._processes.load)

@@ -11,9 +11,9 @@ from dodo_dsl.run.protocol import BackendError
 _SEND = 'printf "%b" "$1" | dd bs=65507 iflag=fullblock status=none > "/dev/udp/$2/$3"'
 
 
-async def announce_begin(cid: int, seed: int, sandbox: Any | None) -> None:
+async def announce_begin(cid: int, seed: int, sandbox: Any | None, key: bytes = b"") -> None:
     """Sends ``dodo.TestBegin`` in the network of the sandbox container, or of the host; raises BackendError."""
-    frame = begin_frame(seed)
+    frame = begin_frame(seed, key=key)
     problem = _host_problem(cid, frame) if sandbox is None else await asyncio.to_thread(_problem, sandbox, cid, frame)
     if problem:
         raise BackendError(f"the begin of the test cannot be announced on its bus: {problem}")

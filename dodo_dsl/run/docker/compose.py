@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,9 @@ from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled
 from dodo_dsl.application.access.model import Finding
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
-from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
 from dodo_dsl.run.application_files import application_paths, env_file_findings, secrets_of
 from dodo_dsl.run.docker.pulls import Pulls, Say
@@ -110,24 +112,36 @@ class Compose:
             raise BackendError(f"the application's images cannot be built: {problem}; see {log}")
         return ""
 
-    async def create(self, subnets: Iterable[str]) -> None:
-        """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError."""
+    async def create(self, subnets: Iterable[str], key: bytes) -> None:
+        """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError.
+
+        DoDo's services get the ``key`` by a file of its own, as any variable could be named in the application's file.
+        """
         code, problem = 1, "no subnet is free"
-        for subnet in subnets:
-            code, _, problem = await self._run("create", "--no-build", "--pull", "never", subnet=subnet)
-            if not code or _OVERLAP not in problem:
-                break
+        with tempfile.TemporaryDirectory(prefix="dodo-key-") as folder:
+            keys = Path(folder) / "keys.compose.json"
+            given = {service.name: {"environment": {KEY_VARIABLE: key.hex()}} for service in self.plan.services}
+            keys.write_text(json.dumps({"services": given}), encoding="utf-8")
+            files = os.pathsep.join([*(f"{layer}.compose.yml" for layer in LAYERS), str(keys)])
+            for subnet in subnets:
+                code, _, problem = await self._run(
+                    "create", "--no-build", "--pull", "never", subnet=subnet, files=files
+                )
+                if not code or _OVERLAP not in problem:
+                    break
         if code:
             raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
 
     async def _run(
-        self, *words: str, subnet: str = "", log: Path | None = None, project: str = ""
+        self, *words: str, subnet: str = "", log: Path | None = None, project: str = "", files: str = ""
     ) -> tuple[int, str, str]:
         """Exit code, standard output and the last line of standard error of a compose command."""
         environment = {**self._outside, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
             environment.pop(name, None)  # the test's own .env sets them
         environment[RUNNER_VARIABLE] = "dodo"
+        if files:
+            environment["COMPOSE_FILE"] = files
         if subnet:
             environment["DODO_SUBNET"] = subnet
         process = await asyncio.create_subprocess_exec(

@@ -140,7 +140,8 @@ class ProcessBackend:
         if pids:
             await asyncio.wait(pids, timeout=PIDS_PATIENCE_S)
         application = [pid.result() for pid in pids if pid.done() and not pid.cancelled()]
-        self._sandbox.send({"do": "send", "cid": self.slot.cid, "data": begin_frame(self.plan.seed, application).hex()})
+        frame = begin_frame(self.plan.seed, application, self.slot.key)
+        self._sandbox.send({"do": "send", "cid": self.slot.cid, "data": frame.hex()})
 
     async def load(self) -> Snapshot | None:
         """What the sandbox sees of its processes; None when it does not answer."""

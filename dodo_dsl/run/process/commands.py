@@ -9,6 +9,7 @@ from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
+from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.model import ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.process.environment import (
@@ -59,6 +60,7 @@ class Commands:
             SLOT_VARIABLE: self.slot.name,
             "DODO_ODVD": os.pathsep.join(str(self.folder / FILES / path) for path in self.plan.messages),
             **self.plan.variables,
+            KEY_VARIABLE: self.slot.key.hex(),
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         module = _is_module(service.process)

@@ -22,13 +22,18 @@ def is_real(plan: Plan) -> bool:
 
 @contextlib.asynccontextmanager
 async def attended(
-    plan: Plan, cid: int, descriptors: tuple[int, ...], say: Callable[[str], None], roots: Sequence[Path] = ()
+    plan: Plan,
+    cid: int,
+    descriptors: tuple[int, ...],
+    say: Callable[[str], None],
+    key: bytes,
+    roots: Sequence[Path] = (),
 ) -> AsyncIterator[tuple[int, ...]]:
     """Leases and checks a real rig's devices, and sends a heartbeat within the block; does nothing for other tests.
 
-    ``descriptors`` are those of the lease of its CID; gives all by which a program holds the rig. ``roots`` are the
-    folders of the test's repository, whose tests the machine's operator may not let use it. Raises BackendError then,
-    and when the rig is in use, in quarantine, or fails its health check.
+    ``descriptors`` are those of the lease of its CID, ``key`` is the test's; gives all descriptors by which a program
+    holds the rig. ``roots`` are the folders of the test's repository, whose tests the machine's operator may not let
+    use it. Raises BackendError then, and when the rig is in use, in quarantine, or fails its health check.
     """
     if not is_real(plan):
         yield descriptors
@@ -44,5 +49,5 @@ async def attended(
         except leases.LeaseTimeout as error:
             raise BackendError(str(error)) from error
         await examine(plan, say, (*descriptors, *more))
-        await stack.enter_async_context(heartbeat(cid))
+        await stack.enter_async_context(heartbeat(cid, key))
         yield (*descriptors, *more)

@@ -8,18 +8,25 @@ from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.bus.address import RECEIVE_BUFFER, Address, group
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, decode_frame, encode_frame
-from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES
+from dodo_dsl.opendlv.bus.proof import is_proven, with_proof
+from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES, MAX_DROPPED
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 _log = logging.getLogger(__name__)
 
 
 class Channel:
-    """Sends messages in OpenDLV's frames to one address, or to all on the bus, and receives the replies."""
+    """Sends messages in OpenDLV's frames to one address, or to all on the bus, and receives the replies.
 
-    def __init__(self, cid: int, messages: MessageSet) -> None:
+    All of them prove that their sender has the key of the test; what does not is no reply.
+    """
+
+    def __init__(self, cid: int, messages: MessageSet, key: bytes = b"") -> None:
         self._group = group(cid)
         self._messages = messages
+        self._key = key
+        self.foreign = 0
+        """How many datagrams came without a proof."""
         self._has_failed = False
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
@@ -33,8 +40,7 @@ class Channel:
 
         A lasting error is logged once.
         """
-        now = time.time_ns() // 1000
-        frame = encode_frame(Envelope(self._messages.id(message), self._messages.encode(message), now, 0, now, 0))
+        frame = encode_frame(self.envelope(message))
         try:
             self._socket.sendto(frame, to or self._group)
         except BlockingIOError:
@@ -44,16 +50,30 @@ class Channel:
                 self._has_failed = True
                 _log.warning("a message to %s:%d cannot be sent: %s", *(to or self._group), error)
 
+    def envelope(self, message: Message) -> Envelope:
+        """A message of now, with its proof."""
+        now, id_ = time.time_ns() // 1000, self._messages.id(message)
+        return Envelope(id_, with_proof(self._key, id_, self._messages.encode(message)), now, 0, now, 0)
+
+    def believes(self, envelope: Envelope) -> bool:
+        """Whether a message comes from one who has the key."""
+        return is_proven(self._key, envelope.data_type, envelope.payload)
+
     def receive(self) -> tuple[Envelope, Address] | None:
         """The next envelope with its sender's address; None when there is none. Invalid datagrams are skipped."""
-        while True:
+        for _ in range(MAX_DROPPED):
             try:
                 data, address = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
-                return decode_frame(data), address
+                envelope = decode_frame(data)
             except FrameError:
+                self.foreign += 1
                 continue
             except OSError:  # nothing there, or a peer has gone
                 return None
+            if self.believes(envelope):
+                return envelope, address
+            self.foreign += 1
+        return None
 
     def fileno(self) -> int:
         """The file descriptor to poll for reading."""

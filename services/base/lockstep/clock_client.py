@@ -37,9 +37,9 @@ class ClockClient:
 
     is_over = False
 
-    def __init__(self, session: Session, name: str) -> None:
+    def __init__(self, session: Session, name: str, key: bytes = b"") -> None:
         self._session, self._name = session, name
-        self._channel = Channel(session.cid, session.messages)
+        self._channel = Channel(session.cid, session.messages, key)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._ignored = {self._step_id, self._done_id, session.messages.id("dodo.TestBegin")}
         self._clock: Address | None = None
@@ -66,7 +66,7 @@ class ClockClient:
             envelope = self._session.receive(0.0)
             if envelope is not None:
                 if envelope.data_type == self._step_id:
-                    return self._accept(envelope, self._session.source)
+                    return self._accept(envelope, self._session.source) if self._channel.believes(envelope) else None
                 self._observe(envelope, observe)
                 return None
         elif observes and self._drain(observe):
@@ -94,7 +94,7 @@ class ClockClient:
         """Send the last answer again."""
         for message in self._rotated():
             if self._on_the_bus:
-                self._session.send(message)
+                self._session.send_envelope(self._channel.envelope(message))
             else:
                 self._channel.send(message, self._clock)
 
@@ -129,7 +129,7 @@ class ClockClient:
             step: Any = self._session.messages.decode(envelope.data_type, envelope.payload)
             if envelope.data_type != self._step_id or step.service != self._name or step.number < self._number:
                 return None
-            self._clock = address
+            self._clock = self._clock or address  # who repeats a step is not the clock
             if step.number == self._number:
                 self._acknowledged = not step.parts
                 if step.parts and not step.part:

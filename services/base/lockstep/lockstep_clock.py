@@ -41,15 +41,17 @@ class StepSource(Protocol):
 class LockstepClock:
     """Test time in the clock service's steps; ``name`` is the service's name in the test.
 
-    Steps come from ``source``, by default from the clock service.
+    Steps come from ``source``, by default from the clock service, which has the ``key`` of the test.
     """
 
     relays = True
 
-    def __init__(self, session: Session, name: str, readers: int, source: StepSource | None = None) -> None:
+    def __init__(
+        self, session: Session, name: str, readers: int, source: StepSource | None = None, key: bytes = b""
+    ) -> None:
         self._session, self._name = session, name
         self._step_done = session.messages.type(STEP_DONE)
-        self._client: StepSource = source or ClockClient(session, name)
+        self._client: StepSource = source or ClockClient(session, name, key)
         self._now = EPOCH - 1
         self._number = -1
         self._open = False

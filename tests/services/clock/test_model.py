@@ -14,7 +14,7 @@ from services.base.lockstep.lockstep_clock import EPOCH
 from services.clock import exchange, model
 from services.clock.model import Stepper
 from services.clock.participants import ApplicationSilent, Patience, ServiceSilent, TimeOver
-from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Mover, ToyEvaluator, Toys
+from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Forger, Mover, ToyEvaluator, Toys
 
 Way = list[tuple[int, float]]
 
@@ -93,6 +93,15 @@ def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch:
     way, stepper = toys.run(toys.application())
     assert close(way, expected(21))
     assert stepper.application.frames == 21
+
+
+@pytest.mark.parametrize("key", [b"", b"another key"])
+def test_who_has_not_the_key_changes_nothing(toys: Toys, key: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    way, _ = toys.run(toys.application(), Forger(toys.cid, key))
+    assert close(way, expected(21))
+    said = capsys.readouterr().out
+    for name in ("Step", "StepDone"):
+        assert said.count(f"the application sent dodo.{name}, which only services of the test may send") == 1
 
 
 def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:

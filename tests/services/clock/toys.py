@@ -7,9 +7,10 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from services.base import Service, Verdict
@@ -25,6 +26,7 @@ from services.clock.response import ResponseTimes
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
+KEY = b"the key of the test"
 BOX = "opendlv.logic.perception.DetectionBoundingBox"
 
 
@@ -164,6 +166,34 @@ class Filter:
                     session.send(request(groundSteering=1.5 - message.x), envelope.sample_time)
 
 
+@dataclass
+class Forger:
+    """An application that steps services and answers for them, on the bus and at all ports, under some key."""
+
+    cid: int
+    key: bytes = b""
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        with Session(self.cid) as session:
+            channel = Channel(self.cid, session.messages, self.key)
+            step, done = (session.messages.type(f"dodo.{name}") for name in ("Step", "StepDone"))
+            frames = encode_frame(Envelope(session.messages.id(PLACE), b"", 0, 0, EPOCH, 0))
+            lines = Path("/proc/net/udp").read_text().splitlines()[1:]
+            ports = sorted({int(line.split()[1].rpartition(":")[2], 16) for line in lines})
+            for number in range(1, 400):
+                if stopped():
+                    break
+                for name in ("judge", "mover"):
+                    time_ = EPOCH + 60_000_000
+                    for forged in (
+                        step(number=number + 50, service=name, time=time_, parts=1, frames=frames),
+                        done(number=number, service=name, parts=1, frames=frames, ended=name == "judge"),
+                    ):
+                        for to in (None, *(("127.0.0.1", port) for port in ports)):
+                            channel.send(forged, to)
+            channel.close()
+
+
 class Runs(Protocol):
     """A program, in a thread."""
 
@@ -209,7 +239,7 @@ class Toys:
                 for app in apps:
                     app.start()
                     started.append(app)
-                channel = Channel(self.cid, session.messages)
+                channel = Channel(self.cid, session.messages, KEY)
                 ids = {name: session.messages.id(name) for name in session.messages.names()}
                 answers = Answers(filters(self.answers, ids), filters(self.relayed, ids))
                 exchange = Exchange(session, channel, answers.take)
@@ -245,6 +275,6 @@ class Toys:
 
     def _loop(self, name: str, maker: Maker, resources: ExitStack) -> Loop:
         session = resources.enter_context(Session(self.cid))
-        clock = LockstepClock(session, name, self.readers)
+        clock = LockstepClock(session, name, self.readers, key=KEY)
         service = maker(session, lambda: resources.enter_context(clock.memory(self.memory_name(name), 8)))
         return Loop(name, service, session, clock, 0)

@@ -213,7 +213,7 @@ def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: Fa
     with contextlib.closing(line):
         start.settle(line, start.find(line))
         model = Gantry(Context("gantry", flags, MessageSet.standard()), line, wall=lambda: now[0])
-        state = MessageSet.standard().type(STATE)(vx=0.2)
+        state, alive = MessageSet.standard().type(STATE)(vx=0.2), MessageSet.standard().type("dodo.Alive")
         for name, patience, words in (
             (STATE, 1.0, "no KinematicState"),
             ("dodo.Alive", 3.0, "the runner has given no"),
@@ -221,10 +221,12 @@ def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: Fa
             (hear_it,) = (handler for (message, _), handler in model.inputs.items() if message == name)
             now[0] += 10  # never heard, never missed
             list(model.update(round(now[0] * 1e6)))
-            hear_it(state, 0)
+            hear_it(state if name == STATE else alive(time=5), 0)
             now[0] += patience - 0.01
             list(model.update(round(now[0] * 1e6)))
             now[0] += 0.2
+            if name != STATE:
+                hear_it(alive(time=5), 0)  # repeated by somebody else
             with pytest.raises(RigError, match=words):
                 list(model.update(round(now[0] * 1e6)))
             model.end_of_input(0)  # nothing more is expected to come

@@ -1,0 +1,66 @@
+"""Who alone may send a message of a test, derived from its wiring."""
+
+from collections.abc import Iterable
+
+from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
+
+TIME_FOR_ANSWERS = "max-delay"
+"""Parameter of evaluators: how long after a frame its answers count, in s."""
+SENDING_LAYERS = ("environment", "action")
+END_OF_INPUT = "dodo.EndOfInput"
+
+
+def senders(test: ResolvedTest) -> tuple[str, ...]:
+    """Words such as ``opendlv.sim.Frame/0=pose``: a message that services consume, and the services that may send it.
+
+    ``my-pose?`` is a service of the deployment, which need not say from where it sends. Messages that the application
+    declares are left out, unless it is judged by them.
+    """
+    wiring = test.wiring
+    own = {service.use.name for service in test.services if not _is_shipped(service.manifest.process)}
+    table: dict[Port, list[str]] = {}
+    for end in wiring.consumed:
+        for port in _guarded(end.port, wiring):
+            table.setdefault(port, sorted({each.service for each in wiring.producers(port)}))
+    sources = sorted(use.name for use in test.spec.uses if use.layer in SENDING_LAYERS)
+    table[Port("message", END_OF_INPUT)] = sources
+    words = (
+        f"{port}={','.join(f'{name}?' if name in own else name for name in names)}" for port, names in table.items()
+    )
+    return tuple(sorted(words))
+
+
+def withheld_truth(test: ResolvedTest) -> tuple[str, ...]:
+    """The messages of the test's services by which it judges the application."""
+    ports = (end.port for end in test.wiring.consumed if test.wiring.is_truth(end.port))
+    return tuple(sorted({str(port) for port in ports}))
+
+
+def truth_delay_s(test: ResolvedTest) -> float:
+    """How long the application's answers count at most."""
+    times = (s.texts.get(TIME_FOR_ANSWERS) for s in test.services if s.use.layer == "evaluation")
+    return max((float(time) for time in times if time), default=0.0)
+
+
+def _guarded(consumed: Port, wiring: Wiring) -> Iterable[Port]:
+    """The messages among those that a port consumes which the application must not send."""
+    if consumed.kind == "memory" or consumed.name == ANYTHING:
+        return ()
+    if wiring.is_truth(consumed):
+        return (Port("message", consumed.name, consumed.stamp),)
+    if _is_declared(consumed, wiring.application_produces):
+        return ()
+    if not consumed.can_be_required:
+        return (Port("message", consumed.name, consumed.stamp),)
+    produced = (end.port for end in wiring.producers(consumed) if end.port.name != ANYTHING)
+    return (Port("message", port.name, port.stamp) for port in produced)
+
+
+def _is_declared(consumed: Port, produced: Iterable[End]) -> bool:
+    return any(consumed.consumes(end.port) for end in produced)
+
+
+def _is_shipped(process: tuple[str, ...]) -> bool:
+    """Whether a service is one of DoDo's programs, which say from where they send."""
+    return process[:2] == ("python", "-m") and process[2:3] != () and process[2].startswith("services.")

@@ -1,0 +1,1 @@
+"""Who is a service of the test: its key, and who may send which message."""

@@ -1,0 +1,91 @@
+"""The services of a test in real time: each says from which address it sends, with a proof that it has the key."""
+
+import time
+from typing import Any
+
+from dodo_dsl.opendlv.bus.address import Address
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.proof import is_proven, with_proof
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.codec import MessageError
+from services.base.identity.senders import Producers, SenderTable
+
+SENDER = "dodo.Sender"
+_AGAIN_S = 0.1
+
+
+class Members:
+    """Learns the addresses of the test's services, and tells their messages from the application's.
+
+    A service says its address before it is ready, and again when another asks. The application starts when all are
+    ready, so that it comes too late to be taken for one of them, even where there is no key, as without a runner.
+    """
+
+    def __init__(self, session: Session, name: str, table: SenderTable) -> None:
+        self._session, self._name, self._table = session, name, table
+        self._id, self._type = session.messages.id(SENDER), session.messages.type(SENDER)
+        self._ids = table.ids | {self._id}
+        self._addresses: dict[str, Address | None] = {}
+        """None for a service that has left: another program may have got its port."""
+        self._known: frozenset[Address] = frozenset()
+        self._asked = 0.0
+
+    def join(self) -> None:
+        """Say from where this service sends, and ask the others."""
+        self._asked = time.monotonic()
+        self._say(asks=True)
+
+    def leave(self) -> None:
+        """Nothing more will come from this service."""
+        self._say(leaves=True)
+
+    def admits(self, envelope: Envelope) -> bool:
+        """Whether the message that the session received last counts; tells the runner of one that must not be."""
+        if envelope.data_type not in self._ids:
+            return True
+        if envelope.data_type == self._id:
+            self._learn(envelope)
+            return False
+        if not self._table.is_of_runner(envelope):
+            return False
+        producers = self._table.producers(envelope)
+        return producers is None or self._session.source in self._known or self._is_excused(producers)
+
+    def _is_excused(self, producers: Producers) -> bool:
+        """A message from an unknown address: counts if it may be of a service that does not say its own.
+
+        It is the application's as soon as all addresses are known from which it may come.
+        """
+        unknown = [name for name in producers.services if name not in self._addresses]
+        if unknown:
+            if time.monotonic() - self._asked > _AGAIN_S:
+                self.join()
+            return not producers.silent.isdisjoint(unknown)
+        self._table.report(producers.reason)
+        return False
+
+    def _say(self, asks: bool = False, leaves: bool = False) -> None:
+        host, port = self._session.address
+        message = self._type(service=self._name, host=host, port=port, asks=asks, leaves=leaves)
+        payload = with_proof(self._table.key, self._id, self._session.messages.encode(message))
+        now = time.time_ns() // 1000
+        self._session.send_envelope(Envelope(self._id, payload, now, 0, now, 0))
+
+    def _learn(self, envelope: Envelope) -> None:
+        """The first address of a service counts, until it leaves: that of the application would come later."""
+        if not is_proven(self._table.key, self._id, envelope.payload):
+            return
+        try:
+            said: Any = self._session.messages.decode(self._id, envelope.payload)
+        except MessageError:
+            return
+        source = self._session.source
+        if (said.host, said.port) != source:
+            return
+        if said.asks:
+            self._say()
+        if said.service not in self._table.services:
+            return
+        if self._addresses.setdefault(said.service, source) == source and said.leaves:
+            self._addresses[said.service] = None
+        self._known = frozenset(address for address in self._addresses.values() if address is not None)

@@ -1,0 +1,110 @@
+"""Services of a test know each other's addresses; the application cannot become one of them."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from dodo_dsl.opendlv.bus.session import Session
+from services.base.identity.members import Members
+from services.base.identity.senders import VARIABLE, SenderTable
+
+FRAME = "opendlv.sim.Frame"
+KEY = b"a key of this test"
+Join = Callable[..., tuple[Session, Members]]
+
+
+@pytest.fixture
+def enter(cid: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Join]:
+    """Makes a service with its session, which joins the others."""
+    monkeypatch.setenv(VARIABLE, "opendlv.sim.Frame/0=pose opendlv.sim.KinematicState/0=own?")
+    with ExitStack() as stack:
+
+        def one(name: str, key: bytes = KEY) -> tuple[Session, Members]:
+            session = stack.enter_context(Session(cid))
+            members = Members(session, name, SenderTable.load(session.messages, key))
+            members.join()
+            return session, members
+
+        yield one
+
+
+def admitted(session: Session, members: Members) -> list[bool]:
+    """For each message on the bus whether it counts, but for those in which services say their address."""
+    found = []
+    sender = session.messages.id("dodo.Sender")
+    while (envelope := session.receive(0.0)) is not None:
+        counts = members.admits(envelope)
+        if envelope.data_type != sender:
+            found.append(counts)
+    return found
+
+
+def send(session: Session, name: str = FRAME, stamp: int = 0) -> None:
+    session.send(session.messages.type(name)(), 1, stamp)
+
+
+@pytest.mark.parametrize("key", [KEY, b""])
+@pytest.mark.parametrize("first", ["pose", "track"])
+def test_whoever_came_first(enter: Join, first: str, key: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    services = {name: enter(name, key) for name in sorted(("pose", "track"), key=lambda name: name != first)}
+    pose, track = services["pose"], services["track"]
+    admitted(*pose)
+    send(pose[0])
+    assert admitted(*track) == [True]
+    application = enter("stranger", b"")[0]
+    send(application)
+    send(application, FRAME, 7)
+    assert admitted(*track) == [False, True]
+    assert capsys.readouterr().out.count("the application sent opendlv.sim.Frame/0, which only 'pose' may send") == 1
+
+
+def test_a_message_of_an_unknown_address_waits_for_who_may_send_it(
+    enter: Join, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is nobody's fault, and does not count."""
+    track, stranger = enter("track"), enter("stranger")[0]
+    send(stranger)
+    assert admitted(*track) == [False]
+    assert capsys.readouterr().out == ""
+
+
+def test_a_service_that_does_not_say_its_address_is_believed(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
+    track, own = enter("track"), enter("stranger")[0]
+    send(own, "opendlv.sim.KinematicState")
+    assert admitted(*track) == [True]
+    said = enter("own")
+    admitted(*track)
+    send(said[0], "opendlv.sim.KinematicState")
+    send(own, "opendlv.sim.KinematicState")
+    assert admitted(*track) == [True, False]
+
+
+def test_nobody_takes_a_service_s_place(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither without the key, nor by what the service said, nor under the name of one that is known."""
+    pose, track = enter("pose"), enter("track")
+    listener = enter("stranger", b"")[0]
+    pose[1].join()
+    admitted(*track)
+    application = enter("pose", b"")[0]
+    sender = application.messages.id("dodo.Sender")
+    heard = []
+    while (envelope := listener.receive(0.0)) is not None:
+        heard += [envelope] if envelope.data_type == sender else []
+    assert len(heard) > 2
+    for envelope in heard:
+        application.send_envelope(envelope)
+    send(application)
+    assert admitted(*track) == [False]
+    second = enter("pose")
+    send(second[0])
+    assert admitted(*track) == [False]
+
+
+def test_the_address_of_a_service_that_left_is_nobody_s(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
+    pose, track = enter("pose"), enter("track")
+    admitted(*pose)
+    pose[1].leave()
+    pose[1].join()  # as if repeated by who has got its port
+    send(pose[0])
+    assert admitted(*track) == [False]
