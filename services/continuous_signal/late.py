@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from services.base.evaluator import EARLY
 from services.continuous_signal.target import MICROSECONDS
 
 
@@ -21,7 +22,9 @@ class LateFacts(NamedTuple):
 
 
 class LateSamples:
-    """Samples are late whose time is more than ``delay`` us from their arrival; None believes all.
+    """Samples are late whose time is more than ``delay`` us before their arrival; None believes all.
+
+    Those of more than EARLY us after it are not believed, either.
 
     Where sample times are not those of the test (``is_test_time``), they are late when one came before them
     that is so much newer.
@@ -57,5 +60,5 @@ class LateSamples:
         if self._delay is None:
             return False
         if self._is_test_time:
-            return abs(arrival - time) > self._delay
+            return arrival - time > self._delay or time - arrival > min(EARLY, self._delay)
         return self.newest is not None and self.newest.time - time > self._delay

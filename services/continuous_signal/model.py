@@ -97,11 +97,16 @@ class SignalEvaluator(Evaluator):
         return first, min(end, observed)
 
     def _observed(self, target: Target, is_complete: bool) -> int:
-        """Until when the target's time was observed, in us; with sample times of their own by the newest sample."""
+        """Until when the target's time was observed, in us; with sample times of their own by the newest sample.
+
+        No less than the time of the test, or else the application could stay where the target is easy.
+        """
         now = self.now or self.zero
         if self._from_begin:
             return min(now - self.zero, round(self._max_time * MICROSECONDS))
         newest = self._late.newest
         if is_complete or newest is None:
             return int(target.times[-1])
-        return newest.time - target.start + (now - newest.arrival)
+        observed = newest.time - target.start + (now - newest.arrival)
+        least = 0 if self._limits.delay is None else min(now - self.zero, round(self._max_time * MICROSECONDS))
+        return max(observed, least - (self._limits.delay or 0))

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
+from services.base.evaluator import EARLY
 from services.object_detection.boxes import Box, LabelledBox
 from services.object_detection.counts import CountsByClass, compare
 from services.object_detection.frames import DetectedFrame, Detections, FrameKey, Value
@@ -21,8 +22,10 @@ class DetectionEvaluator(Evaluator):
     for its sample time.
     """
 
-    def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits) -> None:
+    def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits, truth_delay: int = 0) -> None:
+        """``truth_delay``: how late the truth comes, in us; then a detection counts only before it."""
         super().__init__(rules.max_time, rules.max_delay)
+        self._truth_delay = 0 if truth else truth_delay
         self._truth, self._rules, self._limits = truth, rules, limits
         self._score, self._silence = Score(), Silence(rules.start_up)
         self._frames: dict[int, DetectedFrame] = {}
@@ -43,6 +46,13 @@ class DetectionEvaluator(Evaluator):
 
     def detect(self, key: FrameKey, number: int, value: Value) -> None:
         """The application sent something about its detection ``number`` in a frame."""
+        if self._is_of_the_future(key):
+            self._score.early += isinstance(value, Box)
+            return
+        frame = self._frame(key)
+        if frame is not None and self._is_too_late(frame):
+            self._score.late += isinstance(value, Box)
+            return
         self._take(key, number, value, lambda frame: frame.found)
 
     def reveal(self, key: FrameKey, number: int, value: Value) -> None:
@@ -52,14 +62,16 @@ class DetectionEvaluator(Evaluator):
 
     def announce(self, key: FrameKey, by_application: bool) -> None:
         """There is such a frame; if the application says so, it has answered it."""
-        frame = self._frame(key)
+        frame = None if by_application and self._is_of_the_future(key) else self._frame(key)
         if frame is not None and by_application:
-            self._answer(frame)
+            if not self._is_too_late(frame):
+                self._answer(frame)
         elif frame is not None:
             frame.has_truth = True
 
     def advance(self, now: int) -> None:
-        self._settle(lambda frame: now - frame.since >= self._rules.max_delay * MICROSECONDS)
+        patience = self._rules.max_delay * MICROSECONDS + self._truth_delay
+        self._settle(lambda frame: now - frame.since >= patience)
 
     def decide(self, span: JudgedTime) -> Verdict:
         """At the end of the input, all frames that are left count.
@@ -92,6 +104,17 @@ class DetectionEvaluator(Evaluator):
             raise UnjudgeableError(f"no true box of class '{missing[0]}' came {within}")
         if not there:
             raise UnjudgeableError(f"none of {self._score.frames} frames has a true box {within}")
+
+    def _is_of_the_future(self, key: FrameKey) -> bool:
+        """A frame that comes later must not be used up."""
+        return self.arrival is not None and key.time - self.arrival > EARLY
+
+    def _is_too_late(self, frame: DetectedFrame) -> bool:
+        """Whether the application may know the truth of a frame already, where that comes later than the frame."""
+        if not self._truth_delay:
+            return False
+        is_over = self.now is not None and self.now - frame.since > self._rules.max_delay * MICROSECONDS
+        return bool(frame.true) or is_over
 
     def _answer(self, frame: DetectedFrame) -> None:
         if frame.answered is None and self.now is not None:

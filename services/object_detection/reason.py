@@ -79,6 +79,7 @@ def _aside(score: Score) -> str:
     notes = [
         f"{_count(score.without_truth, 'frame')} without ground truth" if score.without_truth else "",
         f"{_count(score.late, 'detection')} too late" if score.late else "",
+        f"{_count(score.early, 'detection')} of the future" if score.early else "",
         f"{_count(score.repeated, 'detection')} under a detectionId that was in use" if score.repeated else "",
     ]
     left_out = ", ".join(note for note in notes if note)

@@ -76,6 +76,7 @@ class Score:
     answered: int = 0
     without_truth: int = 0
     late: int = 0
+    early: int = 0
     repeated: int = 0
     worst: WorstFrame | None = None
     unanswered: Unanswered = field(default_factory=lambda: Unanswered(0, 0))

@@ -19,8 +19,10 @@ SIGNAL = "groundSteering of opendlv.proxy.GroundSteeringRequest/0"
 samples = st.lists(st.tuples(st.integers(-2 * SECOND, 12 * SECOND), st.floats(-5, 5)), max_size=40)
 
 
-def judge(limits: SignalLimits, target: Target | None = RAMP, from_begin: bool = True) -> SignalEvaluator:
-    it = SignalEvaluator(SIGNAL, target, limits, 60.0, from_begin)
+def judge(
+    limits: SignalLimits, target: Target | None = RAMP, from_begin: bool = True, max_time: float = 60.0
+) -> SignalEvaluator:
+    it = SignalEvaluator(SIGNAL, target, limits, max_time, from_begin)
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     return it
@@ -197,6 +199,26 @@ def test_a_sample_is_not_believed_far_from_its_arrival() -> None:
     assert decided(it).reason.endswith(
         "; left out: 2 samples whose time is not that of the arrival, the first of 9.00 s, which came at 1.00 s"
     )
+
+
+@pytest.mark.parametrize(("ahead", "late"), [(0.1, 0), (0.11, 1)])
+def test_clocks_may_differ_but_nobody_answers_the_future(ahead: float, late: int) -> None:
+    it = judge(SignalLimits(mean=1.0, delay=SECOND))
+    it.arrived = BEGIN + SECOND
+    it.take(0.1, BEGIN + SECOND + round(ahead * SECOND))
+    assert values(decided(it))["late"] == late
+
+
+def test_with_sample_times_of_their_own_nobody_stays_where_it_is_easy() -> None:
+    """Not even when time is over before the input ends."""
+    limits = SignalLimits(mean=1.0, coverage=0.9, delay=SECOND)
+    it = judge(limits, Target(RAMP.times, RAMP.values, 500 * SECOND), max_time=9, from_begin=False)
+    for step in range(90):
+        it.arrived = BEGIN + step * SECOND // 10
+        it.take(0.2, 502 * SECOND + step % 9 * SECOND // 10)
+    it.update(BEGIN + 9 * SECOND + 1)
+    assert it.verdict is not None and it.verdict.outcome == "failed"
+    assert "the samples cover " in it.verdict.reason
 
 
 def test_without_a_believable_sample_that_is_the_reason() -> None:

@@ -403,3 +403,49 @@ def test_a_frame_from_before_the_judge_knows_the_time_does_not_begin_the_test(be
     detect(it, 2, YELLOW)
     verdict = decided(it)
     assert values(verdict)["frames"] == 1
+
+
+def late_truth() -> DetectionEvaluator:
+    """Its truth comes 1 s after the picture, as in real time."""
+    rules = Rules(iou=0.5, labels=[], max_delay=1.0, max_time=60.0)
+    it = DetectionEvaluator(None, rules, DetectionLimits(recall=0.9), SECOND)
+    it.update(BEGIN - SECOND)
+    it.begin(BEGIN)
+    return it
+
+
+def test_what_is_found_counts_until_its_truth_has_come() -> None:
+    it = late_truth()
+    detect(it, 1, YELLOW)
+    at(it, 0.95)
+    reveal(it, 1, YELLOW, BLUE)
+    detect(it, 1, YELLOW, BLUE)
+    reveal(it, 2, YELLOW)
+    detect(it, 2, YELLOW)
+    at(it, 4.0)
+    found = values(decided(it))
+    assert (found["true-positives"], found["false-negatives"], found["late"]) == (1, 2, 3)
+
+
+def test_nothing_counts_after_the_time_for_an_answer_where_truth_is_late() -> None:
+    it = late_truth()
+    detect(it, 1, YELLOW)
+    at(it, 1.1)
+    detect(it, 1, YELLOW, BLUE)
+    reveal(it, 1, YELLOW, BLUE)
+    at(it, 4.0)
+    assert (values(decided(it))["true-positives"], values(decided(it))["late"]) == (1, 2)
+
+
+def test_pictures_of_the_future_cannot_be_answered() -> None:
+    """Else a hard one could be used up before it is shown."""
+    it = judge(truth=None)
+    it.arrived = BEGIN
+    detect(it, 7_003, LabelledBox("yellow", FAR))
+    at(it, 3.0)
+    it.arrived = BEGIN + 3 * SECOND
+    reveal(it, 7_003, YELLOW)
+    detect(it, 7_003, YELLOW)
+    verdict = decided(it)
+    assert values(verdict)["recall"] == 1.0
+    assert "left out: 1 detection of the future" in verdict.reason
