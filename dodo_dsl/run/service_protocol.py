@@ -50,10 +50,8 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return Ready(service)
     if kind == "end-of-input":
         return InputEnded(service)
-    if kind == "note" and _is_text(message.get("text")):
-        return Noted(f"service '{service}': {message['text']}")
-    if kind == "foreign" and _is_text(message.get("reason")):
-        return Foreign(message["reason"])
+    if kind in ("note", "foreign", "taken"):
+        return _told(service, message)
     if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
         return Overrun(service, message["messages"])
     if kind == "late":
@@ -63,11 +61,20 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
             return Malformed(service, problem)
         passed, evidence = message["outcome"] == "passed", message.get("evidence", {})
         return VerdictEvent(service, passed, message["reason"], tuple(message["checks"]), evidence)
-    if kind == "taken" and _is_text(message.get("text")):
-        return MemoryTaken(service, message["text"])
     if kind == "flood" and service == RECORDER:
         return _flood(service, message)
     return _clock_event(kind, message) if service == CLOCK else None
+
+
+def _told(service: str, message: dict[str, Any]) -> Event | None:
+    """What a service says in a sentence."""
+    kind = message["dodo"]
+    text = message.get("reason" if kind == "foreign" else "text")
+    if not isinstance(text, str) or not _is_text(text):
+        return None
+    if kind == "foreign":
+        return Foreign(text)
+    return Noted(f"service '{service}': {text}") if kind == "note" else MemoryTaken(service, text)
 
 
 def _flood(service: str, message: dict[str, Any]) -> Flooded | None:
