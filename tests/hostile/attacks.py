@@ -259,7 +259,7 @@ def other_devices_of_the_network() -> object:
 @attack
 def abstract_socket_of_the_machine() -> object:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-        client.connect("\0" + PLACES.get("abstract", "dodo-test-abstract"))
+        client.connect("\0" + Path(PLACES["secret"]).name)
         return "connected"
 
 
@@ -327,12 +327,7 @@ def segments_of_the_machine() -> object:
 
 @attack
 def shared_memory_of_the_machine() -> object:
-    return [name for name in os.listdir("/dev/shm") if name == PLACES.get("shm", "dodo-test-shm")]
-
-
-@attack
-def files_of_the_machines_tmp() -> object:
-    return [name for name in os.listdir("/tmp") if name == "dodo-test-secret"]
+    return [name for name in os.listdir("/dev/shm") if name == Path(PLACES["secret"]).name]
 
 
 @attack

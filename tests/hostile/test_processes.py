@@ -17,9 +17,9 @@ from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.hostile import attacks
 from tests.run.desk import ROOT
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("attacks")]
 USER = 12_345
-OF_PLACES = ("repository", "results", "tests-in-its-folder", "state", "neighbour", "compiled")
+OF_PLACES = ("repository", "results", "tests-in-its-folder", "state", "neighbour", "compiled", "secret")
 NAMES = sorted({*attacks.ATTACKS, *(f"{verb}-{place}" for place in OF_PLACES for verb in ("read", "write"))})
 
 
@@ -46,10 +46,12 @@ def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
         pytest.skip("these tests are not run by root")
     with tempfile.TemporaryDirectory(prefix="dodo-hostile-") as name, socket.socket(socket.AF_UNIX) as listener:
         folder = Path(name)
-        secret = Path(tempfile.gettempdir(), "dodo-test-secret")
+        secret = Path(tempfile.gettempdir(), f"dodo-test-secret-{os.getpid()}")
         secret.write_text("of another test")
-        listener.bind("\0dodo-test-abstract")
+        listener.bind(f"\0{secret.name}")
         listener.listen()
+        memory = Path("/dev/shm", secret.name)
+        memory.write_text("of another test")
         (folder / "state").mkdir(mode=0o777)
         (folder / "neighbour").write_text("a recording")
         places = {
@@ -57,6 +59,7 @@ def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
             "state": str(folder / "state"),
             "neighbour": str(folder / "neighbour"),
             "compiled": str(folder / "compiled"),
+            "secret": str(secret),
         }
         as_user = words_as_user(folder) if os.getuid() == 0 and request.param == "user" else []
         words = [*as_user, sys.executable, "-m", "tests.hostile.run_attacks", name]
@@ -65,6 +68,7 @@ def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
             words, input=json.dumps(places), capture_output=True, text=True, check=False, cwd=ROOT, env=environment
         )
         secret.unlink()
+        memory.unlink()
         assert done.returncode == 0, done.stdout + done.stderr
         yield json.loads(done.stdout.splitlines()[-1])
         shutil.rmtree(folder, ignore_errors=True)
