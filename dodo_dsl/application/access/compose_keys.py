@@ -174,7 +174,7 @@ NETWORK: Rows = {
     "enable_ipv4": ("removed", "each test has a network of its own"),
     "enable_ipv6": ("removed", "each test has a network of its own"),
     "external": ("removed", "each test has a network of its own"),
-    "internal": ("removed", "a test's network is internal unless dodo.yml allows the outside"),
+    "internal": ("removed", "a test's network has no way out unless dodo.yml allows it"),
     "ipam": ("removed", "each test has a network of its own"),
     "labels": ("removed", "each test has a network of its own"),
     "name": ("removed", "each test has a network of its own"),

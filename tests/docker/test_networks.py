@@ -1,0 +1,75 @@
+"""The network of a test: its containers hear one another's multicast, and reach neither the host nor others."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dodo_dsl.application.access.model import Access
+from dodo_dsl.emit.render import render_plan
+from dodo_dsl.plan.model import Application, Plan
+from tests.docker.compose import IMAGE, Crate
+
+pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
+
+SUBNET = "10.213.239.0/28"
+TALK = """
+import errno, json, socket, threading, time
+GROUP = ("225.0.0.111", 12175)
+heard = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+heard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+heard.bind(GROUP)
+heard.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(GROUP[0]) + bytes(4))
+me = socket.gethostname().encode()
+
+def say():
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    while True:
+        sender.sendto(me, GROUP)
+        time.sleep(0.05)
+
+def reaches(address):
+    with socket.socket() as one:
+        one.settimeout(5)
+        return one.connect_ex((address, 9)) in (0, errno.ECONNREFUSED)
+
+threading.Thread(target=say, daemon=True).start()
+names = set()
+while len(names) < 2:
+    names.add(heard.recv(100))
+print(json.dumps({"gateway": reaches("10.213.239.1"), "host": reaches(HOST)}), flush=True)
+time.sleep(8)
+"""
+
+
+def networks(outside: bool) -> object:
+    """The networks of a compiled test."""
+    common = ("", "sil", "closed-loop", 10.0, "realtime", "network", 1, 140, SUBNET, "sil", "dodo/sandbox:1", ())
+    plan = Plan("t", "t", "t.dodo.yml", *common, Application(".", (), access=Access(outside=outside)))
+    texts = {file.path: file.text for file in render_plan(plan)}
+    return yaml.safe_load(texts["t/environment.compose.yml"])["networks"]
+
+
+def host() -> str:
+    """An address of the engine's machine on another of its networks."""
+    words = ["docker", "network", "inspect", "bridge", "--format", "{{(index .IPAM.Config 0).Gateway}}"]
+    return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+
+
+@pytest.mark.parametrize("outside", [False, True])
+def test_what_containers_reach(outside: bool, tmp_path: Path, crate: Crate) -> None:
+    script = f"HOST = {host()!r}\n{TALK}"
+    service = {"image": IMAGE, "entrypoint": ["python3", "-c", script.replace("$", "$$")], "stop_grace_period": "0s"}
+    file = tmp_path / "docker-compose.yml"
+    file.write_text(yaml.safe_dump({"services": {"a": service, "b": service}, "networks": networks(outside)}))
+    command = ["docker", "compose", "-p", f"dodo-{crate.mark}-net", "-f", str(file)]
+    try:
+        done = subprocess.run(
+            [*command, "up", "--no-log-prefix"], capture_output=True, text=True, check=False, timeout=120
+        )
+    finally:
+        subprocess.run([*command, "down", "-v"], capture_output=True, check=True)
+    said = [json.loads(line[line.index("{") :]) for line in done.stdout.splitlines() if "{" in line]
+    assert said == 2 * [{"gateway": outside, "host": outside}], done.stdout + done.stderr
