@@ -68,6 +68,7 @@ def test_goldens(style: str, way: str, monkeypatch: pytest.MonkeyPatch, update_g
 def test_compose_accepts_them(style: str, tmp_path: Path) -> None:
     command = compose()
     shutil.copytree(FOLDER / "good", tmp_path / "team")
+    (tmp_path / "team" / ".git").mkdir()
     for way in ("network", "hil"):  # hil has what host has, and hardware
         made, _ = plan(tmp_path / "team" / style, way, tmp_path / "generated" / way / "t")
         for file in render_plan(made):

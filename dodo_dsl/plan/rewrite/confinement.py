@@ -25,19 +25,20 @@ def confine(copy: ServiceCopy) -> None:
 
 
 def _limit(copy: ServiceCopy, key: str, word: str, default: int) -> None:
-    """A limit as the file has it, also below ``deploy``, else the default."""
-    deploy: Any = copy.service.get("deploy")
+    """A limit as the file has it, else the default: below ``deploy`` where limits are set there, as compose wants."""
+    limits: Any = copy.service.get("deploy")
     for part in ("resources", "limits"):
-        deploy = deploy.get(part) if isinstance(deploy, dict) else None
-    below = deploy.get(word) if isinstance(deploy, dict) else None
-    own = copy.service.get(key)
+        limits = limits.get(part) if isinstance(limits, dict) else None
+    own, below = copy.service.get(key), limits.get(word) if isinstance(limits, dict) else None
     if _is_limit(copy.filled(own)) or (own is None and _is_limit(copy.filled(below))):
         return
-    if own is not None:
+    if own is not None or below is not None:
         copy.note(f"{key} is {default}")
-    if below is not None:
-        deploy.pop(word)
-    copy.service[key] = default
+    copy.service.pop(key, None)
+    if isinstance(limits, dict):
+        limits[word] = str(default) if word == "memory" else default
+    else:
+        copy.service[key] = default
 
 
 def _is_limit(value: Any) -> bool:

@@ -36,9 +36,15 @@ def test_what_a_service_gets(service: dict[str, Any], changed: dict[str, Any]) -
 def test_limits_below_deploy_are_limits() -> None:
     own = copy({"deploy": {"resources": {"limits": {"memory": "1g", "pids": 0}}}})
     confine(own)
-    assert own.service["deploy"] == {"resources": {"limits": {"memory": "1g"}}}
-    assert own.service["pids_limit"] == 1024
-    assert "mem_limit" not in own.service
+    assert own.service["deploy"] == {"resources": {"limits": {"memory": "1g", "pids": 1024}}}
+    assert not {"pids_limit", "mem_limit"} & set(own.service)
+
+
+def test_limits_go_where_others_are() -> None:
+    own = copy({"deploy": {"resources": {"limits": {"cpus": "2"}}}, "mem_limit": 0})
+    confine(own)
+    assert own.service["deploy"]["resources"]["limits"] == {"cpus": "2", "pids": 1024, "memory": "2000000000"}
+    assert not {"pids_limit", "mem_limit"} & set(own.service)
 
 
 def test_on_a_rig_that_allows_privileges_capabilities_stay() -> None:

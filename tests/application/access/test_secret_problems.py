@@ -1,0 +1,46 @@
+"""Warnings of variables that look like secrets."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.application.access.secret_problems import left_out, withheld
+from dodo_dsl.diagnostics import format_text
+from tests.source.nodes import mapping
+
+
+def names(text: str, own: tuple[str, ...] = (), passed: tuple[str, ...] = ()) -> list[str]:
+    """The variables that a compose file is warned of."""
+    return [problem.message.split("'")[1] for problem in withheld([mapping(text)], own, passed)]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("command: --a=${API_KEY} --b=$CI_X", ["API_KEY", "CI_X"]),
+        ("command: ['${A:-${API_KEY}}', '${API_KEY}']", ["API_KEY"]),
+        ("command: sh -c 'echo $${API_KEY}'", []),
+        ("environment: [API_KEY, SPEED, A_TOKEN=1]", ["API_KEY"]),
+        ("environment: {API_KEY: , A_TOKEN: x}", ["API_KEY"]),
+        ("build: {args: [API_KEY]}", ["API_KEY"]),
+        ("build: {args: {API_KEY: null}}", ["API_KEY"]),
+        ("s: {environment: API_KEY}", ["API_KEY"]),
+        ("x-own: ${API_KEY}", []),
+        ("labels: [API_KEY]", []),
+    ],
+)
+def test_variables_that_are_named(text: str, expected: list[str]) -> None:
+    assert names(text) == expected
+
+
+def test_own_and_passed_variables_are_no_problem() -> None:
+    assert names("command: $A_KEY $B_KEY $C_KEY", ("A_KEY",), ("B_KEY",)) == ["C_KEY"]
+
+
+def test_lines_with_secrets_are_not_shown(tmp_path: Path) -> None:
+    file = tmp_path / ".env"
+    file.write_text("SPEED=1\nexport API_KEY=s3cr3t\nDB=x://a:s3cr3t@b\n")
+    (problem,) = left_out({"API_KEY": file, "DB": file})
+    assert (problem.span.line, problem.span.column, problem.severity) == (2, 8, "warning")
+    assert "API_KEY, DB" in problem.message
+    assert "s3cr3t" not in format_text([problem])
