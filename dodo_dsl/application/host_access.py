@@ -24,6 +24,7 @@ _OF_MACHINE = re.compile(
     r"|(dm-|md|sr|sg|bsg/)[^/]*|(mapper|disk|block|char|cpu)(/.*)?|kvm|fuse|btrfs-control|snapshot|userfaultfd)"
 )
 """Devices that are no hardware of a robot: disks, memory and the kernel's own."""
+_OF_DESKTOP = re.compile(r"/(var/)?run/user/\d+/(pulse|pipewire|wayland)[^/]*(/native)?$")
 _WHOLE = ("/", "/run", "/var/run", "/var", "/var/lib/docker")
 _SOCKET = re.compile(r"(docker|podman|containerd|crio)\.sock$")
 
@@ -60,10 +61,11 @@ def is_shared_memory(found: Mount) -> bool:
 
 
 def is_hardware(found: Mount) -> bool:
-    """A mount of devices, or of their settings in the kernel."""
+    """A mount of devices, of their settings in the kernel, or of a user's sound and screen."""
     if is_shared_memory(found) or found.source in _PLAIN_DEVICES:
         return False
-    return found.below("/dev") or (found.below("/sys") and not found.read_only)
+    is_device = found.below("/dev") or bool(_OF_DESKTOP.match(found.source))
+    return is_device or (found.below("/sys") and not found.read_only)
 
 
 def is_machine(found: Mount) -> bool:

@@ -31,6 +31,8 @@ def test_mounts(volume: object, expected: Mount) -> None:
         ("/dev/shm/x", False, False, True),
         ("/sys/class/gpio", True, False, False),
         ("/device", False, False, False),
+        ("/run/user/1000/pulse/native", True, False, False),
+        ("/run/user/1000/bus", False, False, False),
         ("/", False, True, False),
         ("/proc/1", False, True, False),
         ("/var/run/docker.sock", False, True, False),

@@ -25,10 +25,19 @@ def remove_machine_settings(copy: ServiceCopy) -> None:
         if len(kept) < len(deploy):
             copy.note("deploy keeps only resources and labels")
         copy.service["deploy"] = kept
+        _remove_reserved_memory(copy, kept)
         if not kept:
             copy.service.pop("deploy")
     if scale not in (None, 1):
         copy.note(f"starts once, not {scale} times")
+
+
+def _remove_reserved_memory(copy: ServiceCopy, deploy: dict[str, Any]) -> None:
+    """The engine refuses one above the limit, which a test sets."""
+    resources = deploy.get("resources")
+    reserved = resources.get("reservations") if isinstance(resources, dict) else None
+    if isinstance(reserved, dict) and reserved.pop("memory", None) is not None:
+        copy.note("reserved memory removed, a test has limits only")
 
 
 def _remove_from_build(copy: ServiceCopy, build: dict[str, Any], keys: Collection[str]) -> None:

@@ -31,6 +31,11 @@ def test_names_ports_and_policies() -> None:
             ["a: deploy keeps only resources and labels", "a: starts once, not 2 times"],
         ),
         ({"deploy": {"mode": "global"}}, {}, ["a: deploy keeps only resources and labels"]),
+        (
+            {"deploy": {"resources": {"reservations": {"memory": "8g", "cpus": "1"}}}},
+            {"deploy": {"resources": {"reservations": {"cpus": "1"}}}},
+            ["a: reserved memory removed, a test has limits only"],
+        ),
         ({"deploy": {"labels": ["x"]}}, {"deploy": {"labels": ["x"]}}, []),
     ],
 )
