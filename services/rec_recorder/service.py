@@ -80,7 +80,8 @@ def _traffic(context: Context) -> Traffic:
         return messages.name(id_) if id_ in messages.ids() else f"message {id_}"
 
     limit = round(context.flags["limit"] * MEGABYTE)
-    return Traffic(limit, context.clock.now, lambda: session.lost if session else 0, name)
+    now = None if context.clock.relays else context.clock.now
+    return Traffic(limit, now, lambda: session.lost if session else 0, name)
 
 
 def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None:

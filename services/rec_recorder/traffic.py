@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 
-MOST_PER_SECOND = 20_000
+MOST_PER_SECOND, MOST_OF_A_KIND = 20_000, 10_000
+"""Messages within a second; of one message and sender stamp."""
 _MOST_KINDS = 1000
 _SECOND = 1_000_000
 
@@ -26,12 +27,12 @@ class Kind(NamedTuple):
 class Traffic:
     """Counts envelopes by kind, and ends the recording of a flood.
 
-    ``now`` gives microseconds of test time, ``lost`` how many messages the kernel has dropped so far, and ``name`` the
-    message of an id.
+    ``now`` gives microseconds of real time; it is None in lockstep, where the clock limits messages by frames. ``lost``
+    gives how many messages the kernel has dropped so far, and ``name`` the message of an id.
     """
 
     def __init__(
-        self, most_bytes: int, now: Callable[[], int], lost: Callable[[], int], name: Callable[[int], str]
+        self, most_bytes: int, now: Callable[[], int] | None, lost: Callable[[], int], name: Callable[[int], str]
     ) -> None:
         self._most_bytes, self._now, self._lost, self._name = most_bytes, now, lost, name
         self._bytes: Counter[Kind] = Counter()
@@ -48,16 +49,18 @@ class Traffic:
         self._size += size
         if self._size > self._most_bytes:
             self._end("size", f"the recording would be larger than {self._most_bytes / 1e6:g} MB", self._bytes)
-        self._count(kind)
+        if self._now is not None:
+            self._count(kind, self._now())
 
-    def _count(self, kind: Kind) -> None:
-        now = self._now()
+    def _count(self, kind: Kind, now: int) -> None:
         if not 0 <= now - self._begin < _SECOND:
             self._second.clear()
             self._number = 0
             self._begin, self._lost_before = now, self._lost()
         self._second[kind] += 1
         self._number += 1
+        if self._second[kind] > MOST_OF_A_KIND:
+            self._end("rate", f"more than {MOST_OF_A_KIND} messages of a kind came within a second", self._second)
         if self._number + self._lost() - self._lost_before > MOST_PER_SECOND:
             self._end("rate", f"more than {MOST_PER_SECOND} messages came within a second", self._second)
 

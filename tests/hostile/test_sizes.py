@@ -216,8 +216,9 @@ def test_more_messages_than_a_second_may_have_end_the_recording() -> None:
     counter = Traffic(10**9, clock, lambda: lost[0], str)
     for second in range(3):
         clock.now = 5_000_000 + second * 1_000_000
-        for _ in range(traffic.MOST_PER_SECOND):
-            counter.add(envelope(5), 10)
+        for stamp in (1, 2):
+            for _ in range(traffic.MOST_OF_A_KIND):
+                counter.add(envelope(5, stamp), 10)
     clock.now += 1_000_000
     counter.add(envelope(5), 10)
     lost[0] = traffic.MOST_PER_SECOND
@@ -225,9 +226,23 @@ def test_more_messages_than_a_second_may_have_end_the_recording() -> None:
         counter.add(envelope(5), 10)
 
 
+def test_one_kind_of_message_may_not_flood_alone() -> None:
+    counter = Traffic(10**9, Clock(), lambda: 0, str)
+    for _ in range(traffic.MOST_OF_A_KIND):
+        counter.add(envelope(5, 9), 10)
+    with pytest.raises(FloodError, match="more than 10000 messages of a kind came within a second, most of it 5/9"):
+        counter.add(envelope(5, 9), 10)
+
+
+def test_in_lockstep_the_clock_counts_messages() -> None:
+    counter = Traffic(10**9, None, lambda: 0, str)
+    for _ in range(traffic.MOST_PER_SECOND + 1):
+        counter.add(envelope(5), 10)
+
+
 def test_senders_without_end_take_no_memory() -> None:
     counter = Traffic(10**9, Clock(), lambda: 0, str)
-    for stamp in range(traffic.MOST_PER_SECOND):
+    for stamp in range(traffic.MOST_OF_A_KIND):
         counter.add(envelope(5, stamp), 10)
     assert len(counter._bytes) <= 1001
 
