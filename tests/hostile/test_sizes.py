@@ -15,6 +15,8 @@ import pytest
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError, SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.odvd.parser import OdvdError
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.opendlv.video import decoder
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
@@ -145,8 +147,6 @@ def test_frames_that_lie_about_their_size_are_not_decoded_either(monkeypatch: py
 
 
 def message_data(payload: bytes) -> bytes:
-    from dodo_dsl.opendlv.messages.message_set import MessageSet
-
     return bytes(MessageSet.standard().decode(IMAGE, payload).data)
 
 
@@ -157,6 +157,14 @@ def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> Non
         frames = [frame for _, frame in decoded(recording, recording.rows(messages=[IMAGE]), told.append)]
     assert [frame is not None for frame in frames] == [True] * MOST_DECODERS + [False] * (40 - MOST_DECODERS)
     assert told == [f"frames of more than {MOST_DECODERS} cameras and formats are not decoded"]
+
+
+def test_messages_that_double_are_not_unfolded(tmp_path: Path) -> None:
+    """Each holds the next one twice: thirty of them are a billion fields."""
+    texts = [f"message a.M{n} [id = {5000 + n}] {{ a.M{n + 1} x [id = 1]; a.M{n + 1} y [id = 2]; }}" for n in range(30)]
+    (tmp_path / "a.odvd").write_text("\n".join([*texts, "message a.M30 [id = 4999] { uint8 x [id = 1]; }"]))
+    with pytest.raises(OdvdError, match=r"a\.odvd:15:9: 'a\.M14' unfolds to more than 100000 fields"):
+        MessageSet.load(tmp_path / "a.odvd")
 
 
 def test_a_registry_is_not_searched_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

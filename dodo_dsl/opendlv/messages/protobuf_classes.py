@@ -12,6 +12,8 @@ from dodo_dsl.opendlv.odvd.field_types import INTEGER_BITS, SCALARS
 from dodo_dsl.opendlv.odvd.parser import Definition, Field
 from dodo_dsl.opendlv.odvd.tokens import OdvdError
 
+MAX_FIELDS = 100_000
+
 _Proto = descriptor_pb2.FieldDescriptorProto
 _PROTO_TYPES: dict[str, "descriptor_pb2.FieldDescriptorProto.Type.ValueType"] = {
     "bool": _Proto.TYPE_BOOL,
@@ -64,6 +66,8 @@ class _Builder:
     def __init__(self, definitions: dict[str, Definition]) -> None:
         self.definitions = definitions
         self.layouts: dict[str, Layout] = {}
+        self._fields: dict[str, int] = {}
+        """How many fields a message unfolds to: those of inner messages are counted as often as they occur."""
         self._pool = descriptor_pool.DescriptorPool()
 
     def layout(self, name: str, depth: int) -> Layout:
@@ -77,6 +81,11 @@ class _Builder:
             for field in definition.fields
             if field.type not in SCALARS
         }
+        self._fields[name] = 1 + sum(
+            self._fields[inner[field.name].definition.name] if field.name in inner else 1 for field in definition.fields
+        )
+        if self._fields[name] > MAX_FIELDS:
+            raise OdvdError(f"{definition.place}: '{name}' unfolds to more than {MAX_FIELDS} fields")
         self.layouts[name] = _layout(definition, inner, self._message_type(definition, inner))
         return self.layouts[name]
 
