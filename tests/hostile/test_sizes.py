@@ -39,7 +39,7 @@ from services.virtual_camera.image.overlays import load_with_alpha
 from services.virtual_camera.map.json_node import MapError
 from services.virtual_camera.map.meshes import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES, load_obj
 from services.virtual_camera.map.textures import load_picture
-from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, message, record, video
+from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
 from tests.run.helpers import Bench
 
 __all__ = ["record"]
@@ -165,6 +165,14 @@ def test_messages_that_double_are_not_unfolded(tmp_path: Path) -> None:
     (tmp_path / "a.odvd").write_text("\n".join([*texts, "message a.M30 [id = 4999] { uint8 x [id = 1]; }"]))
     with pytest.raises(OdvdError, match=r"a\.odvd:15:9: 'a\.M14' unfolds to more than 100000 fields"):
         MessageSet.load(tmp_path / "a.odvd")
+
+
+def test_senders_without_end_become_no_tables(record: Callable[..., Path]) -> None:
+    envelopes = [message("opendlv.proxy.DistanceReading", BEGIN, stamp, distance=1.0) for stamp in range(1001)]
+    path = record(envelopes)
+    code, _, stderr = dodo_rec("export", path, "--csv")
+    assert (code, "would become 1001 tables, expected at most 1000; choose messages with" in stderr) == (2, True)
+    assert not path.with_suffix("").exists()
 
 
 def test_a_registry_is_not_searched_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,6 +21,8 @@ from dodo_dsl.rec.frames import IMAGE
 from dodo_dsl.rec.outputs import refuse_existing
 from dodo_dsl.terminal import json_text, printable
 
+MOST_TABLES = 1000
+
 
 @dataclass(frozen=True)
 class _Job:
@@ -102,6 +104,9 @@ def _csv(job: _Job) -> None:
     if not len(known):
         raise NothingSelected(f"{recording.path} has only unknown messages; name their .odvd file with --messages")
     names = csv_table.names(recording, messages, known)
+    if len(names) > MOST_TABLES:
+        reason = f"would become {len(names)} tables, expected at most {MOST_TABLES}"
+        raise NothingSelected(f"{recording.path} {reason}; choose messages with --message")
     refuse_existing([folder / name for name in names], job.options.force)
     with atomic.files_into(folder) as place, progress_bar(job.stderr, "writing tables", len(known)) as progress:
         undecodable = csv_table.write(recording, messages, known, place, progress)
