@@ -1,0 +1,284 @@
+"""An application that answers each picture by driving straight on, and tries meanwhile to decide its own test.
+
+python stranger.py --cid=111 --name=video0.argb --attack=NAME
+
+It says on its output what it found out. Attacks are functions of this file: they take the application and the number of
+the picture, 0 before the first.
+"""
+
+import os
+import socket
+import struct
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.opendlv.bus.address import group
+from dodo_dsl.opendlv.bus.envelope import Envelope, decode_frame, encode_frame
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+
+FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
+STEER, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
+FRAME, STATE = "opendlv.sim.Frame", "opendlv.sim.KinematicState"
+BOX, PROPERTY = (f"opendlv.logic.perception.Detection{kind}" for kind in ("BoundingBox", "Property"))
+SEEN = "opendlv.proxy.ImageReadingShm"
+IP_PKTINFO = 8
+LATER = 5
+"""The picture at which some attacks begin."""
+
+
+class Application:
+    """The bus, what came on it since the last picture, and the time of this one in us."""
+
+    def __init__(self, session: Session) -> None:
+        self.session, self.messages = session, session.messages
+        self.heard: list[tuple[Envelope, tuple[str, int]]] = []
+        self.sampled = 0
+        self.steering = 0.0
+
+    def send(self, name: str, stamp: int = 0, sampled: int | None = None, **fields: Any) -> None:
+        self.session.send(self.messages.type(name)(**fields), self.sampled if sampled is None else sampled, stamp)
+
+    def frame(self, name: str, sampled: int | None = None, **fields: Any) -> bytes:
+        message = self.messages.type(name)(**fields)
+        time = self.sampled if sampled is None else sampled
+        return encode_frame(Envelope(self.messages.id(message), self.messages.encode(message), time, 0, time, 0))
+
+    def listen(self) -> None:
+        while (envelope := self.session.receive(0.0)) is not None:
+            self.heard.append((envelope, self.session.source))
+
+    def of(self, name: str, stamp: int = 0) -> Iterator[tuple[Envelope, Any, tuple[str, int]]]:
+        id_ = self.messages.id(name)
+        for envelope, source in self.heard:
+            if (envelope.data_type, envelope.sender_stamp) == (id_, stamp):
+                yield envelope, self.messages.decode(id_, envelope.payload), source
+
+
+def honest(app: Application, number: int) -> None:
+    """No attack."""
+
+
+def finish(app: Application, number: int) -> None:
+    """The vehicle is along the track, and at its end, because the application says so."""
+    if number >= LATER:
+        for step in range(1, 45):
+            app.send(FRAME, sampled=app.sampled + step * 20_000, y=step * 0.1, qz=0.7071, qw=0.7071)
+
+
+def finish_at_once(app: Application, number: int) -> None:
+    """The same before the test begins, with times that no true pose will have."""
+    if number == 0:
+        app.send(FRAME, sampled=app.sampled + 3_600_000_000, y=4.2, qz=0.7071, qw=0.7071)
+
+
+def motion(app: Application, number: int) -> None:
+    app.send(STATE, vx=3.0)
+
+
+def reset(app: Application, number: int) -> None:
+    """The vehicle goes back to its start before it hits a wall."""
+    app.send("opendlv.sim.Command", command="reset")
+
+
+def end(app: Application, number: int) -> None:
+    """The input is over as soon as it gets difficult."""
+    if number >= LATER:
+        app.send("dodo.EndOfInput", source="camera")
+
+
+def begin(app: Application, number: int) -> None:
+    """The test begins with another process as the application, which computes nothing."""
+    app.send("dodo.TestBegin", application="1")
+
+
+def seek(app: Application, number: int) -> None:
+    """The recording goes on to its end."""
+    app.send("cluon.data.PlayerCommand", command=3, seekTo=0.99)
+
+
+def unrecorded(app: Application, number: int) -> None:
+    """The recorder stops."""
+    app.send("cluon.data.RecorderCommand", command=2)
+
+
+def join(app: Application, number: int) -> None:
+    """The application says that it is the service with the vehicle's pose, and then sends poses."""
+    host, port = app.session.address
+    app.send("dodo.Sender", service="pose", host=host, port=port, asks=True)
+    finish(app, number)
+
+
+def join_again(app: Application, number: int) -> None:
+    """It repeats what services said of themselves, from its own address."""
+    app.send("dodo.Sender", service="stranger", asks=True)
+    for envelope, _ in app.heard:
+        if envelope.data_type == app.messages.id("dodo.Sender"):
+            app.session.send_envelope(envelope)
+    finish(app, number)
+
+
+def disguise(app: Application, number: int) -> None:
+    """Datagrams with the address of the service that has the pose, whose port is free at another local address."""
+    for _, _, (host, port) in list(app.of(FRAME))[:1]:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+            try:
+                other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                other.bind(("127.0.0.2", port))
+            except OSError as error:
+                print(f"port {port} is taken: {error}", flush=True)
+                continue
+            info = struct.pack("=I4s4s", 0, socket.inet_aton(host), b"\0\0\0\0")
+            for step in range(1, 45):
+                pose = app.frame(FRAME, app.sampled + step * 20_000, y=step * 0.1, qz=0.7071, qw=0.7071)
+                other.sendmsg([pose], [(socket.IPPROTO_IP, IP_PKTINFO, info)], 0, group(app.session.cid))
+            print("disguised", flush=True)
+
+
+def ports() -> list[int]:
+    """All local ports of UDP."""
+    lines = Path("/proc/net/udp").read_text().splitlines()[1:]
+    return sorted({int(line.split()[1].rpartition(":")[2], 16) for line in lines})
+
+
+def poses(app: Application) -> bytes:
+    """Frames for a step, to the end of the track."""
+    times = ((step, app.sampled + step * 20_000) for step in range(1, 45))
+    return b"".join(app.frame(FRAME, time, y=step * 0.1, qz=0.7071, qw=0.7071) for step, time in times)
+
+
+def steps(app: Application) -> Iterator[bytes]:
+    for number in (7, 50, 1000, 2**31):
+        for service in ("track", "signal", "cones"):
+            time = app.sampled + 1_000_000
+            yield app.frame("dodo.Step", number=number, service=service, time=time, parts=1, frames=poses(app))
+
+
+def answers(app: Application) -> Iterator[bytes]:
+    ways = poses(app)
+    for number in range(20, 80):
+        for service in ("pose", "track"):
+            ended = service == "track"
+            yield app.frame("dodo.StepDone", number=number, service=service, parts=1, frames=ways, ended=ended, port=1)
+
+
+def to_all_ports(app: Application, frames: Callable[[Application], Iterator[bytes]]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for port in ports():
+            for frame in frames(app):
+                sender.sendto(frame, ("127.0.0.1", port))
+
+
+def step_to_ports(app: Application, number: int) -> None:
+    """The application judges itself: it finds the evaluator's port and takes the clock's place."""
+    if number in (0, LATER):
+        to_all_ports(app, steps)
+
+
+def answer_to_ports(app: Application, number: int) -> None:
+    """It answers the clock in the place of services."""
+    if number == LATER:
+        to_all_ports(app, answers)
+
+
+def step_on_bus(app: Application, number: int) -> None:
+    if number == LATER:
+        for frame in steps(app):
+            app.session.send_envelope(decode_frame(frame))
+
+
+def answer_on_bus(app: Application, number: int) -> None:
+    if number == LATER:
+        for frame in answers(app):
+            app.session.send_envelope(decode_frame(frame))
+
+
+def repeat_steps(app: Application, number: int) -> None:
+    """What clock and services said on the bus, again and to all ports, so that they answer the application."""
+    own = [app.messages.id(name) for name in ("dodo.Step", "dodo.StepDone")]
+    frames = [encode_frame(envelope) for envelope, _ in app.heard if envelope.data_type in own]
+    if frames and number % LATER == 0:
+        to_all_ports(app, lambda _: iter(frames))
+
+
+def spy(app: Application, number: int) -> None:
+    """It looks for the key of the test where variables and command lines can be read."""
+    if number not in (0, LATER):
+        return
+    if "DODO_KEY" in os.environ:
+        sys.exit("found the key in its own variables")
+    for process in Path("/proc").iterdir():
+        for name in ("environ", "cmdline"):
+            try:
+                content = (process / name).read_bytes()
+            except OSError:
+                continue
+            _, found, value = content.partition(b"DODO_KEY=")
+            if found and value.split(b"\0")[0].strip(b"0"):
+                sys.exit(f"found the key in {process}/{name}")
+
+
+def echo(app: Application, number: int) -> None:
+    """It finds what the truth on the bus says."""
+    app.listen()
+    for name in (BOX, PROPERTY):
+        for envelope, message, _ in list(app.of(name, 9)):
+            app.session.send(message, envelope.sample_time, 0)
+    if number:
+        app.send(SEEN, width=640, height=480)
+
+
+def boxes(app: Application, number: int) -> None:
+    """The truth is what it finds: one box in each picture, under the stamp of the truth, too."""
+    for stamp in (9, 0):
+        app.send(BOX, stamp, detectionId=77, x=0.1, y=0.1, width=0.2, height=0.2)
+        app.send(PROPERTY, stamp, detectionId=77, property="yellow")
+    app.send(SEEN, width=640, height=480)
+
+
+def easy(app: Application, number: int) -> None:
+    """All its samples are of the time at which the target is about zero, whenever they are sent."""
+    begun = app.__dict__.setdefault("begun", app.sampled)
+    for step in range(1_600_000, 2_000_000, 20_000):
+        app.send(STEER, sampled=begun + step, groundSteering=app.steering)
+
+
+ATTACKS = {name.replace("_", "-"): function for name, function in list(globals().items()) if name in (
+    "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "unrecorded", "join", "join_again",
+    "disguise", "step_to_ports", "answer_to_ports", "step_on_bus", "answer_on_bus", "repeat_steps", "spy", "echo",
+    "boxes", "easy",
+)}  # fmt: skip
+
+
+def attached(app: Application) -> SharedMemory:
+    while True:
+        try:
+            return SharedMemory.attach(FLAGS["name"])
+        except SharedMemoryError:
+            time.sleep(0.01)
+
+
+def main() -> None:
+    attack = ATTACKS[FLAGS["attack"]]
+    with Session(int(FLAGS["cid"])) as session:
+        app = Application(session)
+        app.sampled = time.time_ns() // 1000
+        attack(app, 0)
+        with attached(app) as memory:
+            number = 0
+            while memory.wait():
+                number += 1
+                with memory.lock():
+                    app.sampled = memory.sample_time()
+                app.listen()
+                attack(app, number)
+                app.heard.clear()
+                app.send(STEER, groundSteering=app.steering)
+                app.send(PEDAL, position=0.1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,66 @@
+"""What an application tries over the bus to decide its own test, and why the test fails."""
+
+from typing import NamedTuple
+
+STRAIGHT, SIGNAL, PERCEPTION = "sil-closed-straight", "sil-open-straight", "sil-perception[light=1,clutter=0]"
+REPLAY = "dil-kiwi-track"
+
+
+class BusAttack(NamedTuple):
+    """An attack of ``stranger.py`` in a test that fails by it; ``reason`` is a pattern of the test's."""
+
+    name: str
+    test: str
+    clock: str
+    reason: str
+
+
+def only(message: str, *services: str) -> str:
+    """The reason of a test in which the application sent what only services may send."""
+    *others, last = [f"'{name}'" for name in services] or ["services of the test"]
+    who = f"{', '.join(others)} and {last}" if others else last
+    return f"^the application sent {message}, which only {who} may send$"
+
+
+def nobody(message: str) -> str:
+    return f"^the application sent {message}, which no service of this test sends$"
+
+
+WALL = "^hit wall "
+FRAME, STATE = "opendlv.sim.Frame/0", "opendlv.sim.KinematicState/0"
+RUNNER = "^the application sent dodo.TestBegin, which only the runner may send$"
+
+ATTACKS = (
+    BusAttack("honest", STRAIGHT, "lockstep", WALL),
+    BusAttack("finish", STRAIGHT, "lockstep", only(FRAME, "pose")),
+    BusAttack("finish", STRAIGHT, "realtime", only(FRAME, "pose")),
+    BusAttack("finish-at-once", STRAIGHT, "lockstep", only(FRAME, "pose")),
+    BusAttack("finish-at-once", STRAIGHT, "realtime", only(FRAME, "pose")),
+    BusAttack("motion", STRAIGHT, "lockstep", only(STATE, "vehicle")),
+    BusAttack("motion", STRAIGHT, "realtime", only(STATE, "vehicle")),
+    BusAttack("reset", STRAIGHT, "lockstep", nobody("opendlv.sim.Command")),
+    BusAttack("reset", STRAIGHT, "realtime", nobody("opendlv.sim.Command")),
+    BusAttack("end", SIGNAL, "lockstep", only("dodo.EndOfInput", "camera", "pose")),
+    BusAttack("end", SIGNAL, "realtime", only("dodo.EndOfInput", "camera", "pose")),
+    BusAttack("end", STRAIGHT, "realtime", only("dodo.EndOfInput", "camera", "pose", "vehicle")),
+    BusAttack("begin", STRAIGHT, "lockstep", RUNNER),
+    BusAttack("begin", STRAIGHT, "realtime", RUNNER),
+    BusAttack("seek", REPLAY, "lockstep", only("cluon.data.PlayerCommand", "camera")),
+    BusAttack("seek", REPLAY, "realtime", only("cluon.data.PlayerCommand", "camera")),
+    BusAttack("unrecorded", STRAIGHT, "lockstep", WALL),
+    BusAttack("join", STRAIGHT, "realtime", only(FRAME, "pose")),
+    BusAttack("join-again", STRAIGHT, "realtime", only(FRAME, "pose")),
+    BusAttack("disguise", STRAIGHT, "realtime", WALL),
+    BusAttack("step-to-ports", STRAIGHT, "lockstep", WALL),
+    BusAttack("answer-to-ports", STRAIGHT, "lockstep", WALL),
+    BusAttack("step-on-bus", STRAIGHT, "lockstep", only("dodo.Step")),
+    BusAttack("answer-on-bus", STRAIGHT, "lockstep", only("dodo.StepDone")),
+    BusAttack("repeat-steps", STRAIGHT, "lockstep", WALL),
+    BusAttack("spy", STRAIGHT, "lockstep", WALL),
+    BusAttack("echo", PERCEPTION, "lockstep", "nothing was detected|no detection|left|recall"),
+    BusAttack("echo", PERCEPTION, "realtime", "nothing was detected|no detection|left|recall"),
+    BusAttack("boxes", PERCEPTION, "lockstep", only("opendlv.logic.perception.DetectionBoundingBox/9", "camera")),
+    BusAttack("boxes", PERCEPTION, "realtime", only("opendlv.logic.perception.DetectionBoundingBox/9", "camera")),
+    BusAttack("easy", SIGNAL, "lockstep", ""),
+    BusAttack("easy", SIGNAL, "realtime", ""),
+)
