@@ -54,6 +54,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         application["limits"] = SandboxLimits(**{**application["limits"], "reads": reads})
         application["access"] = _access(application["access"])
         raw["application"] = Application(**application)
+        raw["truth_delay_s"] = float(raw["truth_delay_s"])
         if settings.seed is not None:
             raw["seed"] = settings.seed
         if settings.wall_timeout_s is not None and raw["lockstep"]:

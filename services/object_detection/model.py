@@ -24,8 +24,8 @@ class DetectionEvaluator(Evaluator):
 
     def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits, truth_delay: int = 0) -> None:
         """``truth_delay``: how late the truth comes, in us; then a detection counts only before it."""
-        super().__init__(rules.max_time, rules.max_delay)
         self._truth_delay = 0 if truth else truth_delay
+        super().__init__(rules.max_time, rules.max_delay + self._truth_delay / MICROSECONDS)
         self._truth, self._rules, self._limits = truth, rules, limits
         self._score, self._silence = Score(), Silence(rules.start_up)
         self._frames: dict[int, DetectedFrame] = {}
@@ -141,10 +141,14 @@ class DetectionEvaluator(Evaluator):
         frame = self._frames.get(key.time)
         if frame is not None or key.time in self._judged or key.time in self._passed_over:
             return frame
-        if self.now is None or self.elapsed(self.now) < self._rules.start:
+        if self.now is None or self.elapsed(self.now) < self._rules.start or self._is_behind_the_end(key):
             self._pass_over(key)
             return None
         return self._frames.setdefault(key.time, DetectedFrame(key, self.now))
+
+    def _is_behind_the_end(self, key: FrameKey) -> bool:
+        """Whether a frame's truth would come too late for the verdict."""
+        return bool(self._truth_delay) and self._ended is not None and key.time > self._ended
 
     def _pass_over(self, key: FrameKey) -> None:
         self._passed_over.add(key.time)

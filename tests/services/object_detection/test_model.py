@@ -45,10 +45,10 @@ def at(it: DetectionEvaluator, seconds: float) -> None:
     it.update(BEGIN + round(seconds * SECOND))
 
 
-def decided(it: DetectionEvaluator, seconds: float = 10.0) -> Verdict:
-    """The verdict when the input has ended after so many seconds."""
+def decided(it: DetectionEvaluator, seconds: float = 10.0, after: float = 1.0) -> Verdict:
+    """The verdict when the input has ended after so many seconds, some time ``after`` that."""
     it.end_of_input(BEGIN + round(seconds * SECOND))
-    at(it, seconds + 1)
+    at(it, seconds + after)
     assert it.verdict is not None
     return it.verdict
 
@@ -422,8 +422,7 @@ def test_what_is_found_counts_until_its_truth_has_come() -> None:
     detect(it, 1, YELLOW, BLUE)
     reveal(it, 2, YELLOW)
     detect(it, 2, YELLOW)
-    at(it, 4.0)
-    found = values(decided(it))
+    found = values(decided(it, 4.0, after=2.0))
     assert (found["true-positives"], found["false-negatives"], found["late"]) == (1, 2, 3)
 
 
@@ -433,8 +432,8 @@ def test_nothing_counts_after_the_time_for_an_answer_where_truth_is_late() -> No
     at(it, 1.1)
     detect(it, 1, YELLOW, BLUE)
     reveal(it, 1, YELLOW, BLUE)
-    at(it, 4.0)
-    assert (values(decided(it))["true-positives"], values(decided(it))["late"]) == (1, 2)
+    found = values(decided(it, 4.0, after=2.0))
+    assert (found["true-positives"], found["late"]) == (1, 2)
 
 
 def test_pictures_of_the_future_cannot_be_answered() -> None:
@@ -449,3 +448,16 @@ def test_pictures_of_the_future_cannot_be_answered() -> None:
     verdict = decided(it)
     assert values(verdict)["recall"] == 1.0
     assert "left out: 1 detection of the future" in verdict.reason
+
+
+def test_the_verdict_waits_for_the_truth_of_the_last_pictures_and_for_no_more() -> None:
+    it = late_truth()
+    it.end_of_input(BEGIN + 5 * SECOND)
+    reveal(it, 7_004.5, YELLOW)
+    at(it, 6.5)
+    assert it.verdict is None
+    reveal(it, 7_005.5, YELLOW)
+    at(it, 7.0)
+    assert it.verdict is not None
+    found = values(it.verdict)
+    assert (found["frames"], found["false-negatives"], found["without-truth"]) == (1, 1, 0)
