@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl import diagnostics
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text
 from dodo_dsl.emit.render import render_plan
@@ -53,6 +54,7 @@ def plan(folder: Path, way: str, out: Path) -> tuple[Plan, str]:
 @pytest.mark.parametrize("style", STYLES)
 def test_goldens(style: str, way: str, monkeypatch: pytest.MonkeyPatch, update_goldens: bool) -> None:
     monkeypatch.chdir(FOLDER / "good" / style)
+    diagnostics._lines.cache_clear()  # every style has files of the same names
     made, said = plan(Path(), way, Path("../../generated/t").resolve())
     texts = {file.path: file.text for file in render_plan(made)}
     variables = "".join(f"# .env: {line}\n" for line in texts["t/.env"].splitlines()[3:])
