@@ -26,6 +26,14 @@ def state_path(variable: str, name: str) -> Path:
         raise NoStateFolder(f"user {os.getuid()} has no home folder: set {variable} or XDG_STATE_HOME") from None
 
 
+def account_path(name: str) -> Path:
+    """``name`` in the state folder of this user's account, whatever variables say; raises NoStateFolder."""
+    try:
+        return Path(pwd.getpwuid(os.getuid()).pw_dir) / ".local" / "state" / "dodo" / name
+    except KeyError:
+        raise NoStateFolder(f"user {os.getuid()} has no account with a home folder") from None
+
+
 class UnsafeFolder(OSError):
     """Others could write into a folder of DoDo's state; the text says what to do."""
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pwd
 import subprocess
 import sys
 import time
@@ -158,6 +159,25 @@ def test_a_rig_with_another_name_stays_in_quarantine(repository: Path) -> None:
     rig(repository)
     assert "in quarantine" not in dodo("rig", "status", "--wait", "0")[1]
     assert quarantine.all_quarantined() == {}
+
+
+def test_no_variable_moves_the_quarantine_of_hardware(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    account = pwd.struct_passwd(("a", "x", os.getuid(), 0, "", str(repository / "account"), ""))
+    monkeypatch.setattr(devices, "_SOFTWARE", set())  # the null device counts as hardware
+    monkeypatch.setattr(pwd, "getpwuid", lambda _: account)
+    quarantine.quarantine("fake", "it has lost steps", ["/dev/null"])
+    assert list((repository / "account" / ".local" / "state" / "dodo" / "rigs").glob("device-*.json"))
+    for name in ("DODO_RIGS", "XDG_STATE_HOME", "HOME"):
+        monkeypatch.setenv(name, str(repository / "empty"))
+    assert quarantine.quarantined("renamed", ["/dev/null"]) == "it has lost steps"
+    assert quarantine.all_quarantined() == {"fake": "it has lost steps"}
+    assert quarantine.clear("renamed", ["/dev/null"])
+    assert quarantine.all_quarantined() == {}
+
+
+@pytest.mark.parametrize("name", ["/dev/null", "/dev/ptmx", "/dev/tty", "/none", "a\0b", "", "emulated", "0"])
+def test_what_is_no_hardware(name: str) -> None:
+    assert not devices.is_hardware(name)
 
 
 # The operator

@@ -10,6 +10,8 @@ from dodo_dsl.spec.rig import EMULATED
 
 _SOCKET = re.compile(r"socket://[^/]*:(?P<port>[0-9]{1,5})")
 _SYS = Path("/sys/dev/char")
+_SOFTWARE = {1, 5, *range(136, 144)}
+"""The kernel's numbers of memory devices, consoles and pseudo terminals (Documentation/admin-guide/devices.txt)."""
 _ABOVE = 6
 """Folders of the kernel's device tree above a port in which a USB device has its serial number."""
 
@@ -30,6 +32,15 @@ def identity(device: str, sys: Path = _SYS) -> str:
     if not stat.S_ISCHR(status.st_mode):
         return ""
     return _serial_number(sys / f"{os.major(status.st_rdev)}:{os.minor(status.st_rdev)}") or f"path {path}"
+
+
+def is_hardware(device: str) -> bool:
+    """Whether a name means a device of hardware that is there: no pseudo terminal, socket, file or device of memory."""
+    try:
+        status = Path(device).stat()
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISCHR(status.st_mode) and os.major(status.st_rdev) not in _SOFTWARE
 
 
 def key(device: str) -> str:

@@ -8,7 +8,7 @@ import contextlib
 import json
 import re
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from dodo_dsl import atomic
@@ -16,31 +16,35 @@ from dodo_dsl.opendlv import regular_file
 from dodo_dsl.run.rigs import devices as hardware
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.machine import MachineError, machine
-from dodo_dsl.state_folder import NoStateFolder, secured, state_path
+from dodo_dsl.state_folder import NoStateFolder, account_path, secured, state_path
 
 FOLDER_VARIABLE = "DODO_RIGS"
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
-def folder() -> Path:
-    """The operator's folder, else ``DODO_RIGS``, else one in this user's state folder; raises RigProblem."""
+def folder(is_hardware: bool = False) -> Path:
+    """The operator's folder, else ``DODO_RIGS``, else one in this user's state folder; raises RigProblem.
+
+    Variables do not count for hardware, as a job could set them.
+    """
     try:
         operators = machine()
         if operators is not None and operators.quarantine is not None:
             return operators.quarantine
-        return state_path(FOLDER_VARIABLE, "rigs")
+        return account_path("rigs") if is_hardware else state_path(FOLDER_VARIABLE, "rigs")
     except NoStateFolder as error:
         raise RigProblem(f"quarantines cannot be kept: {error}") from error
     except MachineError as error:
         raise RigProblem(f"quarantines cannot be kept: {error.filename}: {error.strerror}") from error
 
 
-def _files(rig: str, devices: Iterable[str]) -> list[Path]:
+def _files(rig: str, devices: Sequence[str]) -> list[Path]:
     """The file of the rig's name, and of each device."""
     if not _NAME.fullmatch(rig):
         raise RigProblem(f"'{rig}' is not a rig's name, expected lower-case letters, digits and hyphens")
     keys = sorted({hardware.key(device) for device in devices} - {""})
-    return [folder() / f"{key}.json" for key in (rig, *keys)]
+    place = folder(any(map(hardware.is_hardware, devices)))
+    return [place / f"{key}.json" for key in (rig, *keys)]
 
 
 def quarantined(rig: str, devices: Sequence[str] = ()) -> str:
@@ -51,7 +55,11 @@ def quarantined(rig: str, devices: Sequence[str] = ()) -> str:
 
 def all_quarantined() -> dict[str, str]:
     """The rigs in quarantine, each with its reason; raises RigProblem."""
-    return dict(_read(path) for path in sorted(folder().glob("*.json")) if _NAME.fullmatch(path.stem))
+    places = {folder()}
+    with contextlib.suppress(RigProblem):
+        places.add(folder(is_hardware=True))
+    paths = (path for place in sorted(places) for path in sorted(place.glob("*.json")))
+    return dict(_read(path) for path in paths if _NAME.fullmatch(path.stem))
 
 
 def quarantine(rig: str, reason: str, devices: Sequence[str] = ()) -> None:
@@ -68,8 +76,8 @@ def quarantine(rig: str, reason: str, devices: Sequence[str] = ()) -> None:
 def clear(rig: str, devices: Sequence[str] = ()) -> bool:
     """Ends a quarantine, under the name that the rig had then, too; whether there was one. Raises RigProblem."""
     found = [path for path in _files(rig, devices) if path.exists()]
-    names = {name for name, _ in map(_read, found) if _NAME.fullmatch(name)}
-    for path in (*found, *(folder() / f"{name}.json" for name in names)):
+    also = [path.with_stem(name) for path in found if _NAME.fullmatch(name := _read(path)[0])]
+    for path in (*found, *also):
         path.unlink(missing_ok=True)
     return bool(found)
 
