@@ -20,7 +20,7 @@ from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.slot import Slot, new_key
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.attendance import attended, is_real
+from dodo_dsl.run.rigs.attendance import attended, is_real, refuse_hardware
 
 Say = Callable[[str], None]
 WAY_OUT = "install bubblewrap and allow user namespaces, or trust the application and run with --isolation host"
@@ -104,6 +104,7 @@ class Processes:
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
         plan = job.plan
+        refuse_hardware(plan)
         isolation = "host" if is_real(plan) else self._isolation or plan.isolation
         if isolation == "network":
             if self._problem:
@@ -155,6 +156,7 @@ class Containers:
         if self._client is None or self._pulls is None:
             raise BackendError(self._problem)
         plan = job.plan
+        refuse_hardware(plan)
         project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
         lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"

@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.cli.main import main
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run import leases
 from dodo_dsl.run.rigs import devices, permission, quarantine
 from dodo_dsl.run.rigs.devices import identity, key
@@ -27,6 +29,7 @@ from services.continuous_signal.csv_target import read_table
 from services.dynamic_model.car import read_car
 from services.gantry import manual
 from services.gantry.protocol import answer
+from tests.run.helpers import Bench
 from tests.run.rigs.place import Place, place
 
 __all__ = ["place"]
@@ -305,6 +308,18 @@ def test_without_a_file_there_is_nothing_to_permit(repository: Path, monkeypatch
 
 def test_identities_follow_their_own_folder_of_the_kernel() -> None:
     assert devices.identity("/dev/does-not-exist") == "path /dev/does-not-exist"
+
+
+@pytest.mark.parametrize("rig_name", ["", "emulated"])
+@pytest.mark.parametrize("port", ["/dev/ttyACM0", "socket://127.0.0.1:4242"])
+def test_a_compiled_test_moves_no_hardware_without_a_rig(tmp_path: Path, rig_name: str, port: str) -> None:
+    plan = Bench(tmp_path).plan()
+    moves = PlannedService("action", "pose", "gantry", "x", ("python",), (Flag("serial", port),))
+    for isolation in (None, "host"):
+        bench = Bench(tmp_path, isolation)
+        (outcome,) = bench.run(replace(plan, rig=rig_name, services=(*plan.services, moves)))
+        words = f"service 'pose' would move what is at '{port}', and the test runs on no rig"
+        assert (outcome.outcome, outcome.reason) == ("error", words)
 
 
 # Masters

@@ -1,6 +1,6 @@
 """``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
 
-``rig-isolation``: hardware is on the host's network.
+``rig-isolation``: hardware is on the host's network. ``rig-device``: a test moves the rig that it names and no other.
 """
 
 from collections.abc import Iterator
@@ -11,6 +11,7 @@ from dodo_dsl.spec.rig import EMULATED
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
+    yield from _devices(context)
     spec = context.spec
     if spec.level == "hil" and spec.rig is None:
         message = "a hil test needs a rig to run on"
@@ -28,3 +29,17 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
         message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have a network of its own"
         hint = "remove 'isolation'" if "isolation" in spec.spans else "run it without --isolation"
         yield Diagnostic(spec.span("isolation"), "rig-isolation", message, hint)
+
+
+def _devices(context: RuleContext) -> Iterator[Diagnostic]:
+    """Ports that are not the rig's: nothing would lease or check them, or ask the machine's operator."""
+    rig = context.rig
+    for service in context.services:
+        for argument in service.arguments.values():
+            port = argument.value.text if argument.value and argument.parameter.rig == "serial" else EMULATED
+            if port == EMULATED or (rig is not None and port == rig.text("serial")):
+                continue
+            span = argument.entry.value.span if argument.entry else service.use.span
+            owner = f"rig '{rig.name}' does not have it" if rig else "the test runs on no rig"
+            message = f"'{service.use.name}' would move what is at '{port}', and {owner}"
+            yield Diagnostic(span, "rig-device", message, "name the rig of dodo.yml that has the port with 'rig'")

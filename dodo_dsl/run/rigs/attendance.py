@@ -9,7 +9,7 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.announce import heartbeat
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.health_check import examine
-from dodo_dsl.run.rigs.permission import refuse_test
+from dodo_dsl.run.rigs.permission import refuse_test, refuse_unattended
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in, leased
 from dodo_dsl.spec.rig import EMULATED
@@ -18,6 +18,14 @@ from dodo_dsl.spec.rig import EMULATED
 def is_real(plan: Plan) -> bool:
     """Whether a test runs on hardware, which has a CID of its own."""
     return bool(plan.rig) and plan.rig != EMULATED
+
+
+def refuse_hardware(plan: Plan) -> None:
+    """Raises BackendError for a test without a rig that would move hardware, which nothing leases or checks."""
+    try:
+        refuse_unattended(plan)
+    except RigProblem as problem:
+        raise BackendError(str(problem)) from problem
 
 
 @contextlib.asynccontextmanager

@@ -10,6 +10,7 @@ from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in
 from dodo_dsl.spec import machine as operator
 from dodo_dsl.spec.machine import UNITS, PermittedRig
+from dodo_dsl.spec.rig import EMULATED
 
 LIMIT_FLAGS = {
     "x": "range-x",
@@ -45,6 +46,16 @@ def refuse_test(plan: Plan, roots: Sequence[Path]) -> None:
     devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
     moves = any(service.uses == _GANTRY for service in plan.services)
     refuse_forbidden(devices, limits if moves else dict.fromkeys(LIMIT_FLAGS, 0.0), roots)
+
+
+def refuse_unattended(plan: Plan) -> None:
+    """Raises RigProblem for a test that would move hardware without a rig, which nothing leases or checks."""
+    if plan.rig and plan.rig != EMULATED:
+        return
+    for service in plan.services:
+        port = next((flag.value for flag in service.flags if flag.name == "serial"), EMULATED)
+        if service.uses == _GANTRY and port != EMULATED:
+            raise RigProblem(f"service '{service.name}' would move what is at '{port}', and the test runs on no rig")
 
 
 def _rig_of(device: str, rigs: Iterable[PermittedRig]) -> PermittedRig:
