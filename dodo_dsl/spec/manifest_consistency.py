@@ -12,7 +12,7 @@ RESERVED = ("cid", "help")
 
 _PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
 _NUMBERS = ("number", "integer")
-_TEXTS = ("string", "memory", "message")
+_TEXTS = ("string", "memory", "message", "output")
 _DEFAULTS: dict[str, tuple[type, ...]] = {
     "number": (int, float),
     "integer": (int,),

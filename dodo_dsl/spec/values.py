@@ -16,6 +16,7 @@ Kind = Literal["text", "path", "memory"]
 
 _MEMORY = re.compile(r"/?[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _MESSAGE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", re.ASCII)
+_OUTPUT = re.compile(r"(/tmp/)?[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _MAX_TEXT = 4096
 
 
@@ -148,6 +149,14 @@ def _message(parameter: Parameter, node: Node, _: Path) -> Value:
     return Value(scalar.text)
 
 
+def _output(parameter: Parameter, node: Node, _: Path) -> Value:
+    scalar = _scalar(parameter, node, "a file's name")
+    if not _OUTPUT.fullmatch(scalar.text):
+        message = f"{_name(parameter)} is '{scalar.text[:60]}', expected a file's name without a folder, or one in /tmp"
+        raise ValueProblem(scalar.span, "path-escape", message)
+    return Value(scalar.text)
+
+
 def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     items = node.items if isinstance(node, Sequence) else (node,)
     texts = []
@@ -193,4 +202,5 @@ _CONVERTERS: dict[str, Callable[[Parameter, Node, Path], Value]] = {
     "memory": _memory,
     "message": _message,
     "list": _list,
+    "output": _output,
 }

@@ -19,6 +19,7 @@ _KINDS = {
     "boolean": "true or false",
     "path": "a path",
     "memory": "a name",
+    "output": "a file to write",
 }
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 

@@ -163,6 +163,23 @@ def test_an_earlier_report_is_removed_without_following_symlinks(tmp_path: Path,
     assert not place.exists()
 
 
+@pytest.mark.parametrize("parameter", ["rec", "snapshot"])
+@pytest.mark.parametrize(
+    "name",
+    ["/root/.ssh/authorized_keys", "../a.rec", "/etc/cron.d/a", "/tmp/../etc/a", "a/b", ".bashrc", "", "/dev/null"],
+)
+def test_a_spec_names_no_output_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parameter: str, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [.]\n")
+    values = {"rec": "a.rec", "memories": ["a"], parameter: name}
+    use = {"uses": "rec-recorder", "with": values}
+    (tmp_path / "a.dodo.yml").write_text(f"dodo: 1\nname: a\nenvironment: {json.dumps({'more': use})}\n")
+    _, output = dodo("compile", "--check")
+    assert f"error[path-escape]: parameter '{parameter}' is '{name}', expected a file's name without" in output, output
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can make another user's folder")
 def test_an_empty_folder_of_another_user_stays(tmp_path: Path) -> None:
     (tmp_path / "theirs").mkdir()
