@@ -13,7 +13,7 @@ _FOLDERS = ("/opt", "/srv", "/mnt", "/media", "/data", "/tmp")
 _TO_READ = ("/usr/share", "/usr/local", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
             "/run/udev", "/sys", "/proc")  # fmt: skip
 _TMP = "/tmp"
-"""A test has its own, whatever lies in the host's."""
+"""Nobody keeps repositories there, and a test has its own."""
 _DEVICES = ("/dev", "/sys")
 _HOMES = re.compile(r"/(?:home/[^/]+|root|Users/[^/]+)(?:/|$)")
 _OF_X11 = ".Xauthority"
@@ -55,7 +55,7 @@ class HostPaths:
         if "$" in text or self.is_own(text):
             return "", ""
         path = os.path.realpath(self.whole(text))
-        if path != _TMP and any(_below(str(root), [Path(path)]) for root in self.roots):
+        if not _below(path, [Path(_TMP)]) and any(_below(str(root), [Path(path)]) for root in self.roots):
             return f"'{text}' holds the whole repository and more", _INSIDE
         if not text.startswith(("/", "~")):
             return f"'{text}' {self._where(text)}", _INSIDE
