@@ -12,7 +12,7 @@ from typing import Any
 
 from dodo_dsl import __version__
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.model import Flag, Plan
+from dodo_dsl.plan.model import LAYERS, Flag, Plan
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.run.backends import Containers, Job
 from dodo_dsl.run.runner import Policy, Runner
@@ -49,8 +49,10 @@ class Crate:
         folder = self.bench.folder / "compiled" / plan.slug
         folder.mkdir(parents=True)
         (folder / "test.json").write_text(to_json(plan))
-        (folder / ".env").write_text(f"COMPOSE_PROJECT_NAME={plan.slug}\n")
-        (folder / "docker-compose.yml").write_text(json.dumps(self._compose(plan, app)))
+        (folder / ".env").write_text(f"COMPOSE_PROJECT_NAME={plan.slug}\nCOMPOSE_FILE={LAYERS[0]}.compose.yml\n")
+        for layer in LAYERS:
+            content = self._compose(plan, app) if layer == LAYERS[0] else {"services": {}}
+            (folder / f"{layer}.compose.yml").write_text(json.dumps(content))
         return Job(plan, folder, (report or self.bench.folder / "report") / plan.slug)
 
     def _compose(self, plan: Plan, app: dict[str, Any]) -> dict[str, Any]:
