@@ -20,6 +20,7 @@ from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
 from dodo_dsl.run.application_files import application_paths, env_file_findings, secrets_of
+from dodo_dsl.run.docker.masks import hidden_folders, masks
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.protocol import BackendError
 
@@ -37,6 +38,7 @@ class Compose:
         self.report = report
         self.project = project
         self.services: dict[str, Any] = {}
+        self._volumes: dict[str, Any] = {}
         self._say = say
         self._paths = application_paths(plan.application, folder)
         outside = secret_variables.visible(os.environ, plan.application.access.passed)
@@ -53,7 +55,7 @@ class Compose:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         config = json.loads(out)
         self._refuse(compiled_findings(config, self._test))
-        self.services = config["services"]
+        self.services, self._volumes = config["services"], config.get("volumes") or {}
 
     @property
     def _test(self) -> CompiledTest:
@@ -115,12 +117,16 @@ class Compose:
     async def create(self, subnets: Iterable[str], key: bytes) -> None:
         """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError.
 
-        DoDo's services get the ``key`` by a file of its own, as any variable could be named in the application's file.
+        DoDo's services get the ``key`` by a file of its own, as any variable could be named in the application's file;
+        so do the application's services what hides the tests from them.
         """
         code, problem = 1, "no subnet is free"
         with tempfile.TemporaryDirectory(prefix="dodo-key-") as folder:
             keys = Path(folder) / "keys.compose.json"
-            given = {service.name: {"environment": {KEY_VARIABLE: key.hex()}} for service in self.plan.services}
+            given: dict[str, Any] = {
+                service.name: {"environment": {KEY_VARIABLE: key.hex()}} for service in self.plan.services
+            }
+            given.update(self._masks())
             keys.write_text(json.dumps({"services": given}), encoding="utf-8")
             files = os.pathsep.join([*(f"{layer}.compose.yml" for layer in LAYERS), str(keys)])
             for subnet in subnets:
@@ -131,6 +137,13 @@ class Compose:
                     break
         if code:
             raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
+
+    def _masks(self) -> dict[str, Any]:
+        """What hides the tests from the application's services."""
+        hidden = hidden_folders(self.plan.application, self.folder, self.report)
+        names = [service.name for service in self.plan.application.services if service.name in self.services]
+        found = {name: masks(self.services[name], self._volumes, hidden) for name in names}
+        return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}
 
     async def _run(
         self, *words: str, subnet: str = "", log: Path | None = None, project: str = "", files: str = ""

@@ -1,0 +1,47 @@
+"""What an application's mounts do not show of the tests."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.plan.model import Application
+from dodo_dsl.run.docker.masks import hidden_folders, masks
+
+HIDDEN = [Path("/team/tests"), Path("/team/.git")]
+BOUND = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "/team"}}, "own": {}}
+
+
+@pytest.mark.parametrize(
+    ("volume", "targets"),
+    [
+        ({"type": "bind", "source": "/team", "target": "/app"}, ["/app/tests", "/app/.git"]),
+        ({"type": "bind", "source": "/", "target": "/host"}, ["/host/team/tests", "/host/team/.git"]),
+        ({"type": "bind", "source": "/team/tests", "target": "/t"}, ["/t"]),
+        ({"type": "bind", "source": "/team/tests/truths/a.json", "target": "/a.json"}, ["/a.json"]),
+        ({"type": "bind", "source": "/team/testsuite", "target": "/t"}, []),
+        ({"type": "volume", "source": "bound", "target": "/b"}, ["/b/tests", "/b/.git"]),
+        ({"type": "volume", "source": "own", "target": "/b"}, []),
+        ({"type": "volume", "target": "/b"}, []),
+        ({"type": "tmpfs", "target": "/b"}, []),
+    ],
+)
+def test_what_is_hidden(volume: dict[str, Any], targets: list[str]) -> None:
+    found = masks({"volumes": [volume]}, BOUND, HIDDEN)
+    assert found == [{"type": "tmpfs", "target": target, "read_only": True} for target in targets]
+
+
+def test_folders_of_the_tests(tmp_path: Path) -> None:
+    for name in ("tests", "generated/t", "dodo-report/t", ".git", "maps"):
+        (tmp_path / name).mkdir(parents=True)
+    application = Application("../..", (), hidden=("tests", "gone"))
+    hidden = hidden_folders(application, tmp_path / "generated" / "t", tmp_path / "dodo-report" / "t")
+    assert hidden == [tmp_path / name for name in ("tests", "generated", "dodo-report", ".git")]
+
+
+def test_a_report_elsewhere_needs_no_mask(tmp_path: Path) -> None:
+    (tmp_path / "team" / "generated" / "t").mkdir(parents=True)
+    application = Application("../..", ())
+    assert hidden_folders(application, tmp_path / "team" / "generated" / "t", tmp_path / "report") == [
+        tmp_path / "team" / "generated"
+    ]
