@@ -120,10 +120,14 @@ class Loop:
             self.service.observe(envelope)
 
     def handle(self, envelope: Envelope) -> None:
-        """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored."""
+        """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored.
+
+        Who observes gets one that does not count, too, as if it had never been received: judged again it does not count.
+        """
+        counts = self.members is None or self.members.admits(envelope)
         if not self.clock.relays and self.service.observe is not None:
-            self.service.observe(envelope)
-        if self.members is not None and not self.members.admits(envelope):
+            self.service.observe(envelope if counts else envelope._replace(received=0))
+        if not counts:
             return
         self.service.arrived = self.clock.now() if self.clock.relays else envelope.received
         if envelope.data_type in self._handlers:

@@ -6,8 +6,11 @@ from contextlib import ExitStack
 import pytest
 
 from dodo_dsl.opendlv.bus.session import Session
+from services.base.clock import RealTimeClock
 from services.base.identity.members import Members
 from services.base.identity.senders import VARIABLE, SenderTable
+from services.base.loop import Loop
+from services.base.service import Service
 
 FRAME = "opendlv.sim.Frame"
 KEY = b"a key of this test"
@@ -108,3 +111,28 @@ def test_the_address_of_a_service_that_left_is_nobody_s(enter: Join, capsys: pyt
     pose[1].join()  # as if repeated by who has got its port
     send(pose[0])
     assert admitted(*track) == [False]
+
+
+class Watching(Service):
+    """Takes poses, and observes everything."""
+
+    def __init__(self) -> None:
+        self.taken: list[int] = []
+        self.seen: list[tuple[int, bool]] = []
+        self.inputs = {(FRAME, 0): lambda _message, time: self.taken.append(time)}
+        self.observe = lambda envelope: self.seen.append((envelope.sample_time, envelope.received > 0))
+
+
+def test_what_does_not_count_is_recorded_as_never_received(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
+    pose, (session, members) = enter("pose"), enter("track")
+    admitted(*pose)
+    application = enter("stranger", b"")[0]
+    admitted(session, members)
+    service = Watching()
+    loop = Loop("track", service, session, RealTimeClock(), 0, members)
+    for sender, time in ((pose[0], 1), (application, 2)):
+        sender.send(sender.messages.type(FRAME)(), time)
+        envelope = session.receive(5.0)
+        assert envelope is not None
+        loop.handle(envelope)
+    assert (service.taken, service.seen) == ([1], [(1, True), (2, False)])
