@@ -122,7 +122,7 @@ class Loop:
     def handle(self, envelope: Envelope) -> None:
         """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored.
 
-        Who observes gets one that does not count, too, as if it had never been received: judged again it does not count.
+        Who observes gets one that does not count, too, as if it had never been received, as when it is judged again.
         """
         counts = self.members is None or self.members.admits(envelope)
         if not self.clock.relays and self.service.observe is not None:
