@@ -15,7 +15,11 @@ def flags(example: str, folder: Path) -> list[Flag]:
 
 
 def test_messages_only(tmp_path: Path) -> None:
-    assert flags("", tmp_path) == [Flag("rec", "test.rec", "report"), Flag("cid", "140")]
+    assert flags("", tmp_path) == [
+        Flag("rec", "test.rec", "report"),
+        Flag("commands", "false"),
+        Flag("cid", "140"),
+    ]
 
 
 def test_frames_of_each_camera(tmp_path: Path) -> None:
@@ -25,7 +29,7 @@ environment:
   camera: {uses: virtual-camera, with: {map-path: ../maps/plain, width: 320, height: 240}}
   other: {uses: virtual-camera, with: {name.argb: b.argb, name.i420: /b.i420, width: 640, height: 480}}
 """
-    assert flags(example, tmp_path)[1:3] == [
+    assert flags(example, tmp_path)[2:4] == [
         Flag("frames", "2"),
         Flag("memories", "video0.i420:320x240,b.i420:640x480", "memories"),
     ]
@@ -33,7 +37,7 @@ environment:
 
 def test_a_snapshot_on_a_rig(tmp_path: Path) -> None:
     example = "level: hil\nrig: emulated\nenvironment: {camera: {uses: camera}}\n"
-    assert flags(example, tmp_path)[1:3] == [
+    assert flags(example, tmp_path)[2:4] == [
         Flag("snapshot", "snapshot.png", "report"),
         Flag("memories", "video0.i420:640x480", "memories"),
     ]
@@ -41,4 +45,4 @@ def test_a_snapshot_on_a_rig(tmp_path: Path) -> None:
 
 def test_no_frames_without_cameras(tmp_path: Path) -> None:
     example = "record: {frames: 2 Hz}\nenvironment: {way: {uses: beacon, with: {length: 3 m}}}\n"
-    assert len(flags(example, tmp_path)) == 2
+    assert len(flags(example, tmp_path)) == 3
