@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application.access.secret_variables import holds_secret
+from dodo_dsl.application.access.secret_variables import holds_secret, is_steering
 from dodo_dsl.application.interpolation import dotenv
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar, read
@@ -81,7 +81,7 @@ class ComposeFiles:
     def gather(self, file: Path | None, span: Span) -> None:
         """Adds the variables of an ``.env`` file, if there is one."""
         for name, value in variables_of(file).items() if file else ():
-            if file and holds_secret(name, value):
+            if file and holds_secret(name, value) and not is_steering(name):
                 self.secrets.setdefault(name, file)
             if self.variables.setdefault(name, value) != value:
                 message = (

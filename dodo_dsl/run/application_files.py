@@ -5,6 +5,7 @@ from pathlib import Path
 
 from dodo_dsl.application.access.host_paths import HostPaths, repository
 from dodo_dsl.application.access.model import Finding
+from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.interpolation import dotenv_file, interpolate
 from dodo_dsl.plan.model import Application
 
@@ -19,7 +20,8 @@ def application_paths(application: Application, folder: Path) -> HostPaths:
 def secrets_of(application: Application, folder: Path, outside: Mapping[str, str]) -> dict[str, str]:
     """The secrets of its ``.env`` files that are there, with the variables ``outside`` filled in."""
     files = {path: dotenv_file(folder / path, outside) for path in set(application.secrets.values())}
-    return {name: files[path][name] for name, path in application.secrets.items() if name in files[path]}
+    given = {name: path for name, path in application.secrets.items() if not is_steering(name)}
+    return {name: files[path][name] for name, path in given.items() if name in files[path]}
 
 
 def env_file_findings(application: Application, paths: HostPaths, known: Mapping[str, str]) -> Iterator[Finding]:

@@ -14,7 +14,12 @@ FOLDER = Path("generated/t")
 
 def application(*env_files: str, roots: tuple[str, ...] = ()) -> Application:
     service = ApplicationService("driver", env_files=env_files)
-    secrets = {"API_KEY": "../../team/.env", "GONE_KEY": "../../team/.env", "OLD_KEY": "../../none/.env"}
+    secrets = {
+        "LD_PRELOAD": "../../team/.env",
+        "API_KEY": "../../team/.env",
+        "GONE_KEY": "../../team/.env",
+        "OLD_KEY": "../../none/.env",
+    }
     access = Access(roots=roots, paths=("/etc/ros",))
     return Application("../../team", (service,), secrets=secrets, access=access)
 
@@ -29,7 +34,7 @@ def test_paths(tmp_path: Path) -> None:
 def test_secrets_are_read_where_they_are(tmp_path: Path) -> None:
     (tmp_path / FOLDER).mkdir(parents=True)
     (tmp_path / "team").mkdir()
-    (tmp_path / "team" / ".env").write_text("API_KEY=a-${HOST}\nSPEED=3\n")
+    (tmp_path / "team" / ".env").write_text("API_KEY=a-${HOST}\nSPEED=3\nLD_PRELOAD=evil.so\n")
     assert secrets_of(application(), tmp_path / FOLDER, {"HOST": "here"}) == {"API_KEY": "a-here"}
 
 

@@ -12,6 +12,7 @@ from dodo_dsl.application.access.model import Finding, key_findings
 NETWORKS = ("", "default", "none")
 _SCHEMES = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
 _OURS = "dodo/"
+_REGISTRIES = ("index.docker.io/", "docker.io/")
 _WITHOUT = "is left out of sil and dil tests, which have no hardware"
 
 
@@ -19,7 +20,7 @@ def build_findings(name: str, service: dict[str, Any], paths: HostPaths) -> Iter
     """Files of the host, its network, privileges, and the names of DoDo's own images."""
     build = service["build"]
     image = str(service.get("image") or "")
-    if image.startswith(_OURS):
+    if short_name(image).startswith(_OURS):
         message = f"the image '{image}' of '{name}' would replace one of DoDo's own"
         yield Finding((), message, "give the image another name")
     if isinstance(build, str):
@@ -31,6 +32,16 @@ def build_findings(name: str, service: dict[str, Any], paths: HostPaths) -> Iter
     yield from key_findings(f"the build of '{name}'", BUILD, build)
     yield from _context(build, paths)
     yield from _others(name, build, paths)
+
+
+def short_name(image: str) -> str:
+    """An image's name without tag, digest and the registry that the engine takes by default."""
+    name = image.partition("@")[0]
+    head, sign, tag = name.rpartition(":")
+    name = head if sign and "/" not in tag else name
+    for registry in _REGISTRIES:
+        name = name.removeprefix(registry)
+    return name
 
 
 def _is_remote(text: str) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dodo_dsl.application import host_access
+from dodo_dsl.application.access.build_findings import short_name
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.model import Access, Finding, Steps
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
@@ -54,7 +55,8 @@ def _of_others(name: str, service: Mapping[str, Any], test: CompiledTest) -> Ite
     driver = str((service.get("logging") or {}).get("driver") or "")
     if driver not in _DRIVERS:
         yield Finding(("logging", "driver"), f"DoDo cannot read logs of '{driver}'")
-    if service.get("build") is not None and service.get("image") in test.images:
+    ours = {short_name(image) for image in test.images}
+    if service.get("build") is not None and short_name(str(service.get("image"))) in ours:
         yield Finding(("image",), f"the image '{service['image']}' of '{name}' would replace one of DoDo's own")
 
 

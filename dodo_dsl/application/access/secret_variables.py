@@ -9,6 +9,14 @@ PATTERNS = (
     PIPELINE, "*TOKEN*", "*PASSWORD*", "*SECRET*", "*KEY*",
     "*PASSWD*", "*PASSPHRASE*", "*CREDENTIAL*", "*_PASS", "DOCKER_AUTH_CONFIG",
 )  # fmt: skip
+STEERING = (
+    "PATH", "HOME", "SHELL", "ENV", "IFS", "TMPDIR", "LD_*", "GCONV_PATH", "LOCPATH", "GLIBC_TUNABLES", "MALLOC_*",
+    "GODEBUG", "GOCOVERDIR", "GOTRACEBACK", "RES_OPTIONS", "HOSTALIASES", "BASH_*", "PYTHON*", "XDG_*", "OTEL_*",
+    "GIT_*", "SSH_*", "BUILDX_*", "BUILDKIT_*", "COMPOSE_*", "DODO_*", "DOCKER_HOST", "DOCKER_CONTEXT",
+    "DOCKER_CONFIG", "DOCKER_CERT_PATH", "DOCKER_TLS*", "DOCKER_API_VERSION", "DOCKER_CLI*", "DOCKER_CONTENT_TRUST*",
+    "DOCKER_CUSTOM_HEADERS", "DOCKER_AUTH_CONFIG", "DOCKER_BUILDKIT",
+)  # fmt: skip
+"""What programs of the host, the engine's client and compose read for themselves."""
 _NO_SECRETS = ("DODO_IMAGE_*",)
 _SECRET_VALUE = re.compile(r"://[^/@:\s]+:[^/@\s]+@|-----BEGIN [A-Z ]*PRIVATE KEY")
 
@@ -30,6 +38,11 @@ def holds_secret(name: str, value: str) -> bool:
 
 def _matches(name: str, patterns: Collection[str]) -> bool:
     return any(fnmatchcase(name.upper(), pattern) for pattern in patterns)
+
+
+def is_steering(name: str) -> bool:
+    """Whether a variable of an application could change what DoDo and the engine's client do on the host."""
+    return _matches(name, STEERING)
 
 
 def visible(variables: Mapping[str, str], passed: Collection[str] = ()) -> dict[str, str]:

@@ -4,18 +4,17 @@ from collections.abc import Iterable, Iterator
 
 from dodo_dsl import source
 from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
+from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.compose_files import text_of
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.source import Node, Scalar
-
-_NOT_CARRIED = ("COMPOSE_", "DODO_")
 
 
 def carried(application: ApplicationSource, cid: int, base: str, path_variables: set[str]) -> dict[str, str]:
     """Those that it uses and that are no secrets, with the test's CID, and paths relative to the test."""
     found = {}
     for name in _used(application):
-        if name.startswith(_NOT_CARRIED) or name in application.secrets:
+        if is_steering(name) or name in application.secrets:
             continue
         value = application.variables[name]
         is_path = name in path_variables and (value in (".", "..") or value.startswith(("./", "../")))

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.application.access.build_findings import short_name
 from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.model import Access
@@ -69,6 +70,20 @@ def test_what_is_refused(service: dict[str, Any], places: list[str]) -> None:
 def test_images_of_dodo_are_not_built() -> None:
     places = found({"build": {"context": "/builds/team"}, "image": "dodo/judge:1"})
     assert places == ["services.driver.build", "services.driver.image"]
+
+
+@pytest.mark.parametrize(
+    ("image", "name"),
+    [
+        ("dodo/judge:1", "dodo/judge"),
+        ("docker.io/dodo/judge", "dodo/judge"),
+        ("index.docker.io/dodo/judge@sha256:00", "dodo/judge"),
+        ("host:5000/dodo/judge:1", "host:5000/dodo/judge"),
+        ("host:5000/judge", "host:5000/judge"),
+    ],
+)
+def test_names_of_images(image: str, name: str) -> None:
+    assert short_name(image) == name
 
 
 HARDWARE = {"devices": [{"source": "/dev/ttyACM0"}], "network_mode": "host", "ipc": "host"}

@@ -33,6 +33,18 @@ def test_values_that_hold_secrets() -> None:
     assert not secret_variables.holds_secret("SITE", "https://example.org:8080/a@b")
 
 
+@pytest.mark.parametrize(
+    "name", ["LD_PRELOAD", "DOCKER_HOST", "PATH", "GIT_SSH_COMMAND", "COMPOSE_FILE", "DODO_SUBNET"]
+)
+def test_variables_that_steer_programs(name: str) -> None:
+    assert secret_variables.is_steering(name)
+
+
+@pytest.mark.parametrize("name", ["DOCKER_REGISTRY", "DOCKER_TAG", "CID", "MAPS_PATH", "HTTP_PROXY", "SPEED"])
+def test_variables_that_steer_nothing(name: str) -> None:
+    assert not secret_variables.is_steering(name)
+
+
 def test_what_is_visible() -> None:
     variables = {"A": "1", "A_KEY": "2", "CI_JOB_TOKEN": "3"}
     assert secret_variables.visible(variables) == {"A": "1"}
