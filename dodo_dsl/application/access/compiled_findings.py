@@ -52,7 +52,8 @@ def _of_others(name: str, service: Mapping[str, Any], test: CompiledTest) -> Ite
         mode = str(service.get(key) or "")
         if mode in ("host", "bridge") or host_access.reference(mode)[0] == "container":
             yield Finding((key,), f"'{mode}' of '{name}' is not the test's own")
-    driver = str((service.get("logging") or {}).get("driver") or "")
+    logging = service.get("logging")
+    driver = str(logging.get("driver") or "") if isinstance(logging, dict) else ""
     if driver not in _DRIVERS:
         yield Finding(("logging", "driver"), f"DoDo cannot read logs of '{driver}'")
     ours = {short_name(image) for image in test.images}
