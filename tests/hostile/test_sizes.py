@@ -1,5 +1,6 @@
 """Inputs that unfold to more than a machine has, and floods: each is refused, or ends with who it was."""
 
+import json
 import os
 import struct
 import subprocess
@@ -37,6 +38,7 @@ from services.rec_recorder.traffic import FloodError, Traffic
 from services.virtual_camera.draw import scene
 from services.virtual_camera.image.overlays import load_with_alpha
 from services.virtual_camera.map.json_node import MapError
+from services.virtual_camera.map.map_file import MAX_OVERLAYS, read_map
 from services.virtual_camera.map.meshes import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES, load_obj
 from services.virtual_camera.map.textures import load_picture
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
@@ -125,6 +127,14 @@ def test_what_a_map_takes_in_all_is_limited(monkeypatch: pytest.MonkeyPatch, lim
     monkeypatch.setattr(scene, limit, 10)
     with pytest.raises(MapError, match=f"map.json: more than 10 {what}"):
         scene.load_scene(shipped)
+
+
+def test_overlays_are_counted(tmp_path: Path) -> None:
+    (tmp_path / "a.png").touch()
+    overlay = {"name": "a", "dimension": [1, 1], "textureFile": "a.png", "instances": [[0, 0]] * (MAX_OVERLAYS + 1)}
+    (tmp_path / "map.json").write_text(json.dumps({"overlay": [overlay]}))
+    with pytest.raises(MapError, match=f"{MAX_OVERLAYS + 1} instances of overlays, expected at most {MAX_OVERLAYS}"):
+        read_map(tmp_path)
 
 
 def test_frames_that_a_message_calls_too_large_are_not_decoded(record: Callable[..., Path]) -> None:

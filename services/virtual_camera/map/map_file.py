@@ -7,6 +7,8 @@ from services.virtual_camera.map.json_node import MapError, Node
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
+MAX_OVERLAYS = 50
+"""Places of overlays, each of which takes the memory of a picture."""
 
 Vector3 = tuple[float, float, float]
 Paint = Vector3 | Path
@@ -167,6 +169,7 @@ def read_map(path: Path) -> MapFile:
     _limit(file, "models", sum(len(m.instances) for m in models), MAX_INSTANCES)
     _limit(file, "blocks", sum(len(b.instances) for b in blocks), MAX_BLOCKS)
     overlays = tuple(o for o in map(_overlay, root.items("overlay")) if o)
+    _limit(file, "overlays", sum(len(o.places) for o in overlays), MAX_OVERLAYS)
     return MapFile(file, models, blocks, overlays)
 
 
