@@ -13,6 +13,7 @@ _COMMAND = re.compile(r"^(\s*:)(?=:)", re.MULTILINE)
 """GitHub's: the first characters of a line are two colons."""
 _OLD_COMMAND = re.compile(r"#(?=#(\[|vso\[))")
 """GitHub's old ones and those of Azure Pipelines, anywhere in a line."""
+_LONGEST = len("##vso")
 
 
 def printable(text: str) -> str:
@@ -40,14 +41,20 @@ class HarmlessStream:
         self.unescaped = stream
         self._line = ""
         """The begin of the unfinished line: blanks, and a colon at most."""
+        self._end = ""
+        """The last characters."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.unescaped, name)
 
     def write(self, text: str) -> int:
+        size = len(text)
+        if any(found.start() < len(self._end) for found in _OLD_COMMAND.finditer(self._end + text)):
+            text = f" {text}"
+        self._end = (self._end + text)[-_LONGEST:]
         head, self._line = self._line, _begin_of_last_line(self._line + text)
         self.unescaped.write(harmless(head + text)[len(head) :])
-        return len(text)
+        return size
 
     def writelines(self, lines: Iterable[str]) -> None:
         self.write("".join(lines))

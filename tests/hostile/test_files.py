@@ -15,6 +15,8 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dodo_dsl import atomic
 from dodo_dsl.cli.main import main
@@ -370,6 +372,19 @@ def test_commands_in_pieces_are_none() -> None:
     for part in ("a::b\n", " ", ":", ":error::x\n", "\t:", "ok\n"):
         out.write(part)
     assert stream.getvalue() == "a::b\n : :error::x\n\t:ok\n"
+
+
+PIECES = st.sampled_from(["#", "##", "[", "##[", "vso", "vso[", ":", "::", "::error::", " ", "\t", "\n", "a", "\x1b["])
+
+
+@given(st.lists(PIECES | st.text(max_size=5), max_size=12))
+def test_no_pieces_become_a_command(pieces: list[str]) -> None:
+    stream = StringIO()
+    out = harmless_stream(stream)
+    for piece in pieces:
+        assert out.write(piece) == len(piece)
+    assert not re.search(r"^[ \t]*::|##\[|##vso\[", stream.getvalue(), re.MULTILINE), repr(stream.getvalue())
+    assert all(c.isprintable() or c in "\n\t" for c in stream.getvalue())
 
 
 @pytest.mark.parametrize("attack", ATTACKS)
