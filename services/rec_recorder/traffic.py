@@ -1,9 +1,7 @@
 """The limits of what a test may send, and which messages it is made of."""
 
 import json
-from collections import Counter
 from collections.abc import Callable
-from typing import NamedTuple
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 
@@ -17,11 +15,8 @@ class FloodError(RuntimeError):
     """More is sent than a recording takes; one sentence."""
 
 
-class Kind(NamedTuple):
-    """A message's id and sender stamp; the id is 0 for those that are too many to be told apart."""
-
-    data_type: int
-    sender_stamp: int
+Kind = tuple[int, int]
+"""A message's id and sender stamp; the id is 0 for those that are too many to be told apart."""
 
 
 class Traffic:
@@ -35,17 +30,17 @@ class Traffic:
         self, most_bytes: int, now: Callable[[], int] | None, lost: Callable[[], int], name: Callable[[int], str]
     ) -> None:
         self._most_bytes, self._now, self._lost, self._name = most_bytes, now, lost, name
-        self._bytes: Counter[Kind] = Counter()
-        self._second: Counter[Kind] = Counter()
+        self._bytes: dict[Kind, int] = {}
+        self._second: dict[Kind, int] = {}
         self._begin, self._lost_before = 0, 0
         self._size = self._number = 0
 
     def add(self, envelope: Envelope, size: int) -> None:
         """Takes an envelope of ``size`` bytes before it is written; raises FloodError, and reports it to the runner."""
-        kind = Kind(envelope.data_type, envelope.sender_stamp)
-        if len(self._bytes) >= _MOST_KINDS and kind not in self._bytes:
-            kind = Kind(0, 0)
-        self._bytes[kind] += size
+        kind = (envelope.data_type, envelope.sender_stamp)
+        if kind not in self._bytes and len(self._bytes) >= _MOST_KINDS:
+            kind = (0, 0)
+        self._bytes[kind] = self._bytes.get(kind, 0) + size
         self._size += size
         if self._size > self._most_bytes:
             self._end("size", f"the recording would be larger than {self._most_bytes / 1e6:g} MB", self._bytes)
@@ -57,16 +52,16 @@ class Traffic:
             self._second.clear()
             self._number = 0
             self._begin, self._lost_before = now, self._lost()
-        self._second[kind] += 1
         self._number += 1
-        if self._second[kind] > MOST_OF_A_KIND:
+        count = self._second[kind] = self._second.get(kind, 0) + 1
+        if count > MOST_OF_A_KIND:
             self._end("rate", f"more than {MOST_OF_A_KIND} messages of a kind came within a second", self._second)
         if self._number + self._lost() - self._lost_before > MOST_PER_SECOND:
             self._end("rate", f"more than {MOST_PER_SECOND} messages came within a second", self._second)
 
-    def _end(self, limit: str, what: str, counts: Counter[Kind]) -> None:
-        (kind, most), *_ = counts.most_common(1)
-        message = self._name(kind.data_type) if kind.data_type else "many kinds of messages"
-        facts = {"limit": limit, "what": what, "message": message, "sender": kind.sender_stamp}
-        print(json.dumps({"dodo": "flood", **facts, "share": round(most / counts.total(), 3)}), flush=True)
-        raise FloodError(f"{what}, most of it {message}/{kind.sender_stamp}")
+    def _end(self, limit: str, what: str, counts: dict[Kind, int]) -> None:
+        (id_, stamp), most = max(counts.items(), key=lambda item: item[1])
+        message = self._name(id_) if id_ else "many kinds of messages"
+        facts = {"limit": limit, "what": what, "message": message, "sender": stamp}
+        print(json.dumps({"dodo": "flood", **facts, "share": round(most / sum(counts.values()), 3)}), flush=True)
+        raise FloodError(f"{what}, most of it {message}/{stamp}")
