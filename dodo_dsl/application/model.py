@@ -1,5 +1,6 @@
 """The application as it is written, and the messages that its services declare to produce and to consume."""
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,7 +74,7 @@ class ApplicationSource:
     known: Mapping[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
 
-    @property
+    @functools.cached_property
     def paths(self) -> HostPaths:
         """The host's paths as the application may use them."""
         roots = (*repository(self.folder), *self.other_roots)
