@@ -21,7 +21,7 @@ class WorkFolder:
     kept: bool = False
 
     def __enter__(self) -> Self:
-        self.path.mkdir(mode=0o755)
+        self.path.mkdir(mode=0o700)
         return self
 
     def __exit__(self, *_: object) -> None:
