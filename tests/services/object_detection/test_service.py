@@ -91,8 +91,9 @@ def test_the_verdict_on_the_bus(truth: Path, cid: int, tmp_path: Path) -> None:
     with Session(cid) as session, running("object_detection", tmp_path, *words) as process:
         send(session, "dodo.TestBegin", sample_time=now)
         for frame in range(20):
-            send_detections(session, now + frame * 100_000, YELLOW, BLUE, number=frame)
-            send_detections(session, now + frame * 100_000, ("red", (0, 0, 1, 1)), sender=4)
+            time_us = now + frame * 4_000  # none is of the future, however quickly they come
+            send_detections(session, time_us, YELLOW, BLUE, number=frame)
+            send_detections(session, time_us, ("red", (0, 0, 1, 1)), sender=4)
         send(session, "dodo.EndOfInput", source="recording")
         code, output, errors = finished(process)
     assert (code, errors) == (0, "")
