@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import dataclass
+from pathlib import Path
 
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, parse
 
@@ -59,6 +60,11 @@ class Rig:
                 return None
             node = entry.value
         return entry
+
+
+def is_simulated(port: str) -> bool:
+    """Whether no hardware is at a port: the emulated rig's, or a pseudo-terminal, whose other end is a program."""
+    return port == EMULATED or Path(port).resolve().parent == Path("/dev/pts")
 
 
 @functools.cache

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.spec.rig import EMULATED
+from dodo_dsl.spec.rig import EMULATED, is_simulated
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
@@ -37,7 +37,7 @@ def _devices(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         for argument in service.arguments.values():
             port = argument.value.text if argument.value and argument.parameter.rig == "serial" else EMULATED
-            if port == EMULATED or (rig is not None and port == rig.text("serial")):
+            if is_simulated(port) or (rig is not None and port == rig.text("serial")):
                 continue
             span = argument.entry.value.span if argument.entry else service.use.span
             owner = f"rig '{rig.name}' does not have it" if rig else "the test runs on no rig"

@@ -10,7 +10,7 @@ from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in
 from dodo_dsl.spec import machine as operator
 from dodo_dsl.spec.machine import UNITS, PermittedRig
-from dodo_dsl.spec.rig import EMULATED
+from dodo_dsl.spec.rig import EMULATED, is_simulated
 
 LIMIT_FLAGS = {
     "x": "range-x",
@@ -54,7 +54,7 @@ def refuse_unattended(plan: Plan) -> None:
         return
     for service in plan.services:
         port = next((flag.value for flag in service.flags if flag.name == "serial"), EMULATED)
-        if service.uses == _GANTRY and port != EMULATED:
+        if service.uses == _GANTRY and not is_simulated(port):
             raise RigProblem(f"service '{service.name}' would move what is at '{port}', and the test runs on no rig")
 
 
