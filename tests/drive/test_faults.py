@@ -68,7 +68,7 @@ def words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     service = {
         "image": "x",
         "command": "--cid=111",
-        "environment": ["LD_PRELOAD", "DODO_TEST_NETEM"],
+        "environment": ["LD_PRELOAD", "DODO_TEST_NETEM", "DODO_TEST_CLOCK"],
         "x-dodo": said,
         "x-dodo-process": ["python", str(tmp_path / "blind.py")],
     }
