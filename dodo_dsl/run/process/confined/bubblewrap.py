@@ -18,9 +18,11 @@ _KEPT = ("CAP_SETUID", "CAP_SETGID", "CAP_SETPCAP")
 
 @dataclass(frozen=True)
 class Mounts:
-    """Where the sandbox prepared the application's folder (None: read-only as it is), home and ``/tmp``."""
+    """Where the sandbox prepared the application's folder, home and ``/tmp``."""
 
-    folder: Path | None
+    folder: Path
+    writable: bool
+    """The folder; what is written there goes with the test."""
     home: Path
     tmp: Path
 
@@ -65,8 +67,8 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
         seen += ["--perms", "0755", "--dir", parent]
     for path in read:
         seen += ["--ro-bind-try", path, path]
-    own = ["--bind", str(mounts.folder)] if mounts.folder else ["--ro-bind", confined.folder]
-    seen += [*own, confined.folder, "--bind", str(mounts.home), HOME, "--setenv", "HOME", HOME]
+    seen += ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
+    seen += ["--bind", str(mounts.home), HOME, "--setenv", "HOME", HOME]
     for path in confined.hidden:
         if Path(path).is_dir():
             seen += ["--tmpfs", path, "--remount-ro", path]

@@ -39,7 +39,7 @@ class ConfinedProcess:
         """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
         program = _found(words[0], environment, confined.folder)
         user = user_of(confined.cid) if places else None
-        mounts = bubblewrap.Mounts(places.written(confined.folder), places.home, places.tmp) if places else None
+        mounts = bubblewrap.Mounts(*places.folder(confined.folder), places.home, places.tmp) if places else None
         self._status, status = os.pipe()
         filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)
         try:

@@ -1,13 +1,15 @@
 """What a sandbox prepares once for the application: its view of ``/tmp``, a home, and its folder with writes apart."""
 
-import contextlib
+import errno
 import os
+import stat
 import tempfile
 from pathlib import Path
 
 from dodo_dsl.run.process import namespaces
 
 _SIZE = "size=1g,mode=0755"
+_READABLE = stat.S_IROTH | stat.S_IXOTH
 
 
 class Places:
@@ -21,7 +23,7 @@ class Places:
         self.tmp = self._root / "tmp"
         self.tmp.mkdir()
         namespaces.bind(Path("/tmp"), self.tmp, deep=False)  # without the folders of the host's that are mounted there
-        self._written: dict[str, Path] = {}
+        self._shown: dict[str, tuple[Path, bool]] = {}
 
     def _own(self, name: str) -> Path:
         path = self._root / name
@@ -30,26 +32,36 @@ class Places:
             os.chown(path, self._user, self._user)
         return path
 
-    def _show(self, source: Path, target: Path) -> None:
-        """The folder as the application's own where the kernel can do that, else as it is."""
-        if self._user is not None:
-            with contextlib.suppress(OSError):
-                namespaces.bind_as(source, target, source.stat().st_uid, self._user)
-                return
-        namespaces.bind(source, target, deep=True)
+    def folder(self, folder: str) -> tuple[Path, bool]:
+        """Where an application's folder is shown, the same for all services, and whether it can be written there.
 
-    def written(self, folder: str) -> Path | None:
-        """A copy of a folder on write, the same for all services; None where the kernel cannot mount one."""
-        if folder not in self._written:
-            name = f"folder-{len(self._written)}"
-            lower, merged = self._root / name / "lower", self._root / name / "merged"
-            upper, work = self._own(f"{name}/upper"), self._own(f"{name}/work")
+        What is written goes nowhere else. Raises OSError, also where its user may not read the folder.
+        """
+        if folder not in self._shown:
+            place = self._root / f"folder-{len(self._shown)}"
+            lower, merged = place / "lower", place / "merged"
+            upper, work = self._own(f"{place.name}/upper"), self._own(f"{place.name}/work")
             for path in (lower, merged):
                 path.mkdir()
             self._show(Path(folder), lower)  # whose name needs no escapes
             try:
                 namespaces.overlay(lower, upper, work, merged)
-            except OSError:
-                return None
-            self._written[folder] = merged
-        return self._written[folder]
+            except OSError:  # as some file systems refuse: then it can only be read
+                self._shown[folder] = lower, False
+            else:
+                self._shown[folder] = merged, True
+        return self._shown[folder]
+
+    def _show(self, source: Path, target: Path) -> None:
+        """The folder as the application's own where the kernel can do that, else as it is."""
+        if self._user is None:
+            namespaces.bind(source, target, deep=True)
+            return
+        status = source.stat()
+        try:
+            namespaces.bind_as(source, target, status.st_uid, self._user)
+        except OSError:
+            if status.st_mode & _READABLE != _READABLE:
+                why = "readable for its owner alone, and this kernel cannot show it to the application's user"
+                raise PermissionError(errno.EACCES, why, str(source)) from None
+            namespaces.bind(source, target, deep=True)
