@@ -1,5 +1,6 @@
-"""Files of the application that a compiled test reads where they are: their paths, and the secrets that they hold."""
+"""Files beside a compiled test: those that the application reads, its secrets, and what it never sees."""
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -31,3 +32,17 @@ def env_file_findings(application: Application, paths: HostPaths, known: Mapping
         for item, path in enumerate(service.env_files):
             if problem := paths.file_problem(interpolate(path, variables)):
                 yield Finding(("services", service.name, "env_file", item), problem)
+
+
+def hidden_folders(application: Application, folder: Path, report: Path) -> list[Path]:
+    """Folders with tests, compiled tests, reports and the history of the repository, as far as they are there."""
+    paths = application_paths(application, folder)
+    found = [paths.folder / path for path in application.hidden]
+    found += [path for own in (folder.resolve(), report.resolve()) if (path := _holder(own, paths.folder))]
+    found += [root / ".git" for root in paths.roots]
+    return [Path(os.path.realpath(path)) for path in found if path.is_dir()]
+
+
+def _holder(path: Path, own: Path) -> Path | None:
+    """What to hide of an output: the folder that holds it, if that is still below the application's."""
+    return next((p for p in (path.parent, path) if p != own and p.is_relative_to(own)), None)

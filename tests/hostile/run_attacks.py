@@ -27,10 +27,13 @@ def main(argv: list[str]) -> int:
     own.mkdir()
     (own / "tests").mkdir()
     (own / "tests" / "truth.json").write_text("[]")
+    (own / ".git").mkdir()
+    (own / ".git" / "packed").write_text("truths of all versions")
     (own / "data.txt").write_text("as it was")
     program = Path(shutil.copy(attacks.__file__, own / "attacks.py"))
     (app,) = plan.application.services
     places |= {"tests-in-its-folder": str(own / "tests" / "truth.json"), "results": str(folder / "report")}
+    places["history-of-its-folder"] = str(own / ".git" / "packed")
     service = replace(app, process=("python", str(program)), environment={"ATTACKED": json.dumps(places)})
     application = replace(plan.application, folder="../application", services=(service,), hidden=("tests",))
     os.environ |= {"CI_JOB_TOKEN": "secret", "MY_SECRET": "secret"}

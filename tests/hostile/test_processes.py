@@ -19,7 +19,16 @@ from tests.run.desk import ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("attacks")]
 USER = 12_345
-OF_PLACES = ("repository", "results", "tests-in-its-folder", "state", "neighbour", "compiled", "secret")
+OF_PLACES = (
+    "repository",
+    "history-of-its-folder",
+    "results",
+    "tests-in-its-folder",
+    "state",
+    "neighbour",
+    "compiled",
+    "secret",
+)
 NAMES = sorted({*attacks.ATTACKS, *(f"{verb}-{place}" for place in OF_PLACES for verb in ("read", "write"))})
 
 

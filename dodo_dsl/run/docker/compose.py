@@ -19,8 +19,8 @@ from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
-from dodo_dsl.run.application_files import application_paths, env_file_findings, secrets_of
-from dodo_dsl.run.docker.masks import hidden_folders, masks
+from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
+from dodo_dsl.run.docker.masks import masks
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.protocol import BackendError
 

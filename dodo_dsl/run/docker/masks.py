@@ -5,23 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.plan.model import Application
-from dodo_dsl.run.application_files import application_paths
-
-
-def hidden_folders(application: Application, folder: Path, report: Path) -> list[Path]:
-    """Folders with tests, compiled tests, reports and the history of the repository, as far as they are there."""
-    paths = application_paths(application, folder)
-    found = [paths.folder / path for path in application.hidden]
-    found += [path for own in (folder.resolve(), report.resolve()) if (path := _holder(own, paths.folder))]
-    found += [root / ".git" for root in paths.roots]
-    return [Path(os.path.realpath(path)) for path in found if path.is_dir()]
-
-
-def _holder(path: Path, own: Path) -> Path | None:
-    """What to hide of an output: the folder that holds it, if that is still below the application's."""
-    return next((p for p in (path.parent, path) if p != own and p.is_relative_to(own)), None)
-
 
 def masks(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> list[dict[str, Any]]:
     """The mounts that hide them, as ``docker compose config`` shows the service and the file's ``volumes``."""

@@ -10,6 +10,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import begin_frame
+from dodo_dsl.run.application_files import hidden_folders
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes
@@ -127,10 +128,9 @@ class ProcessBackend:
         """How an application's process is kept apart; None for DoDo's own services."""
         if command.layer != "application" or (self.isolation == "host" and not self.is_apart):
             return None
-        application, outputs = self.plan.application, (self._folder, self.report)
-        return confinement(
-            command.folder, self.isolation, self.cid, application.limits, application.hidden, outputs
-        ).to_json()
+        application = self.plan.application
+        hidden = hidden_folders(application, self._folder, self.report)
+        return confinement(command.folder, self.isolation, self.cid, application.limits, hidden).to_json()
 
     async def next_event(self) -> Event:
         return await self._events.get()

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from dodo_dsl.plan.model import Application
-from dodo_dsl.run.docker.masks import hidden_folders, masks
+from dodo_dsl.run.application_files import hidden_folders
+from dodo_dsl.run.docker.masks import masks
 
 HIDDEN = [Path("/team/tests"), Path("/team/.git")]
 BOUND = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "/team"}}, "own": {}}

@@ -37,19 +37,9 @@ class Confinement:
         return cls(**{**raw, **lists, "limits": limits})
 
 
-def confinement(
-    folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[str], outputs: Iterable[Path]
-) -> Confinement:
-    """The confinement of an application; ``hidden`` are folders below its own, ``outputs`` those that DoDo writes."""
+def confinement(folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
+    """The confinement of an application; of the ``hidden`` folders those matter that lie below its own."""
     reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
-    inside = [
-        *(folder / path for path in hidden),
-        *(path for own in outputs if (path := _below(own.resolve(), folder))),
-    ]
+    inside = [str(path) for path in hidden if path != folder and path.is_relative_to(folder)]
     python = [sys.prefix, sys.base_prefix, str(_PACKAGE)]
-    return Confinement(str(folder), isolation, cid, (*dict.fromkeys([*python, *reads]),), (*map(str, inside),), limits)
-
-
-def _below(path: Path, folder: Path) -> Path | None:
-    """The folder to hide for an output: the one that holds it, if that is still below the application's."""
-    return next((p for p in (path.parent, path) if p != folder and p.is_relative_to(folder)), None)
+    return Confinement(str(folder), isolation, cid, (*dict.fromkeys([*python, *reads]),), (*inside,), limits)

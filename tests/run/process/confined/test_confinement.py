@@ -12,18 +12,14 @@ MOUNTS = Mounts(Path("/tmp/x/folder"), True, Path("/tmp/x/home"), Path("/tmp/x/t
 
 def test_paths_are_relative_to_its_folder_and_the_interpreter_is_there(tmp_path: Path) -> None:
     limits = SandboxLimits(reads=("../models", "/srv/ros"))
-    reads = confinement(tmp_path / "app", "network", 130, limits, (), ()).reads
+    reads = confinement(tmp_path / "app", "network", 130, limits, ()).reads
     assert {sys.prefix, sys.base_prefix, str(tmp_path / "models"), "/srv/ros"} <= set(reads)
 
 
-def test_tests_and_outputs_in_its_folder_are_hidden(tmp_path: Path) -> None:
-    outputs = (tmp_path / "generated" / "sil", tmp_path / "report" / "sil", tmp_path.parent / "elsewhere" / "sil")
-    found = confinement(tmp_path, "network", 130, SandboxLimits(), ("tests",), outputs)
-    assert found.hidden == tuple(str(tmp_path / name) for name in ("tests", "generated", "report"))
-
-
-def test_an_output_beside_it_hides_nothing_of_it(tmp_path: Path) -> None:
-    assert confinement(tmp_path, "network", 130, SandboxLimits(), (), (tmp_path,)).hidden == ()
+def test_what_is_hidden_lies_in_its_folder(tmp_path: Path) -> None:
+    hidden = (tmp_path / "tests", tmp_path / ".git", tmp_path, tmp_path.parent / "elsewhere")
+    found = confinement(tmp_path, "network", 130, SandboxLimits(), hidden)
+    assert found.hidden == (str(tmp_path / "tests"), str(tmp_path / ".git"))
 
 
 def test_it_goes_to_the_sandbox_and_back() -> None:
