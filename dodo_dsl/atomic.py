@@ -20,14 +20,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from dodo_dsl.opendlv.regular_file import kind_of
+
 _KERNELS = (Path("/dev"), Path("/proc"), Path("/sys"))
 _MEMORY = Path("/dev/shm")
-_KINDS = {
-    stat.S_ISCHR: "a device",
-    stat.S_ISBLK: "a device",
-    stat.S_ISFIFO: "a FIFO",
-    stat.S_ISSOCK: "a socket",
-}
 _MOST_NAME = 40
 """Characters of the target's name in a temporary one, which with the rest stays below the 255 bytes of a name."""
 
@@ -50,8 +46,7 @@ def refuse_others(path: Path) -> None:
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
         if not stat.S_ISREG(mode):
-            kind = next((text for is_kind, text in _KINDS.items() if is_kind(mode)), "no file")
-            raise NotReplaceable(errno.EINVAL, f"{kind}, which no output replaces", str(path))
+            raise NotReplaceable(errno.EINVAL, f"{kind_of(mode)}, which no output replaces", str(path))
 
 
 @contextmanager

@@ -29,8 +29,12 @@ def opened(path: Path) -> io.FileIO:
     os.close(descriptor)
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    kind = next((text for is_kind, text in _KINDS.items() if is_kind(mode)), "no file")
-    raise NotAFile(errno.EINVAL, f"{kind}, expected a file", str(path))
+    raise NotAFile(errno.EINVAL, f"{kind_of(mode)}, expected a file", str(path))
+
+
+def kind_of(mode: int) -> str:
+    """What a mode that is no regular file's and no folder's stands for, such as ``a FIFO``."""
+    return next((text for is_kind, text in _KINDS.items() if is_kind(mode)), "no file")
 
 
 def content(path: Path, most: int = MOST_BYTES) -> bytes:
