@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.drive.applications import ROOT, dodo, results
 
 pytestmark = pytest.mark.realtime
@@ -32,16 +31,12 @@ def good_drives(report: Path) -> None:
 
 
 def test_they_pass_at_once_in_real_time(tmp_path: Path) -> None:
-    if why := namespaces_refusal():
-        pytest.skip(f"no namespaces here: {why}")
     dodo("run", *BOTH, "--clock", "realtime", "-j", "2", "--report", str(tmp_path), code=0)
     good_drives(tmp_path)
 
 
 def test_they_pass_at_once_on_the_host_and_leave_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Shared memory and semaphores of the host, which this run has for itself, and token files are gone at the end."""
-    if why := namespaces_refusal():
-        pytest.skip(f"no namespaces here: {why}")
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
     words = [*BOTH, "--isolation", "host", "-j", "2", "--report", str(tmp_path / "report")]
     own = ["unshare", "--ipc", *(() if os.getuid() == 0 else ("--user", "--map-root-user"))]

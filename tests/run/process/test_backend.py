@@ -11,7 +11,6 @@ import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run import engine
-from dodo_dsl.run.process.host_isolation import namespaces_refusal
 from tests.run.desk import processes_with
 from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
 
@@ -27,8 +26,6 @@ def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 @pytest.fixture(params=["network", "host"])
 def bench(request: pytest.FixtureRequest, host: Bench) -> Bench:
-    if request.param == "network" and (why := namespaces_refusal()):
-        pytest.skip(f"no namespaces here: {why}")
     host.isolation = request.param
     return host
 
