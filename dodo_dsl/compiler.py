@@ -16,7 +16,7 @@ from dodo_dsl.emit.output_folder import pipeline_folder
 from dodo_dsl.emit.pipeline import pipeline_problems
 from dodo_dsl.emit.render import File, render_pipeline
 from dodo_dsl.plan.build import Compiled, build
-from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec, load_spec
 from dodo_dsl.spec.registry import locate

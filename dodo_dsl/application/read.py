@@ -9,7 +9,7 @@ from typing import Any
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.access import filled, secret_problems
-from dodo_dsl.application.access.diagnostics import diagnostic
+from dodo_dsl.application.access.access_diagnostics import diagnostic
 from dodo_dsl.application.access.filled import known_variables
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.access.shared_findings import shared_findings

@@ -8,7 +8,7 @@ from typing import Any
 from dodo_dsl import source
 from dodo_dsl.application import host_access, opendlv_flags
 from dodo_dsl.application.access import filled
-from dodo_dsl.application.access.diagnostics import diagnostic, place
+from dodo_dsl.application.access.access_diagnostics import diagnostic, place
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, plain
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean

@@ -21,7 +21,7 @@ from dodo_dsl.check.rules import (
     services,
 )
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
 

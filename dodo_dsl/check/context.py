@@ -12,10 +12,10 @@ from dodo_dsl.check.wiring import Wiring
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv.odvd import STANDARD, parser
 from dodo_dsl.spec.arguments import ResolvedService
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import Rig
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check.wiring import Wiring, wire
 from dodo_dsl.spec.arguments import Argument, ResolvedService, resolved
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import Rig
 
 
 @dataclass(frozen=True)

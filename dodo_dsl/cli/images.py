@@ -10,7 +10,7 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.images import build_context, docker_command, wheels
 from dodo_dsl.images.names import Image, choose, known
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
 EXAMPLES = """examples:

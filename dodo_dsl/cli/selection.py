@@ -9,7 +9,7 @@ from pathlib import Path
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, format_text, has_errors
-from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.settings import Settings

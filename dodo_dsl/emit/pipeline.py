@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.plan.model import Plan, Suite
+from dodo_dsl.spec.deployment.rig import EMULATED
 from dodo_dsl.spec.model import LEVELS
-from dodo_dsl.spec.rig import EMULATED
 
 CHILD = "child.gitlab-ci.yml"
 RULE = "pipeline-limit"

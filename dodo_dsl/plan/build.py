@@ -18,11 +18,11 @@ from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, 
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
 from dodo_dsl.spec.arguments import Argument, ResolvedService
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.spec.deployment.rig import EMULATED_FILE, Rig
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import EMULATED_FILE, Rig
-from dodo_dsl.spec.sandbox import SandboxLimits
 from dodo_dsl.spec.settings import Settings
 from dodo_dsl.spec.values import Value
 

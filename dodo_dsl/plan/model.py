@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.spec import model as spec_model
-from dodo_dsl.spec.sandbox import SandboxLimits
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0

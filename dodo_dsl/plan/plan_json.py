@@ -20,9 +20,9 @@ from dodo_dsl.plan.model import (
     PlannedService,
     is_device,
 )
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS
-from dodo_dsl.spec.sandbox import SandboxLimits
 from dodo_dsl.spec.settings import Settings
 
 FORMAT = 1

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.application.access.host_paths import HostPaths, repository
-from dodo_dsl.application.access.model import Finding
+from dodo_dsl.application.access.model import AccessFinding
 from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.interpolation import dotenv_file, interpolate
 from dodo_dsl.plan.model import Application
@@ -25,13 +25,13 @@ def secrets_of(application: Application, folder: Path, outside: Mapping[str, str
     return {name: files[path][name] for name, path in given.items() if name in files[path]}
 
 
-def env_file_findings(application: Application, paths: HostPaths, known: Mapping[str, str]) -> Iterator[Finding]:
+def env_file_findings(application: Application, paths: HostPaths, known: Mapping[str, str]) -> Iterator[AccessFinding]:
     """Files of ``env_file`` that are not the application's; raises EnvironmentProblem for a variable without value."""
     variables = {**application.variables, **dotenv_file(paths.folder / ".env", known), **known}
     for service in application.services:
         for item, path in enumerate(service.env_files):
             if problem := paths.file_problem(interpolate(path, variables)):
-                yield Finding(("services", service.name, "env_file", item), problem)
+                yield AccessFinding(("services", service.name, "env_file", item), problem)
 
 
 def hidden_folders(application: Application, folder: Path, report: Path) -> list[Path]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.spec.machine import machine
+from dodo_dsl.spec.deployment.machine import machine
 from dodo_dsl.state_folder import secured
 
 FOLDER_VARIABLE = "DODO_LEASES"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.spec.sandbox import SandboxLimits
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from tests.run.desk import gone, processes_with
 from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
 

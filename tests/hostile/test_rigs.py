@@ -21,7 +21,7 @@ from dodo_dsl.run.rigs.devices import identity, key
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import device_leases
 from dodo_dsl.spec import machine as operator
-from dodo_dsl.spec.machine import MachineError, machine
+from dodo_dsl.spec.deployment.machine import MachineError, machine
 from services.base.flags import parse
 from services.beacon.table import read_points
 from services.beacon.table import read_table as read_points_table

@@ -7,7 +7,7 @@ from typing import Any
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access.compose_keys import BUILD
 from dodo_dsl.application.access.host_paths import ASK, HostPaths
-from dodo_dsl.application.access.model import Finding, key_findings
+from dodo_dsl.application.access.model import AccessFinding, key_findings
 
 NETWORKS = ("", "default", "none")
 _SCHEMES = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
@@ -16,16 +16,16 @@ _REGISTRIES = ("index.docker.io/", "docker.io/")
 _WITHOUT = "is left out of sil and dil tests, which have no hardware"
 
 
-def build_findings(name: str, service: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+def build_findings(name: str, service: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     """Files of the host, its network, privileges, and the names of DoDo's own images."""
     build = service["build"]
     image = str(service.get("image") or "")
     if short_name(image).startswith(_OURS):
         message = f"the image '{image}' of '{name}' would replace one of DoDo's own"
-        yield Finding((), message, "give the image another name")
+        yield AccessFinding((), message, "give the image another name")
     if isinstance(build, str):
         build = {"context": build}
-        yield from (Finding((), f.message, f.hint, f.kind) for f in _context(build, paths))
+        yield from (AccessFinding((), f.message, f.hint, f.kind) for f in _context(build, paths))
         return
     if not isinstance(build, dict):
         return
@@ -48,17 +48,17 @@ def _is_remote(text: str) -> bool:
     return text.startswith(_SCHEMES)
 
 
-def _context(build: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+def _context(build: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     context = build.get("context")
     context = context if isinstance(context, str) and context else "."
     if _is_remote(context) or "$" in context:
         return
     if problem := _folder_problem(context, paths):
-        yield Finding(("context",), problem, ASK)
+        yield AccessFinding(("context",), problem, ASK)
         return
     file = build.get("dockerfile")
     if isinstance(file, str) and file and (problem := paths.file_problem(posixpath.join(context, file), file)):
-        yield Finding(("dockerfile",), problem, ASK)
+        yield AccessFinding(("dockerfile",), problem, ASK)
 
 
 def _folder_problem(text: str, paths: HostPaths) -> str:
@@ -67,20 +67,20 @@ def _folder_problem(text: str, paths: HostPaths) -> str:
     return paths.file_problem(text)
 
 
-def _others(name: str, build: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+def _others(name: str, build: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     contexts = build.get("additional_contexts")
     for step, text in _pairs(contexts):
         if text and not _is_remote(text) and "$" not in text and (problem := _folder_problem(text, paths)):
-            yield Finding(("additional_contexts", step), problem, ASK)
+            yield AccessFinding(("additional_contexts", step), problem, ASK)
     for step, text in _pairs(build.get("ssh")):
         if text and (problem := paths.file_problem(text)):
-            yield Finding(("ssh", step), problem, ASK)
+            yield AccessFinding(("ssh", step), problem, ASK)
     network = str(build.get("network") or "")
     if "$" not in network and network not in NETWORKS:
         message = f"a build of '{name}' on the network '{network}' reaches services of the host"
-        yield Finding(("network",), message, "remove it")
+        yield AccessFinding(("network",), message, "remove it")
     if host_access.is_true(build.get("privileged", False)):
-        yield Finding(("privileged",), f"'privileged' of the build of '{name}' {_WITHOUT}", kind="privilege")
+        yield AccessFinding(("privileged",), f"'privileged' of the build of '{name}' {_WITHOUT}", kind="privilege")
 
 
 def _pairs(written: Any) -> Iterator[tuple[str | int, str]]:

@@ -7,7 +7,7 @@ from typing import Any
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access.build_findings import short_name
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.model import Access, Finding, Steps
+from dodo_dsl.application.access.model import Access, AccessFinding, Steps
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
 from dodo_dsl.application.access.shared_findings import shared_findings
 
@@ -27,7 +27,7 @@ class CompiledTest:
     paths: HostPaths
 
 
-def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator[Finding]:
+def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator[AccessFinding]:
     """Findings in what ``docker compose config --format json`` prints, each of which refuses the test."""
     rest = {key: value for key, value in config.items() if key != _SERVICES}
     yield from shared_findings(rest, test.paths, test.access.passed)
@@ -37,28 +37,28 @@ def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator
             found = [*service_findings(name, service, around), *_of_others(name, service, test)]
             yield from (f.below(_SERVICES, name) for f in found if not _is_allowed(f, test.access))
         elif name not in test.own:
-            yield Finding((_SERVICES, name), f"the test has no service '{name}'")
+            yield AccessFinding((_SERVICES, name), f"the test has no service '{name}'")
 
 
-def _is_allowed(finding: Finding, access: Access) -> bool:
+def _is_allowed(finding: AccessFinding, access: Access) -> bool:
     if finding.kind == "hardware":
         return access.devices
     return finding.kind in ("privilege", "left out") and access.devices and access.privileged
 
 
-def _of_others(name: str, service: Mapping[str, Any], test: CompiledTest) -> Iterator[Finding]:
+def _of_others(name: str, service: Mapping[str, Any], test: CompiledTest) -> Iterator[AccessFinding]:
     """What the copy has otherwise: the test's own network and memory, and logs that DoDo reads."""
     for key in ("network_mode", "ipc") if test.own_network else ():
         mode = str(service.get(key) or "")
         if mode in ("host", "bridge") or host_access.reference(mode)[0] == "container":
-            yield Finding((key,), f"'{mode}' of '{name}' is not the test's own")
+            yield AccessFinding((key,), f"'{mode}' of '{name}' is not the test's own")
     logging = service.get("logging")
     driver = str(logging.get("driver") or "") if isinstance(logging, dict) else ""
     if driver not in _DRIVERS:
-        yield Finding(("logging", "driver"), f"DoDo cannot read logs of '{driver}'")
+        yield AccessFinding(("logging", "driver"), f"DoDo cannot read logs of '{driver}'")
     ours = {short_name(image) for image in test.images}
     if service.get("build") is not None and short_name(str(service.get("image"))) in ours:
-        yield Finding(("image",), f"the image '{service['image']}' of '{name}' would replace one of DoDo's own")
+        yield AccessFinding(("image",), f"the image '{service['image']}' of '{name}' would replace one of DoDo's own")
 
 
 def shown(steps: Steps) -> str:

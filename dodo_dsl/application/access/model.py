@@ -29,7 +29,7 @@ class Access:
 
 
 @dataclass(frozen=True)
-class Finding:
+class AccessFinding:
     """A key or value that a test may not have; ``steps`` lead to it from where the search began.
 
     ``hardware`` and ``privilege`` stay on rigs that allow them; they and what is ``left out`` are not in the copy.
@@ -40,20 +40,20 @@ class Finding:
     hint: str = ""
     kind: Kind = "refused"
 
-    def below(self, *steps: str | int) -> "Finding":
-        return Finding((*steps, *self.steps), self.message, self.hint, self.kind)
+    def below(self, *steps: str | int) -> "AccessFinding":
+        return AccessFinding((*steps, *self.steps), self.message, self.hint, self.kind)
 
 
-def key_findings(what: str, rows: Rows, written: Mapping[str, Any], compiled: bool = False) -> Iterator[Finding]:
+def key_findings(what: str, rows: Rows, written: Mapping[str, Any], compiled: bool = False) -> Iterator[AccessFinding]:
     """Keys without a row, and those that are refused; in a ``compiled`` file also those that are removed."""
     for key, value in written.items():
         if str(key).startswith("x-"):
             continue
         if key not in rows:
-            yield Finding((key,), f"unknown key '{key}' in {what}", did_you_mean(str(key), rows), "unknown")
+            yield AccessFinding((key,), f"unknown key '{key}' in {what}", did_you_mean(str(key), rows), "unknown")
             continue
         treatment, why = rows[key]
         if value in (None, False, "", "false", [], {}):
             continue
         if treatment == "refused" or (compiled and treatment == "removed"):
-            yield Finding((key,), f"'{key}' of {what} cannot be isolated: {why}", "remove it")
+            yield AccessFinding((key,), f"'{key}' of {what} cannot be isolated: {why}", "remove it")

@@ -6,7 +6,7 @@ from typing import Any
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access.compose_keys import MOUNT
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.model import Finding, Steps, key_findings
+from dodo_dsl.application.access.model import AccessFinding, Steps, key_findings
 from dodo_dsl.application.compose_paths import is_path
 
 TYPES = ("bind", "volume", "tmpfs", "image")
@@ -17,7 +17,7 @@ _WITHOUT = "is left out of sil and dil tests, which have no hardware"
 
 def mount_findings(
     name: str, service: Mapping[str, Any], paths: HostPaths, volumes: Mapping[str, Any]
-) -> Iterator[Finding]:
+) -> Iterator[AccessFinding]:
     """Mounts of the host, of its hardware, and of ``volumes`` that others use, too."""
     written = service.get("volumes")
     for item, volume in enumerate(written if isinstance(written, list) else ()):
@@ -32,7 +32,7 @@ def mount_findings(
         about = volumes.get(found.source)
         if host_access.is_external(about) and not found.read_only:
             hint = "mount it read-only (:ro), or remove 'external', so that compose creates it"
-            yield Finding(steps, f"volume '{found.source}' is external, so tests would share it", hint)
+            yield AccessFinding(steps, f"volume '{found.source}' is external, so tests would share it", hint)
 
 
 def _is_bind(volume: Any, source: str) -> bool:
@@ -41,7 +41,7 @@ def _is_bind(volume: Any, source: str) -> bool:
     return is_path(source)
 
 
-def _bind(name: str, found: host_access.Mount, paths: HostPaths) -> Iterator[Finding]:
+def _bind(name: str, found: host_access.Mount, paths: HostPaths) -> Iterator[AccessFinding]:
     problem, hint = "", ""
     seen = host_access.Mount(paths.whole(found.source), found.target, found.read_only)
     if "$" in found.source:
@@ -51,20 +51,20 @@ def _bind(name: str, found: host_access.Mount, paths: HostPaths) -> Iterator[Fin
     elif host_access.is_of_machine(seen.source):
         problem, hint = f"'{found.source}' gives access to the host's disks or memory", "remove it"
     elif host_access.is_hardware(seen) and found.source.startswith("/"):
-        yield Finding((), f"'{found.source}' of '{name}' {_WITHOUT}", kind="hardware")
+        yield AccessFinding((), f"'{found.source}' of '{name}' {_WITHOUT}", kind="hardware")
     else:
         problem, hint = paths.mount_problem(found.source, found.read_only)
     if problem:
-        yield Finding((), problem, hint)
+        yield AccessFinding((), problem, hint)
 
 
-def _long_form(name: str, volume: dict[str, Any]) -> Iterator[Finding]:
+def _long_form(name: str, volume: dict[str, Any]) -> Iterator[AccessFinding]:
     yield from key_findings(f"a mount of '{name}'", MOUNT, volume)
     kind = str(volume.get("type", ""))
     if kind and "$" not in kind and kind not in TYPES:
-        yield Finding(("type",), f"mounts of type '{kind}' cannot be isolated", f"use one of {', '.join(TYPES)}")
+        yield AccessFinding(("type",), f"mounts of type '{kind}' cannot be isolated", f"use one of {', '.join(TYPES)}")
     bind = volume.get("bind")
     propagation = str(bind.get("propagation") or "") if isinstance(bind, dict) else ""
     if propagation not in PRIVATE and "$" not in propagation:
         message = f"propagation '{propagation}' lets mounts in and out of the container"
-        yield Finding(("bind", "propagation"), message, "remove it")
+        yield AccessFinding(("bind", "propagation"), message, "remove it")

@@ -9,7 +9,7 @@ from dodo_dsl.application import host_access
 from dodo_dsl.application.access.build_findings import build_findings
 from dodo_dsl.application.access.compose_keys import SERVICE
 from dodo_dsl.application.access.host_paths import ASK, HostPaths
-from dodo_dsl.application.access.model import Finding, key_findings
+from dodo_dsl.application.access.model import AccessFinding, key_findings
 from dodo_dsl.application.access.mount_findings import mount_findings
 
 PROFILE_HINT = "give the service a profile, so that it starts with 'docker compose --profile' and not in a test"
@@ -32,7 +32,7 @@ class Surroundings:
     compiled: bool = False
 
 
-def service_findings(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[Finding]:
+def service_findings(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
     """Everything that ``service`` may not have; ``name`` is how messages call it."""
     yield from key_findings(f"'{name}'", _WITHOUT_SPECIAL, service, around.compiled)
     yield from _namespaces(service, around)
@@ -52,76 +52,78 @@ _WITHOUT_SPECIAL = {key: row for key, row in SERVICE.items() if key not in ("use
 }
 
 
-def _namespaces(service: dict[str, Any], around: Surroundings) -> Iterator[Finding]:
+def _namespaces(service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
     for key in host_access.NAMESPACES:
         kind, name = host_access.reference(service.get(key))
         if kind == "container" and name not in around.containers:
-            yield Finding((key,), f"'{key}' joins the container '{name}', which is not part of the application")
+            yield AccessFinding((key,), f"'{key}' joins the container '{name}', which is not part of the application")
     if service.get("pid") == "host":
-        yield Finding(("pid",), "'pid: host' gives access to the processes of all tests", "remove it")
+        yield AccessFinding(("pid",), "'pid: host' gives access to the processes of all tests", "remove it")
     if host_access.is_true(service.get("use_api_socket", False)):
-        yield Finding(("use_api_socket",), "'use_api_socket' gives access to the Docker engine", PROFILE_HINT)
+        yield AccessFinding(("use_api_socket",), "'use_api_socket' gives access to the Docker engine", PROFILE_HINT)
     runtime = str(service.get("runtime") or "")
     if runtime and "$" not in runtime and runtime not in RUNTIMES:
         message = f"the runtime '{runtime}' may not isolate the container"
-        yield Finding(("runtime",), message, f"remove it, or use one of {', '.join(RUNTIMES)}")
+        yield AccessFinding(("runtime",), message, f"remove it, or use one of {', '.join(RUNTIMES)}")
 
 
-def _strangers(service: dict[str, Any], around: Surroundings) -> Iterator[Finding]:
+def _strangers(service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
     for item, link in enumerate(_items(service.get("external_links"))):
         message = f"'{link}' is a container outside the application"
-        yield Finding(("external_links", item), message, "make it a service of the application")
+        yield AccessFinding(("external_links", item), message, "make it a service of the application")
     for item, entry in enumerate(_items(service.get("volumes_from"))):
         kind, name, _ = host_access.borrowed(entry)
         if kind == "container" and name not in around.containers:
             message = f"the container '{name}' is not part of the application"
-            yield Finding(("volumes_from", item), message, "make it a service of the application")
+            yield AccessFinding(("volumes_from", item), message, "make it a service of the application")
 
 
-def _files(service: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+def _files(service: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     written = service.get("env_file")
     for item, entry in enumerate(_items(written)):
         path = entry.get("path") if isinstance(entry, dict) else entry
         if isinstance(path, str) and (problem := paths.file_problem(path)):
             steps = ("env_file", item, "path") if isinstance(entry, dict) else ("env_file", item)
-            yield Finding(steps, problem, ASK)
+            yield AccessFinding(steps, problem, ASK)
 
 
-def _hardware(name: str, service: dict[str, Any]) -> Iterator[Finding]:
+def _hardware(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
     if host_access.is_true(service.get("privileged", False)):
-        yield Finding(("privileged",), f"'privileged' of '{name}' {_WITHOUT}", kind="privilege")
+        yield AccessFinding(("privileged",), f"'privileged' of '{name}' {_WITHOUT}", kind="privilege")
     for item, word in enumerate(_items(service.get("devices"))):
         shown = word.get("source") if isinstance(word, dict) else word
         steps = ("devices", item, "source") if isinstance(word, dict) else ("devices", item)
         if host_access.is_of_machine(shown):
             message = f"device '{shown}' gives access to the host's disks or memory"
-            yield Finding(steps, message, "remove it")
+            yield AccessFinding(steps, message, "remove it")
         else:
-            yield Finding(steps, f"device '{shown}' of '{name}' {_WITHOUT}", kind="hardware")
+            yield AccessFinding(steps, f"device '{shown}' of '{name}' {_WITHOUT}", kind="hardware")
     for item, word in enumerate(_items(service.get("device_cgroup_rules"))):
         if "$" in str(word) or _RULE_OF_CHARACTERS.fullmatch(str(word)):
-            yield Finding(("device_cgroup_rules", item), f"device '{word}' of '{name}' {_WITHOUT}", kind="hardware")
+            yield AccessFinding(
+                ("device_cgroup_rules", item), f"device '{word}' of '{name}' {_WITHOUT}", kind="hardware"
+            )
         else:
             message = f"the rule '{word}' gives access to the host's disks"
-            yield Finding(("device_cgroup_rules", item), message, "name character devices, for example c 81:* rw")
+            yield AccessFinding(("device_cgroup_rules", item), message, "name character devices, for example c 81:* rw")
     for item, word in enumerate(_items(service.get("cap_add"))):
         if not host_access.is_harmless_capability(word):
-            yield Finding(("cap_add", item), f"capability '{word}' of '{name}' {_WITHOUT}", kind="privilege")
+            yield AccessFinding(("cap_add", item), f"capability '{word}' of '{name}' {_WITHOUT}", kind="privilege")
 
 
-def _confinement(name: str, service: dict[str, Any]) -> Iterator[Finding]:
+def _confinement(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
     for item, word in enumerate(_items(service.get("security_opt"))):
         if not host_access.is_confining(word):
             message = f"'{word}' of '{name}' is left out, the engine's own confinement stays"
-            yield Finding(("security_opt", item), message, kind="left out")
+            yield AccessFinding(("security_opt", item), message, kind="left out")
 
 
-def _hooks(name: str, service: dict[str, Any]) -> Iterator[Finding]:
+def _hooks(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
     for key in HOOKS:
         for item, hook in enumerate(_items(service.get(key))):
             if isinstance(hook, dict) and host_access.is_true(hook.get("privileged", False)):
                 message = f"a privileged '{key}' of '{name}' reaches the host"
-                yield Finding((key, item, "privileged"), message, "remove it")
+                yield AccessFinding((key, item, "privileged"), message, "remove it")
 
 
 def _items(written: Any) -> list[Any]:

@@ -8,7 +8,7 @@ from dodo_dsl.application import host_access
 from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compose_keys import CONFIG, NETWORK, SECRET, TOP, VOLUME, Rows
 from dodo_dsl.application.access.host_paths import ASK, HostPaths
-from dodo_dsl.application.access.model import Finding, key_findings
+from dodo_dsl.application.access.model import AccessFinding, key_findings
 
 _TABLES: dict[str, tuple[str, Rows]] = {
     "volumes": ("the volume", VOLUME),
@@ -22,7 +22,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _OURS = "dodo-"
 
 
-def shared_findings(document: Mapping[str, Any], paths: HostPaths, passed: Collection[str]) -> Iterator[Finding]:
+def shared_findings(document: Mapping[str, Any], paths: HostPaths, passed: Collection[str]) -> Iterator[AccessFinding]:
     """Everything beside the services, in a mapping of the file's other keys."""
     yield from key_findings("the compose file", TOP, document)
     for key, (what, rows) in _TABLES.items():
@@ -33,7 +33,9 @@ def shared_findings(document: Mapping[str, Any], paths: HostPaths, passed: Colle
                 yield from (f.below(key, name) for f in _values(key, name, about, paths, passed))
 
 
-def _values(key: str, name: str, about: dict[str, Any], paths: HostPaths, passed: Collection[str]) -> Iterator[Finding]:
+def _values(
+    key: str, name: str, about: dict[str, Any], paths: HostPaths, passed: Collection[str]
+) -> Iterator[AccessFinding]:
     if key == "volumes":
         yield from _volume(name, about, paths)
     elif key in ("secrets", "configs"):
@@ -42,32 +44,32 @@ def _values(key: str, name: str, about: dict[str, Any], paths: HostPaths, passed
 
 def _content(
     what: str, name: str, about: dict[str, Any], paths: HostPaths, passed: Collection[str]
-) -> Iterator[Finding]:
+) -> Iterator[AccessFinding]:
     file = about.get("file")
     if isinstance(file, str) and (problem := paths.file_problem(file)):
-        yield Finding(("file",), problem, ASK)
+        yield AccessFinding(("file",), problem, ASK)
     variable = about.get("environment")
     if isinstance(variable, str) and secret_variables.is_of_pipeline(variable) and variable not in passed:
         message = f"the {what} '{name}' is '{variable}', which belongs to the pipeline and not to the application"
-        yield Finding(("environment",), message, f"to allow it, write environment: [{variable}] in dodo.yml")
+        yield AccessFinding(("environment",), message, f"to allow it, write environment: [{variable}] in dodo.yml")
 
 
-def _volume(name: str, about: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+def _volume(name: str, about: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     driver = str(about.get("driver") or "local")
     if driver != "local" and "$" not in driver:
         message = f"the driver '{driver}' of the volume '{name}' reaches beyond the test"
-        yield Finding(("driver",), message, "remove it, so that the engine makes a volume of its own")
+        yield AccessFinding(("driver",), message, "remove it, so that the engine makes a volume of its own")
     external = about.get("external")
     called = str((external.get("name") if isinstance(external, dict) else about.get("name")) or name)
     is_ours = host_access.is_external(about) and called.startswith(_OURS)
     if "$" not in called and (is_ours or not _NAME.fullmatch(called)):
-        yield Finding(("name",), f"'{called}' is not a name that a volume of the application may have")
+        yield AccessFinding(("name",), f"'{called}' is not a name that a volume of the application may have")
     options = about.get("driver_opts")
     if isinstance(options, dict) and options and driver == "local":
         yield from (f.below("driver_opts") for f in _options(name, options, paths))
 
 
-def _options(name: str, options: dict[str, Any], paths: HostPaths) -> Iterator[Finding]:
+def _options(name: str, options: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     """A tmpfs, or a folder that may be mounted; with other options the engine mounts disks and shares of networks."""
     kind, flags = str(options.get("type") or ""), str(options.get("o") or "")
     device = str(options.get("device") or "")
@@ -76,14 +78,14 @@ def _options(name: str, options: dict[str, Any], paths: HostPaths) -> Iterator[F
     words = [word.strip() for word in flags.split(",") if word.strip()]
     if {"bind", "rbind"} & set(words):
         if not all(_BIND_OPTIONS.fullmatch(word) for word in words):
-            yield Finding(("o",), f"'{flags}' of the volume '{name}' has other options than bind, ro and rw")
+            yield AccessFinding(("o",), f"'{flags}' of the volume '{name}' has other options than bind, ro and rw")
         problem, hint = _bind_problem(device, "ro" in words, paths)
         if problem:
-            yield Finding(("device",), problem, hint)
+            yield AccessFinding(("device",), problem, hint)
     elif kind != "tmpfs" or not all(_TMPFS_OPTIONS.fullmatch(word) for word in words):
         message = f"the volume '{name}' mounts '{kind or flags or device}', which reaches beyond the test"
         hint = "use a tmpfs (type: tmpfs), or a folder of the repository (o: bind)"
-        yield Finding(("type",) if kind else ("o",) if flags else (), message, hint)
+        yield AccessFinding(("type",) if kind else ("o",) if flags else (), message, hint)
 
 
 def _bind_problem(device: str, read_only: bool, paths: HostPaths) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.spec.rig import EMULATED, is_simulated
+from dodo_dsl.spec.deployment.rig import EMULATED, is_simulated
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:

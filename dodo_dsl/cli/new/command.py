@@ -13,7 +13,7 @@ from dodo_dsl.cli.new.scaffold import New
 from dodo_dsl.cli.new.shipped_copy import copied_files
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import shown_path
-from dodo_dsl.spec.deployment import FILE_NAME, Deployment
+from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment
 from dodo_dsl.spec.model import KINDS, LEVELS
 
 EXAMPLES = """examples:

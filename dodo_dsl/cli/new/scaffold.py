@@ -12,7 +12,7 @@ from dodo_dsl import package_data
 from dodo_dsl.check.rules.names import KEYWORDS
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.diagnostics import did_you_mean
-from dodo_dsl.spec.deployment import FILE_NAME
+from dodo_dsl.spec.deployment.deployment import FILE_NAME
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
 

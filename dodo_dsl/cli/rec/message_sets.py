@@ -8,7 +8,7 @@ from dodo_dsl.opendlv.messages import versions
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.odvd.parser import OdvdError
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.spec.deployment import find_deployment, load_deployment
+from dodo_dsl.spec.deployment.deployment import find_deployment, load_deployment
 
 Tell = Callable[[str], None]
 

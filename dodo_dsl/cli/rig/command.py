@@ -15,9 +15,9 @@ from dodo_dsl.run.rigs.access import MANUAL, query_exclusively
 from dodo_dsl.run.rigs.permission import LIMIT_FLAGS, refuse_forbidden
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.deployment import FILE_NAME, Deployment
+from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment
+from dodo_dsl.spec.deployment.rig import EMULATED, Rig
 from dodo_dsl.spec.manifest import Parameter
-from dodo_dsl.spec.rig import EMULATED, Rig
 from dodo_dsl.spec.values import ValueProblem, convert
 from dodo_dsl.terminal import json_text, printable
 

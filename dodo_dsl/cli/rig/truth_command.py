@@ -17,10 +17,10 @@ from dodo_dsl.run.rigs import camera
 from dodo_dsl.run.rigs.access import query_exclusively
 from dodo_dsl.run.rigs.permission import LIMIT_FLAGS, refuse_forbidden
 from dodo_dsl.run.rigs.rig_leases import devices_in
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import Rig
 
 EXAMPLES = """examples:
   dodo rig truth emulated --test hil-camera --classes cone_yellow=yellow,cone_blue=blue -o truths/board.json

@@ -26,7 +26,7 @@ from dodo_dsl.run.rigs.attendance import is_real
 from dodo_dsl.run.runner import Policy, Runner, default_backend
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.model import LEVELS
 from dodo_dsl.terminal import printable
 

@@ -17,7 +17,7 @@ from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import runs
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.rigs.attendance import is_real
-from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.settings import Settings
 
 

@@ -9,16 +9,16 @@ from typing import Any
 from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, environment, plain, text
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.plan.rewrite import cid_and_image, confinement, removals, service_namespaces, variables, volumes
+from dodo_dsl.plan.rewrite import cid_and_image, container_limits, removals, service_namespaces, variables, volumes
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 from dodo_dsl.source import Node
-from dodo_dsl.spec.sandbox import SandboxLimits
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
     cid_and_image.assign_image,
     removals.remove_machine_settings,
     removals.remove_hardware,
-    confinement.confine,
+    container_limits.confine,
     service_namespaces.own_namespaces,
     volumes.own_mounts,
     service_namespaces.own_dependencies,

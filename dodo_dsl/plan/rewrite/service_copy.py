@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.application.access import filled
-from dodo_dsl.spec.sandbox import SandboxLimits
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 from dodo_dsl import atomic
 from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
-from dodo_dsl.application.access.model import Finding
+from dodo_dsl.application.access.model import AccessFinding
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
@@ -67,7 +67,7 @@ class Compose:
         return CompiledTest(application, names, images, own_network, plan.application.access, self._paths)
 
     @staticmethod
-    def _refuse(findings: Iterable[Finding]) -> None:
+    def _refuse(findings: Iterable[AccessFinding]) -> None:
         if found := list(findings):
             others = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
             raise BackendError(f"the application may not have {shown(found[0].steps)}: {found[0].message}{others}")

@@ -26,7 +26,7 @@ Child = subprocess.Popen[bytes] | ForkedModule | ConfinedProcess
 
 
 @dataclass(frozen=True)
-class Ended:
+class ChildExit:
     """How a child ended: ``code`` below 0 for a signal; ``used`` bytes of memory where that was more than allowed.
 
     ``failed`` tells that it never began, as its sandbox could not be set up.
@@ -40,7 +40,7 @@ class Ended:
 class Children:
     """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how."""
 
-    def __init__(self, on_exit: Callable[[str, Ended], None]) -> None:
+    def __init__(self, on_exit: Callable[[str, ChildExit], None]) -> None:
         self._on_exit = on_exit
         self._running: dict[str, Child] = {}
         self._used: dict[str, int] = {}
@@ -109,7 +109,7 @@ class Children:
                     child = self._running.pop(name)
                     code = child.wait()
                     failed = isinstance(child, ConfinedProcess) and child.failed
-                    self._on_exit(name, Ended(code, self._used.pop(name, 0), failed))
+                    self._on_exit(name, ChildExit(code, self._used.pop(name, 0), failed))
 
     def end_all(self, owns_namespace: bool, wait: Callable[[float], None]) -> None:
         """SIGTERM to the children, GRACE_S to comply, then SIGKILL to all descendants.

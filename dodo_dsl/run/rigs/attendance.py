@@ -12,7 +12,7 @@ from dodo_dsl.run.rigs.health_check import examine
 from dodo_dsl.run.rigs.permission import refuse_test, refuse_unattended
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in, leased
-from dodo_dsl.spec.rig import EMULATED
+from dodo_dsl.spec.deployment.rig import EMULATED
 
 
 def is_real(plan: Plan) -> bool:

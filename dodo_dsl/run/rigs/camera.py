@@ -8,9 +8,9 @@ from dodo_dsl.plan.emulated_rig import CAMERA, DRAWN, hardware
 from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.arguments import Argument, resolved
+from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
-from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.values import ValueProblem, convert, default_value
 
 PROGRAMS = {

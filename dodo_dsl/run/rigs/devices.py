@@ -6,7 +6,7 @@ import re
 import stat
 from pathlib import Path
 
-from dodo_dsl.spec.rig import EMULATED
+from dodo_dsl.spec.deployment.rig import EMULATED
 
 _SOCKET = re.compile(r"socket://[^/]*:(?P<port>[0-9]{1,5})")
 _SYS = Path("/sys/dev/char")

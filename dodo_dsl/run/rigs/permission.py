@@ -8,9 +8,9 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.rigs.devices import identity
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in
-from dodo_dsl.spec import machine as operator
-from dodo_dsl.spec.machine import UNITS, PermittedRig
-from dodo_dsl.spec.rig import EMULATED, is_simulated
+from dodo_dsl.spec.deployment import machine as operator
+from dodo_dsl.spec.deployment.machine import UNITS, PermittedRig
+from dodo_dsl.spec.deployment.rig import EMULATED, is_simulated
 
 LIMIT_FLAGS = {
     "x": "range-x",

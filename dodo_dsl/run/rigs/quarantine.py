@@ -15,7 +15,7 @@ from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.run.rigs import devices as hardware
 from dodo_dsl.run.rigs.problems import RigProblem
-from dodo_dsl.spec.machine import MachineError, machine
+from dodo_dsl.spec.deployment.machine import MachineError, machine
 from dodo_dsl.state_folder import NoStateFolder, account_path, secured, state_path
 
 FOLDER_VARIABLE = "DODO_RIGS"

@@ -11,7 +11,7 @@ from dodo_dsl.cli.main import parser
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.backends import Job
-from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment
 from tests.check import examples
 
 LOCKSTEP_ONLY = """\

@@ -14,7 +14,7 @@ from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.confined import bubblewrap, seccomp_filter
 from dodo_dsl.run.process.confined.confinement import FIRST_USER, Confinement
 from dodo_dsl.run.process.confined.places import Places
-from dodo_dsl.spec.sandbox import SandboxLimits
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _SIGNALLED = range(129, 129 + 64)
 """Exit codes by which bubblewrap tells the signal that ended the program."""

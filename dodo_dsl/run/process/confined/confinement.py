@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.spec.sandbox import SandboxLimits
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _PACKAGE = Path(__file__).resolve().parents[3]
 FIRST_USER = 64_000

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from dodo_dsl.run.process.confined.bubblewrap import Mounts, words
 from dodo_dsl.run.process.confined.confinement import Confinement, confinement
-from dodo_dsl.spec.sandbox import SandboxLimits
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 MOUNTS = Mounts(Path("/tmp/x/folder"), True, Path("/tmp/x/home"), Path("/tmp/x/tmp"))
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.plan.rewrite.confinement import confine
+from dodo_dsl.plan.rewrite.container_limits import confine
 from tests.plan.rewrite.copies import copy
 
 DEFAULTS = {"pids_limit": 1024, "mem_limit": 2_000_000_000, "cap_drop": ["NET_RAW", "MKNOD"]}

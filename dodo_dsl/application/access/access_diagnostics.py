@@ -5,12 +5,12 @@ out of tests without a rig.
 """
 
 from dodo_dsl import source
-from dodo_dsl.application.access.model import Finding, Steps
+from dodo_dsl.application.access.model import AccessFinding, Steps
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 
 
-def diagnostic(finding: Finding, node: Node, key: Span) -> Diagnostic:
+def diagnostic(finding: AccessFinding, node: Node, key: Span) -> Diagnostic:
     """A finding within a node, whose own key is at ``key``."""
     span = place(node, finding.steps, key)
     if finding.kind == "unknown":
