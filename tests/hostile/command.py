@@ -1,0 +1,11 @@
+"""``dodo`` as a function: its exit code, and all that it would print."""
+
+from io import StringIO
+
+from dodo_dsl.cli.main import main
+
+
+def dodo(*words: str) -> tuple[int, str]:
+    stdout = StringIO()
+    code = main(words, stdout, stdout)
+    return code, stdout.getvalue()

@@ -1,0 +1,60 @@
+"""Input is a file: no command waits for a FIFO or reads a device."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv import regular_file
+from tests.hostile.command import dodo
+from tests.rec.conftest import video
+
+ROOT = Path(__file__).parents[2]
+STRANGER = 54_321
+
+
+READERS = {
+    "info": ("rec", "info", "{}"),
+    "cut": ("rec", "cut", "{}", "-o", "new.rec"),
+    "export": ("rec", "export", "{}", "--csv"),
+    "messages": ("rec", "info", "drive.rec", "--messages", "{}"),
+    "truth": ("rec", "export", "drive.rec", "--coco", "--truth", "{}", "-o", "out"),
+    "judge": ("judge", "{}", "--spec", "sil-closed-straight"),
+    "application": ("compile", "--check", "--application", "{}"),
+    "spec": ("compile", "--check", "{}"),
+    "picture": ("rig", "truth", "emulated", "-o", "t.json", "--picture", "{}", "--box", "a", "1", "1", "2", "2"),
+}
+"""Commands that read a file; each has to end at once, with a sentence that names it."""
+
+
+@pytest.mark.parametrize("kind", ["fifo", "socket", "link", "device"])
+@pytest.mark.parametrize("reader", READERS)
+def test_input_is_a_file(
+    record: Callable[..., Path], strange: dict[str, Path], kind: str, reader: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = record(video(1)).parent
+    monkeypatch.chdir(folder)
+    (folder / "dodo.yml").write_text("dodo: 1\n")
+    code, output = dodo(*(word.format(strange[kind]) for word in READERS[reader]))
+    assert code in (2, 3), output
+    assert "strange-" in output and "Traceback" not in output and "internal error" not in output
+
+
+@pytest.mark.parametrize("kind", ["fifo", "socket", "folder", "device"])
+@pytest.mark.parametrize("name", ["results.json", "test.json", "dodo.yml"])
+def test_files_that_are_found_are_files(
+    strange: dict[str, Path], tmp_path: Path, kind: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    strange[kind].rename(tmp_path / name)
+    words = {"results.json": ("report", "."), "test.json": ("run", "--compiled", "."), "dodo.yml": ("list",)}[name]
+    code, output = dodo(*words)
+    assert "Traceback" not in output and "internal error" not in output
+    assert code == 2 or name == "dodo.yml", output
+
+
+def test_a_reader_takes_no_more_than_it_may(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(bytes(1001))
+    with pytest.raises(OSError, match="larger than 1000 bytes"):
+        regular_file.content(tmp_path / "a", 1000)
+    assert len(regular_file.content(tmp_path / "a", 1001)) == 1001

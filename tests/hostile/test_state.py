@@ -1,0 +1,94 @@
+"""State between runs is kept where others cannot change it."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run import leases
+from dodo_dsl.run.history import History
+from dodo_dsl.state_folder import UnsafeFolder, secured
+
+ROOT = Path(__file__).parents[2]
+STRANGER = 54_321
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    return tmp_path / "leases"
+
+
+def test_state_is_made_for_its_user_alone(folder: Path) -> None:
+    before = os.umask(0)
+    try:
+        assert leases.folder() == folder
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o1777, 0o703])
+def test_state_that_all_can_write_is_refused(folder: Path, mode: int) -> None:
+    folder.mkdir()
+    folder.chmod(mode)
+    with pytest.raises(UnsafeFolder, match="all users can write it, and so DoDo's state: chmod 700"):
+        leases.try_lease("cid-130", {})
+    assert list(folder.iterdir()) == []
+
+
+def test_state_behind_a_symlink_is_refused(folder: Path) -> None:
+    (folder.parent / "elsewhere").mkdir(mode=0o700)
+    folder.symlink_to(folder.parent / "elsewhere")
+    with pytest.raises(UnsafeFolder, match="not a folder, and DoDo keeps no state where it points to"):
+        leases.try_lease("cid-130", {})
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can make another user's folder")
+def test_state_of_another_user_is_refused(folder: Path) -> None:
+    folder.mkdir(mode=0o700)
+    os.chown(folder, STRANGER, STRANGER)
+    with pytest.raises(UnsafeFolder, match=f"belongs to user {STRANGER}, who could change DoDo's state"):
+        leases.try_lease("cid-130", {})
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="of root's folders the group may write")
+def test_a_group_loses_its_write_permission(folder: Path) -> None:
+    folder.mkdir()
+    folder.chmod(0o770)
+    assert stat.S_IMODE(secured(folder).stat().st_mode) == 0o750
+
+
+@pytest.mark.parametrize("name", ["cid-130.lock", "cid-130.PID.json"])
+def test_a_planted_symlink_is_not_written_through(folder: Path, name: str) -> None:
+    folder.mkdir(mode=0o700)
+    victim = folder.parent / "victim"
+    victim.write_text("untouched")
+    (folder / name.replace("PID", str(os.getpid()))).symlink_to(victim)
+    try:
+        lease = leases.try_lease("cid-130", {})
+        assert lease is not None
+        lease.release()
+    except OSError as error:
+        assert "symbolic links" in str(error)
+    assert victim.read_text() == "untouched"
+
+
+def test_a_record_that_never_ends_is_not_read(folder: Path) -> None:
+    folder.mkdir(mode=0o700)
+    os.mkfifo(folder / "cid-130.1.json")
+    assert leases.holder("cid-130") == "another process"
+    assert list(leases.orphans("cid-")) == []
+
+
+def test_history_follows_no_symlink_and_waits_for_no_fifo(tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("")
+    (tmp_path / "link").symlink_to(victim)
+    os.mkfifo(tmp_path / "fifo")
+    for name in ("link", "fifo"):
+        history = History(tmp_path / name)
+        history._saved = -1
+        history.save()
+    assert victim.read_text() == ""
