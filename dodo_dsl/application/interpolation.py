@@ -111,7 +111,7 @@ def dotenv(text: str) -> dict[str, str]:
 
 
 def dotenv_file(path: Path, known: Mapping[str, str]) -> dict[str, str]:
-    """The variables of a ``.env`` file, interpolated with earlier ones and ``known``; empty when there is no file."""
+    """The variables of a ``.env`` file, interpolated with earlier ones and ``known``; none without a file."""
     if not path.is_file():
         return {}
     found: dict[str, str] = {}

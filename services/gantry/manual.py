@@ -1,6 +1,6 @@
 """Manual control of the rig: ``python -m services.gantry.manual --serial=PORT ACTION``, which prints one JSON object.
 
-A pipe as standard input is the sign of life of whoever commands: its end stops the rig, too.
+Where standard input is a pipe, its end stops the rig, too: the command that moved it has died.
 Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is stopped
 at every exit, unless a fault has stopped it: that is kept to be seen, and ``calibrate`` acknowledges it. Exit codes:
 0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.

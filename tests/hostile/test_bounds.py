@@ -1,4 +1,4 @@
-"""An application that takes too much, or stays: it fails, and nothing of it is left."""
+"""An application takes too much, or stays after its test."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +30,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 @pytest.mark.parametrize("application", [TAKES, CHILD_TAKES], ids=["itself", "child"])
 def test_memory_without_end(bench: Bench, application: str) -> None:
+    """A program that takes memory without end is ended, and its test fails."""
     plan = bench.plan(judge=READY + WAIT, application=application, timeout_s=60)
     limited = replace(plan.application, limits=SandboxLimits(memory=200_000_000))
     (outcome,) = bench.run(replace(plan, application=limited))
@@ -41,7 +42,7 @@ def test_memory_without_end(bench: Bench, application: str) -> None:
 
 @pytest.mark.parametrize("isolation", ["network", "host"])
 def test_a_child_that_hides_does_not_outlive_its_test(bench: Bench, isolation: str) -> None:
-    """It has another session, another parent and no environment."""
+    """A child with another session, another parent and no environment does not outlive its test."""
     bench.isolation = isolation
     mark = f"hides-{bench.folder.name}-{isolation}"
     plan = bench.plan(judge=READY + AFTER_START + PASS, application=STAYS.replace("MARK", mark) + STARTED + WAIT)
@@ -62,7 +63,7 @@ def test_what_it_writes_goes_with_the_test(bench: Bench) -> None:
 
 
 def test_it_has_time_to_end(bench: Bench) -> None:
-    """SIGTERM reaches it through bubblewrap, and what it says then is in its log."""
+    """Control: SIGTERM reaches the application, and what it says then is in its log."""
     handler = "import signal\nsignal.signal(signal.SIGTERM, lambda *_: (print('landed', flush=True), sys.exit(0)))\n"
     plan = bench.plan(judge=READY + AFTER_START + PASS, application=handler + STARTED + WAIT)
     bench.run(plan)

@@ -1,4 +1,4 @@
-"""Attacks by compose files: refused, left out, or stopped at run time, as the table beside this file has it."""
+"""Attacks by compose files are refused, left out, or stopped at run time."""
 
 import asyncio
 from pathlib import Path
@@ -53,6 +53,7 @@ def plan(application: Application) -> Plan:
 
 @pytest.mark.parametrize("attack", attacks("refused"))
 def test_what_is_refused(attack: dict[str, Any], tmp_path: Path) -> None:
+    """Compose files that reach the host, or other tests, are refused with file, line and column."""
     application, problems = found(attack, tmp_path)
     assert application is None
     errors = [problem for problem in problems if problem.severity == "error"]
@@ -64,6 +65,7 @@ def test_what_is_refused(attack: dict[str, Any], tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("attack", attacks("left out"))
 def test_what_is_left_out(attack: dict[str, Any], tmp_path: Path) -> None:
+    """Hardware and privileges are left out of simulations, with a warning."""
     application, problems = found(attack, tmp_path)
     assert not has_errors(problems)
     assert {problem.severity for problem in problems} == {"warning"}
@@ -72,6 +74,7 @@ def test_what_is_left_out(attack: dict[str, Any], tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("attack", attacks("removed"))
 def test_what_is_removed(attack: dict[str, Any], tmp_path: Path) -> None:
+    """What would set the host or other tests is removed from the test's copy."""
     application, problems = found(attack, tmp_path)
     assert problems == []
     gone(attack, application)
@@ -87,6 +90,7 @@ def gone(attack: dict[str, Any], application: Application | None) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("attack", attacks("at run time"))
 def test_what_is_stopped_at_run_time(attack: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What only the engine would see is stopped before anything is created."""
     compose()
     monkeypatch.delenv("X", raising=False)
     application, problems = found(attack, tmp_path)
@@ -104,6 +108,7 @@ def test_what_is_stopped_at_run_time(attack: dict[str, Any], tmp_path: Path, mon
 
 
 def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
+    """Control: the same file without an attack is accepted."""
     application, problems = found({}, tmp_path)
     assert application is not None
     assert problems == []
@@ -111,7 +116,7 @@ def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_without_the_attack_the_engine_gets_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Secrets of the team's own ``.env`` come to the containers, and the pipeline's do not."""
+    """Control: the engine gets the same file without an attack."""
     compose()
     monkeypatch.setenv("CI_JOB_TOKEN", "pipeline")
     monkeypatch.setenv("API_KEY", "pipeline")

@@ -32,6 +32,7 @@ READERS = {
 def test_input_is_a_file(
     record: Callable[..., Path], strange: dict[str, Path], kind: str, reader: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """No command reads a FIFO, a socket or a device."""
     folder = record(video(1)).parent
     monkeypatch.chdir(folder)
     (folder / "dodo.yml").write_text("dodo: 1\n")
@@ -45,6 +46,7 @@ def test_input_is_a_file(
 def test_files_that_are_found_are_files(
     strange: dict[str, Path], tmp_path: Path, kind: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Nor where it looks for its input itself."""
     monkeypatch.chdir(tmp_path)
     strange[kind].rename(tmp_path / name)
     words = {"results.json": ("report", "."), "test.json": ("run", "--compiled", "."), "dodo.yml": ("list",)}[name]

@@ -91,6 +91,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("kind", ["fifo", "socket", "device", "link"])
 @pytest.mark.parametrize("writer", WRITERS)
 def test_no_writer_replaces_what_is_no_file(strange: dict[str, Path], kind: str, writer: str) -> None:
+    """No output replaces a device, FIFO, socket or folder."""
     before = strange[kind].lstat().st_ino
     with pytest.raises(OSError, match=f"strange-{kind}"):
         WRITERS[writer](strange[kind])
@@ -107,7 +108,7 @@ def test_logs_follow_no_symlink(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("link", ["", "files", "files/maps"])
 def test_compiling_follows_no_symlink(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, link: str) -> None:
-    """What a repository has in the place of output: a way to files elsewhere, which would be removed."""
+    """Compiling follows no symlink that a repository has in the place of output."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dodo.yml").write_text(f"dodo: 1\napplication: {ROOT}/examples/kiwi/docker-compose.yml\n")
     (tmp_path / "theirs").mkdir()

@@ -1,4 +1,4 @@
-"""What an application on processes tries on the machine does not get through: as root, and as an ordinary user."""
+"""An application on processes attacks the machine, as root and as an ordinary user."""
 
 import json
 import os
@@ -82,11 +82,13 @@ def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
 
 
 def test_the_test_itself_goes_on(told: dict[str, Any]) -> None:
+    """The test is judged as if no attack had been tried."""
     assert (told["outcome"], told["reason"]) == ("passed", "it drove")
     assert told["kept"] == ["as it was", "[]"]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_does_not_get_through(told: dict[str, Any], name: str) -> None:
+    """An attack on the machine, its files or other tests does not get through."""
     (row,) = [row for row in told["attacks"] if row["attack"] == name]
     assert not row["through"], row["how"]

@@ -20,7 +20,7 @@ from dodo_dsl.run.rigs import devices, permission, quarantine
 from dodo_dsl.run.rigs.devices import identity, key
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import device_leases
-from dodo_dsl.spec import machine as operator
+from dodo_dsl.spec.deployment import machine as operator
 from dodo_dsl.spec.deployment.machine import MachineError, machine
 from services.base.flags import parse
 from services.beacon.table import read_points
@@ -90,6 +90,7 @@ PLACES: dict[str, Callable[[str, Path], str]] = {
 def test_numbers_that_only_python_reads(
     where: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Numbers that only Python would read, such as 1_0, are refused."""
     monkeypatch.chdir(tmp_path)
     said = PLACES[where](text, tmp_path / "table") + capsys.readouterr().err
     assert "not" in said or "takes 3 numbers" in said or "expected" in said, said
@@ -98,6 +99,7 @@ def test_numbers_that_only_python_reads(
 
 @pytest.mark.parametrize("text", NUMBERS)
 def test_the_serial_line_has_no_such_numbers(text: str) -> None:
+    """The gantry's serial line takes no such numbers either."""
     assert answer(f"$0.1,{text},0.2") is None
     assert answer(f"${text}") is None
 
@@ -130,6 +132,7 @@ def test_a_serial_number_is_the_device_s_whatever_port_it_is_in(tmp_path: Path) 
 
 @pytest.mark.parametrize("name", ["", "emulated", "a\0b", str(Path(__file__))])
 def test_what_is_no_hardware_has_no_identity(name: str) -> None:
+    """What is no hardware is not taken for a device."""
     assert (identity(name), key(name)) == ("", "")
 
 
@@ -180,6 +183,7 @@ def test_no_variable_moves_the_quarantine_of_hardware(repository: Path, monkeypa
 
 @pytest.mark.parametrize("name", ["/dev/null", "/dev/ptmx", "/dev/tty", "/none", "a\0b", "", "emulated", "0"])
 def test_what_is_no_hardware(name: str) -> None:
+    """Files, pseudo-terminals and sockets are not taken for hardware."""
     assert not devices.is_hardware(name)
 
 
@@ -301,12 +305,14 @@ def test_a_file_of_the_operator_that_cannot_be_used_stops_everything(
 
 
 def test_without_a_file_there_is_nothing_to_permit(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Control: without a file of the operator, everything is permitted."""
     monkeypatch.setattr(operator, "FILE", repository / "none" / "rigs.yml")
     assert machine() is None
     permission.refuse_forbidden(["/dev/null"], {}, [repository])
 
 
 def test_identities_follow_their_own_folder_of_the_kernel() -> None:
+    """A device that is not there is known by its path."""
     assert devices.identity("/dev/does-not-exist") == "path /dev/does-not-exist"
 
 
@@ -327,7 +333,7 @@ def test_a_compiled_test_moves_no_hardware_without_a_rig(tmp_path: Path, rig_nam
 
 @pytest.mark.realtime
 def test_a_rig_whose_command_is_killed_stops(place: Place) -> None:
-    """No signal reaches the program that moves it: the pipe from its master ends."""
+    """A rig stops when the command that moves it is killed."""
     place.rig.status = 2
     process = place.start("rig", "goto", "fake", "0.5", "0", "0")
     while not place.rig.commands("GOTO"):
@@ -345,6 +351,7 @@ def test_a_rig_whose_command_is_killed_stops(place: Place) -> None:
 
 @pytest.mark.slow
 def test_the_program_of_a_rig_needs_no_master_where_it_has_none() -> None:
+    """Control: a rig's program answers without a runner."""
     words = [sys.executable, "-m", "services.gantry.manual", "--serial=/dev/null", "status"]
     result = subprocess.run(words, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert "error" in json.loads(result.stdout)

@@ -1,4 +1,4 @@
-"""Inputs that unfold to more than a machine has, and floods: each is refused, or ends with who it was."""
+"""Inputs that unfold to more than a machine has, and floods."""
 
 import json
 import os
@@ -96,6 +96,7 @@ def test_a_picture_whose_size_cannot_be_read_is_not_decoded(tmp_path: Path, cont
 
 
 def test_sizes_in_headers_are_those_of_the_pictures() -> None:
+    """Control: sizes in headers are those of the pictures."""
     import cv2
 
     for kind in (".png", ".jpg"):
@@ -174,7 +175,7 @@ def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> Non
 
 
 def test_messages_that_double_are_not_unfolded(tmp_path: Path) -> None:
-    """Each holds the next one twice: thirty of them are a billion fields."""
+    """Messages that hold the next one twice, a billion fields in thirty, are refused."""
     texts = [f"message a.M{n} [id = {5000 + n}] {{ a.M{n + 1} x [id = 1]; a.M{n + 1} y [id = 2]; }}" for n in range(30)]
     (tmp_path / "a.odvd").write_text("\n".join([*texts, "message a.M30 [id = 4999] { uint8 x [id = 1]; }"]))
     with pytest.raises(OdvdError, match=r"a\.odvd:15:9: 'a\.M14' unfolds to more than 100000 fields"):
@@ -339,6 +340,7 @@ def attached(name):
 @pytest.mark.realtime
 @pytest.mark.parametrize("kind", APPLICATIONS)
 def test_whole_applications(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    """Applications that fill the recording, or keep a camera's lock, end their own test."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
     shipped = Path(__file__).parents[2] / "tests_registry"

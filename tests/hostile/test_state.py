@@ -76,6 +76,7 @@ def test_a_planted_symlink_is_not_written_through(folder: Path, name: str) -> No
 
 
 def test_a_record_that_never_ends_is_not_read(folder: Path) -> None:
+    """A lease's record that never ends is not read."""
     folder.mkdir(mode=0o700)
     os.mkfifo(folder / "cid-130.1.json")
     assert leases.holder("cid-130") == "another process"

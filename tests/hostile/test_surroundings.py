@@ -40,6 +40,7 @@ def run(
     ],
 )
 def test_streams_that_are_closed_or_full(shell: str, code: int, said: str) -> None:
+    """A closed or full standard stream is a sentence, and no traceback."""
     result = run("list", shell=shell)
     assert (result.returncode, result.stderr.endswith(said)) == (code, True), result.stderr
     assert "Traceback" not in result.stderr and "Exception ignored" not in result.stderr
@@ -48,12 +49,14 @@ def test_streams_that_are_closed_or_full(shell: str, code: int, said: str) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [("doctor",), ("rig", "status")])
 def test_a_user_without_a_home(words: tuple[str, ...]) -> None:
+    """A user without a home folder gets a sentence."""
     result = run(*words, HOME=None, XDG_STATE_HOME=None, DODO_HISTORY=None, DODO_RIGS=None)
     assert result.returncode in (0, 1, 3)
     assert "Traceback" not in result.stderr and "internal error" not in result.stderr
 
 
 def test_paths_that_are_not_utf_8(tmp_path: Path, record: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every command takes paths that are not UTF-8."""
     folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe"))
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -75,5 +78,6 @@ def test_paths_that_are_not_utf_8(tmp_path: Path, record: Callable[..., Path], m
 
 @pytest.mark.slow
 def test_a_path_that_is_not_utf_8_is_an_argument(tmp_path: Path) -> None:
+    """Such a path may be an argument of the command."""
     result = run("rec", "info", os.fsencode(tmp_path) + b"/\xff.rec")
     assert (result.returncode, "No such file" in result.stderr) == (2, True)

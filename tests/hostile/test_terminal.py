@@ -37,6 +37,7 @@ FORBIDDEN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202e]|^\s*::|##\[|##vso\[
 
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_no_text_commands_a_stream(attack: str) -> None:
+    """No text that DoDo prints commands a terminal or a log."""
     stream = StringIO()
     out = harmless_stream(stream)
     assert harmless_stream(out) is out
@@ -49,6 +50,7 @@ def test_no_text_commands_a_stream(attack: str) -> None:
 
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_json_says_the_same_and_commands_nothing(attack: str) -> None:
+    """JSON says the same, and commands nothing."""
     stream = StringIO()
     harmless_stream(stream).write(json_text({ATTACKS[attack]: [ATTACKS[attack], "ü"]}))
     assert not FORBIDDEN.search(stream.getvalue())
@@ -56,6 +58,7 @@ def test_json_says_the_same_and_commands_nothing(attack: str) -> None:
 
 
 def test_commands_in_pieces_are_none() -> None:
+    """A command does not get through in pieces."""
     stream = StringIO()
     out = HarmlessStream(stream)
     for part in ("a::b\n", " ", ":", ":error::x\n", "\t:", "ok\n"):
@@ -68,6 +71,7 @@ PIECES = st.sampled_from(["#", "##", "[", "##[", "vso", "vso[", ":", "::", "::er
 
 @given(st.lists(PIECES | st.text(max_size=5), max_size=12))
 def test_no_pieces_become_a_command(pieces: list[str]) -> None:
+    """No pieces of text become a command together (property test)."""
     stream = StringIO()
     out = harmless_stream(stream)
     for piece in pieces:
@@ -113,6 +117,7 @@ def test_a_repository_commands_no_terminal(
 
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_a_results_file_commands_no_terminal(tmp_path: Path, attack: str) -> None:
+    """A file of results commands no terminal."""
     (tmp_path / "results.json").write_text(json.dumps({"dodo": "results", "version": 1, "tests": [ATTACKS[attack]]}))
     code, output = dodo("report", str(tmp_path))
     assert code == 2

@@ -83,7 +83,7 @@ def clear(rig: str, devices: Sequence[str] = ()) -> bool:
 
 
 def _read(path: Path) -> tuple[str, str]:
-    """The name of the rig and the reason; without a reason where there is no file. Raises RigProblem."""
+    """The name of the rig and the reason, which is empty without a file. Raises RigProblem."""
     try:
         if path.parent.is_dir():
             secured(path.parent)

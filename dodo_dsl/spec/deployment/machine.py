@@ -44,7 +44,7 @@ class Machine:
 
 
 def machine(file: Path | None = None) -> Machine | None:
-    """What the operator of this machine wrote; None where there is no file. Raises MachineError."""
+    """What the operator of this machine wrote; None without a file. Raises MachineError."""
     path = file or FILE
     try:
         status = path.lstat()

@@ -41,4 +41,4 @@ def _bytes(node: object, default: int) -> int:
 
 
 def _count(node: object, default: int) -> int:
-    return int(node.text) if isinstance(node, Scalar) else default
+    return int(str(node.value)) if isinstance(node, Scalar) else default

@@ -1,4 +1,4 @@
-"""An application does not decide its own test over the bus: on processes, in namespaces and on the host."""
+"""An application attacks its own test over the bus, in namespaces and on the host."""
 
 import re
 import shutil
@@ -40,12 +40,13 @@ def check(test: dict[str, Any], attack: BusAttack) -> None:
 
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: f"{attack.name}-{attack.test}-{attack.clock}")
 def test_it_does_not_get_through(tmp_path: Path, attack: BusAttack) -> None:
+    """An application that sends what only services may send does not decide its test."""
     check(attacked(tmp_path, attack), attack)
 
 
 @pytest.mark.parametrize("name", ["finish", "spy"])
 @pytest.mark.parametrize("clock", ["lockstep", "realtime"])
 def test_nor_on_the_host(tmp_path: Path, name: str, clock: str) -> None:
-    """With the leases of this user, which keep it apart from other tests on the host."""
+    """The same on the host, with the leases of this user, which keep it apart from other tests there."""
     (attack,) = (each for each in ATTACKS if (each.name, each.test, each.clock) == (name, STRAIGHT, "lockstep"))
     check(attacked(tmp_path, attack._replace(clock=clock), "--isolation", "host"), attack)
