@@ -34,7 +34,7 @@ MEANINGS = {
     "outside": "samples at times without a target, ignored",
     "broken": "samples that are not finite numbers",
     "without-truth": "frames without ground truth, ignored",
-    "late": "detections that came after their frame was judged, ignored",
+    "late": "samples or detections that came too late to be judged, ignored",
     "repeated": "detections with a detectionId that their frame already had, ignored",
 }
 """Explanations of checks whose names do not explain them, as in the READMEs of the evaluators."""
