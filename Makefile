@@ -4,10 +4,9 @@ DODO := .venv/bin/dodo
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
-# `make test` runs two chains side by side. An engine that makes networks disturbs tests in real time, so one chain has both
-ALONE := realtime-tests engine-tests
-BESIDE := fast-tests slow-tests
-PARTS := $(ALONE) $(BESIDE) alone beside
+# Tests in real time come first, beside nothing but the linters; two rigs at a time leave each of them a core
+RIGS ?= 2
+PARTS := realtime-tests engine-tests other-tests first then
 
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
@@ -17,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
 	@echo "make check    format, lint, types, imports, and the tests that need only Python: two minutes"
-	@echo "make test     set up, then every check and every test: a quarter of an hour"
+	@echo "make test     set up, then every check and every test: ten minutes"
 	@echo "make lint     format, lint, types, imports"
 	@echo "make bench    measure, beside a peer in the same run"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
@@ -45,17 +44,14 @@ types: dev
 quick-tests: dev
 	$(PYTEST) -n $(WORKERS) -m "not slow" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
 
+realtime-tests:
+	$(PYTEST) -n $(RIGS) --dist loadgroup -m realtime --junitxml=$(JUNIT)/realtime.xml
+
 engine-tests:
 	nice -n 5 $(PYTEST) -m engine --junitxml=$(JUNIT)/engine.xml
 
-realtime-tests:
-	$(PYTEST) -m realtime --junitxml=$(JUNIT)/realtime.xml
-
-fast-tests: dev
-	nice -n 10 $(PYTEST) -n $(WORKERS) -m "not slow" --junitxml=$(JUNIT)/fast.xml
-
-slow-tests:
-	nice -n 10 $(PYTEST) -n $(WORKERS) --dist loadgroup -m "slow and not engine and not realtime" --junitxml=$(JUNIT)/slow.xml
+other-tests:
+	nice -n 10 $(PYTEST) -n $(WORKERS) --dist loadgroup -m "not engine and not realtime" --junitxml=$(JUNIT)/other.xml
 
 tools:
 	@scripts/install-test-tools
@@ -67,15 +63,14 @@ check:
 	@$(MAKE) --no-print-directory -j 3 style types quick-tests
 
 test:
-	@$(MAKE) --no-print-directory -j 3 style types tools
-	@status=0; rm -f $(JUNIT)/*.xml; $(MAKE) --no-print-directory -j 2 --keep-going alone beside || status=$$?; \
+	@$(MAKE) --no-print-directory -j 2 dev tools
+	@status=0; rm -f $(JUNIT)/*.xml; for part in first then; do \
+		$(MAKE) --no-print-directory -j 3 --keep-going --output-sync=target $$part || status=$$?; done; \
 		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status
 
-alone:
-	@status=0; for part in $(ALONE); do $(MAKE) --no-print-directory --output-sync=target $$part || status=$$?; done; exit $$status
+first: realtime-tests style types
 
-beside:
-	@status=0; for part in $(BESIDE); do $(MAKE) --no-print-directory --output-sync=target $$part || status=$$?; done; exit $$status
+then: engine-tests other-tests
 
 bench:
 	@scripts/setup dev

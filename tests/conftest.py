@@ -17,18 +17,27 @@ settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCh
 settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
 settings.load_profile("dodo")  # how fast a machine is decides no test; `make check` chooses the other
 
+REALTIME_RERUNS, REALTIME_REST_S = 2, 5
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-goldens", action="store_true", help="write expected output instead of comparing")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow."""
+    """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
+
+    A test in real time has two more tries, as other work on this machine may keep it waiting. Slow tests come first, so
+    that no worker is left with one at the end.
+    """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.realtime)
+        if item.get_closest_marker("realtime"):
+            item.add_marker(pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -25,6 +25,10 @@ REST = 0.005
 """m/s below which a rig stands."""
 
 
+Runner = subprocess.Popen[str]
+"""``dodo run`` as a process, with its output."""
+
+
 class Pose(NamedTuple):
     """When (s, the rig's time), where (m, m, rad) and how fast (m/s, m/s, rad/s) it truly is."""
 
@@ -98,13 +102,15 @@ class Hardware:
     def late(self) -> bool:
         return any(event["event"] == "late" for event in self.events)
 
-    def until(self, true: Callable[[Pose], bool], patience: float) -> Pose:
-        """The first pose from now on for which something is true."""
+    def until(self, true: Callable[[Pose], bool], patience: float, runner: "Runner | None" = None) -> Pose:
+        """The first pose from now on for which something is true; a ``runner`` that ends before has failed."""
         seen, end = len(self.poses), time.monotonic() + patience
         while time.monotonic() < end:
             for pose in self.poses[seen:]:
                 if true(pose):
                     return pose
+            if runner is not None and runner.poll() is not None:
+                raise AssertionError(f"dodo run ended before the rig did it: {runner.communicate()[0]}")
             seen = len(self.poses)
             time.sleep(0.01)
         raise AssertionError(f"the rig did not come to do it within {patience:g} s: {self.poses[-1:]}")
@@ -116,7 +122,7 @@ class Run:
 
     folder: Path
     rig: Hardware
-    runner: "subprocess.Popen[str]"
+    runner: Runner
     found: dict[str, int] = field(default_factory=dict)
 
     def processes(self) -> Iterator[Path]:
@@ -177,12 +183,12 @@ def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
         runner.communicate()
 
 
-def at_its_start(rig: Hardware) -> Pose:
+def at_its_start(run: Run) -> Pose:
     """The pose at which it stands and waits for the drive."""
-    return rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 120)
+    return run.rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 120, run.runner)
 
 
-def on_its_way(rig: Hardware) -> Pose:
+def on_its_way(run: Run) -> Pose:
     """The pose at which it drives, after it has stood at its start."""
-    at_its_start(rig)
-    return rig.until(lambda pose: pose.vx > 0.2, 120)
+    at_its_start(run)
+    return run.rig.until(lambda pose: pose.vx > 0.2, 120, run.runner)

@@ -135,7 +135,7 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
 
 def test_the_rig_itself_saw_no_limit_passed_and_knows_where_it_stands(tmp_path: Path, rig: Hardware) -> None:
     with running(tmp_path, rig, "network") as run:
-        before = on_its_way(rig)
+        before = on_its_way(run)
         rig.order("extremes")  # anew from here on
         start = next(pose for pose in reversed(rig.poses) if pose.t < before.t and stands(pose))
         output = run.runner.communicate(timeout=300)[0]

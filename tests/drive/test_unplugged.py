@@ -8,8 +8,7 @@ import itertools
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -139,10 +138,10 @@ def brakes(at: float, poses: list[Pose], begin: float, slack: float) -> None:
 
 def pull_the_plug(run: Run, way: Way) -> None:
     """Pull it as the rig drives, and see it come to rest in its own time."""
-    at_its_start(run.rig)
+    at_its_start(run)
     if way.module:
         run.find(way.module)
-    on_its_way(run.rig)
+    on_its_way(run)
     with Lateness() as lateness:
         way.pull(run)
         if way.pull is kill_rig:
@@ -168,23 +167,10 @@ def nothing_is_left(run: Run) -> bool:
     return not any(run.processes())
 
 
-@pytest.fixture(scope="module")
-def tries(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, firmware: None
-) -> Iterator[dict[Way, "Future[None]"]]:
-    """The ways that were asked for, three at a time: each mostly waits for its rig."""
-    asked = [item.callspec.params["way"] for item in request.session.items if item.path == request.path]
-    with ThreadPoolExecutor(3) as pool:
-        yield {way: pool.submit(tried, tmp_path_factory.mktemp("way"), way) for way in asked}
-
-
+@pytest.mark.usefixtures("firmware")
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way.name}-{way.isolation}")
-def test_the_outcome_is_error_and_the_rig_comes_to_rest(tries: dict[Way, "Future[None]"], way: Way) -> None:
-    tries[way].result()
-
-
-def tried(folder: Path, way: Way) -> None:
-    with Hardware(folder / "port") as rig, running(folder, rig, way.isolation) as run:
+def test_the_outcome_is_error_and_the_rig_comes_to_rest(tmp_path: Path, way: Way) -> None:
+    with Hardware(tmp_path / "port") as rig, running(tmp_path, rig, way.isolation) as run:
         pull_the_plug(run, way)
         if way.reason:
             test = judged(run)

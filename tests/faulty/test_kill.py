@@ -1,13 +1,12 @@
 """Each fault against the one shipped test that has to catch it, all in one run."""
 
 import re
-import shutil
 from pathlib import Path
 
 import pytest
-import yaml
 
-from tests.drive.applications import ROOT, dodo, results
+from tests.drive.applications import dodo, results
+from tests.drive.variants import registry, variant
 from tests.faulty.matrix import APPLICATION
 from tests.faulty.table import FAULTS, Fault
 
@@ -21,36 +20,20 @@ SILENT = "4"  # tests at a time, as some of them only wait until an application 
 SHORTER = "12 s"  # for applications that stand still; the example needs 5.71 s
 
 
-def copy_of(fault: Fault, registry: Path) -> None:
+def copy_of(fault: Fault, tests: Path) -> Path:
     """The test that has to catch a fault, under the fault's name: with one application, the bus tells them apart."""
-    shipped, *choices = fault.test.split("--")
-    spec: dict[str, object] = {
-        "dodo": 1,
-        "name": fault.name,
-        "extends": f"../{shipped}/{shipped}.dodo.yml",
-        "description": fault.does,
-        "clock": "lockstep",
-    }
-    if shipped == "sil-closed-straight":
-        spec["evaluation"] = {"track": {"with": {"max-time": SHORTER}}}
-    if choices:
-        spec["matrix"] = {
-            key: [yaml.safe_load(value)] for key, _, value in (choice.partition("-") for choice in choices)
-        }
-    folder = registry / fault.name
-    folder.mkdir()
-    (folder / f"{fault.name}.dodo.yml").write_text(yaml.safe_dump(spec, sort_keys=False))
+    keys: dict[str, object] = {"description": fault.does, "clock": "lockstep"}
+    if fault.test == "sil-closed-straight":
+        keys["evaluation"] = {"track": {"with": {"max-time": SHORTER}}}
+    return variant(tests, fault.test, fault.name, **keys)
 
 
-@pytest.mark.realtime  # as it takes the whole machine, not for its clock
+@pytest.mark.slow
 def test_each_fault_is_caught_and_its_cause_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    registry, report = tmp_path / "tests", tmp_path / "report"
-    shutil.copytree(ROOT / "tests_registry", registry)
-    for fault in CAUGHT:
-        copy_of(fault, registry)
+    tests, report = registry(tmp_path), tmp_path / "report"
+    specs = [str(copy_of(fault, tests)) for fault in CAUGHT]
     by_bus = dict(enumerate(CAUGHT, FIRST_CID))
     monkeypatch.setenv("FAULT", ",".join(f"{cid}={fault.name}" for cid, fault in by_bus.items()))
-    specs = [str(registry / fault.name / f"{fault.name}.dodo.yml") for fault in CAUGHT]
     dodo("run", *specs, "--application", str(APPLICATION), "--report", str(report), "--jobs", SILENT, code=1)
 
     found = {test["slug"].partition("--")[0]: test for test in results(report).values()}

@@ -1,6 +1,6 @@
 """An application that answers each picture by driving straight on, and tries meanwhile to decide its own test.
 
-python stranger.py --cid=111 --name=video0.argb --attack=NAME
+python stranger.py --cid=111 --name=video0.argb --attacks=CID=NAME,CID=NAME
 
 It says on its output what it found out. Attacks are functions of this file: they take the application and the number of
 the picture, 0 before the first.
@@ -263,7 +263,8 @@ def attached(app: Application) -> SharedMemory:
 
 
 def main() -> None:
-    attack = ATTACKS[FLAGS["attack"]]
+    by_bus = dict(pair.split("=") for pair in FLAGS["attacks"].split(","))
+    attack = ATTACKS[by_bus[FLAGS["cid"]]]
     with Session(int(FLAGS["cid"])) as session:
         app = Application(session)
         app.sampled = time.time_ns() // 1000

@@ -1,4 +1,4 @@
-"""An application attacks its own test over the bus, in namespaces and on the host."""
+"""Applications attack their own tests over the bus, in namespaces and on the host, all with one clock in one run."""
 
 import re
 import shutil
@@ -9,25 +9,44 @@ import pytest
 import yaml
 
 from tests.drive.applications import dodo, results
-from tests.hostile.bus.table import ATTACKS, STRAIGHT, BusAttack
-
-pytestmark = pytest.mark.slow
+from tests.drive.variants import registry, variant
+from tests.hostile.bus.table import ATTACKS, BusAttack
 
 BUSY = "the machine was too busy to judge: "
 HERE = Path(__file__).parent
+FIRST_CID = 128
 
 
-def attacked(folder: Path, attack: BusAttack, *words: str) -> dict[str, Any]:
-    """The test's result."""
-    shutil.copy(HERE / "stranger.py", folder)
-    command = f"--cid=111 --name=video0.argb --attack={attack.name}"
+def named(attack: BusAttack) -> str:
+    return f"{attack.name}-{attack.test.partition('--')[0]}"
+
+
+def chosen(clock: str, isolation: str) -> list[BusAttack]:
+    return sorted((each for each in ATTACKS if (each.clock, each.isolation) == (clock, isolation)), key=named)
+
+
+LOCKSTEP, REALTIME, ON_THE_HOST = (
+    chosen(*words) for words in (("lockstep", "network"), ("realtime", "network"), ("lockstep", "host"))
+)
+
+
+def attacked(folder: Path, attacks: list[BusAttack], isolation: str = "network") -> dict[str, dict[str, Any]]:
+    """The results of attacks, in one run: the application knows by its bus which is its own."""
+    tests = registry(folder)
+    specs = [str(variant(tests, each.test, named(each), isolation=isolation)) for each in attacks]
+    by_bus = ",".join(f"{cid}={each.name}" for cid, each in enumerate(attacks, FIRST_CID))
+    command = f"--cid=111 --name=video0.argb --attacks={by_bus}"
     service = {"image": "x", "command": command, "x-dodo-process": ["python", "stranger.py"]}
     compose, report = folder / "docker-compose.yml", folder / "report"
     compose.write_text(yaml.safe_dump({"services": {"stranger": service}}))
-    given = ("--application", str(compose), "--report", str(report), "--clock", attack.clock, *words)
-    dodo("run", attack.test, *given, code=(1, 3))
-    (test,) = results(report).values()
-    return test
+    shutil.copy(HERE / "stranger.py", folder)
+    given = ("--application", str(compose), "--report", str(report), "--clock", attacks[0].clock)
+    dodo("run", *specs, *given, code=(1, 3))
+    found = {slug.partition("--")[0]: test for slug, test in results(report).items()}
+    assert {name: test["cid"] for name, test in found.items()} == {
+        named(each): cid for cid, each in enumerate(attacks, FIRST_CID)
+    }
+    return found
 
 
 def check(test: dict[str, Any], attack: BusAttack) -> None:
@@ -38,15 +57,34 @@ def check(test: dict[str, Any], attack: BusAttack) -> None:
     assert re.search(attack.reason, reason), test["reason"]
 
 
-@pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: f"{attack.name}-{attack.test}-{attack.clock}")
-def test_it_does_not_get_through(tmp_path: Path, attack: BusAttack) -> None:
+@pytest.fixture(scope="module")
+def lockstep(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    return attacked(tmp_path_factory.mktemp("lockstep"), LOCKSTEP)
+
+
+@pytest.fixture(scope="module")
+def realtime(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    return attacked(tmp_path_factory.mktemp("realtime"), REALTIME)
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("bus-lockstep")
+@pytest.mark.parametrize("attack", LOCKSTEP, ids=named)
+def test_it_does_not_get_through(lockstep: dict[str, dict[str, Any]], attack: BusAttack) -> None:
     """An application that sends what only services may send does not decide its test."""
-    check(attacked(tmp_path, attack), attack)
+    check(lockstep[named(attack)], attack)
 
 
-@pytest.mark.parametrize("name", ["finish", "spy"])
-@pytest.mark.parametrize("clock", ["lockstep", "realtime"])
-def test_nor_on_the_host(tmp_path: Path, name: str, clock: str) -> None:
+@pytest.mark.realtime
+@pytest.mark.xdist_group("bus-realtime")
+@pytest.mark.parametrize("attack", REALTIME, ids=named)
+def test_nor_in_real_time(realtime: dict[str, dict[str, Any]], attack: BusAttack) -> None:
+    """The same in real time, where the attack races what the services send."""
+    check(realtime[named(attack)], attack)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attack", ON_THE_HOST, ids=named)
+def test_nor_on_the_host(tmp_path: Path, attack: BusAttack) -> None:
     """The same on the host, with the leases of this user, which keep it apart from other tests there."""
-    (attack,) = (each for each in ATTACKS if (each.name, each.test, each.clock) == (name, STRAIGHT, "lockstep"))
-    check(attacked(tmp_path, attack._replace(clock=clock), "--isolation", "host"), attack)
+    check(attacked(tmp_path, [attack], "host")[named(attack)], attack)
