@@ -4,8 +4,8 @@ DODO := .venv/bin/dodo
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
-# Tests in real time come first, beside nothing but the linters; two rigs at a time leave each of them a core
-RIGS ?= 2
+# Tests in real time come first, beside nothing but the linters: each mostly waits for its rig
+RIGS ?= $(WORKERS)
 PARTS := realtime-tests engine-tests other-tests first then
 
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
@@ -48,10 +48,10 @@ realtime-tests:
 	$(PYTEST) -n $(RIGS) --dist loadgroup -m realtime --junitxml=$(JUNIT)/realtime.xml
 
 engine-tests:
-	nice -n 5 $(PYTEST) -m engine --junitxml=$(JUNIT)/engine.xml
+	$(PYTEST) -m engine --junitxml=$(JUNIT)/engine.xml
 
 other-tests:
-	nice -n 10 $(PYTEST) -n $(WORKERS) --dist loadgroup -m "not engine and not realtime" --junitxml=$(JUNIT)/other.xml
+	$(PYTEST) -n $(WORKERS) --dist loadgroup -m "not engine and not realtime" --junitxml=$(JUNIT)/other.xml
 
 tools:
 	@scripts/install-test-tools
