@@ -4,20 +4,25 @@ from typing import Any
 
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
-DROPPED = ("NET_RAW", "MKNOD")
-"""Capabilities that engines give by default: to send as another container, and to make device files."""
+DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
+"""Capabilities that engines give by default and no OpenDLV program needs: to send as another container, for example.
+
+What a program that starts as root needs to give up root, it keeps.
+"""
 _DRIVERS = ("json-file", "local")
 _RESERVED_LABELS = ("com.docker.", "dodo.")
 _UNLIMITED = ("", "0", "-1")
 
 
 def confine(copy: ServiceCopy) -> None:
-    """Limits of processes and memory, fewer capabilities, logs that DoDo reads, and labels of the service's own."""
+    """Limits of processes, memory and files, no way to more privileges, logs that DoDo reads, labels of its own."""
     limits = copy.setting.limits
     _limit(copy, "pids_limit", "pids", limits.processes)
     _limit(copy, "mem_limit", "memory", limits.memory)
+    _limit_files(copy, limits.file_size)
     if not copy.setting.keeps_privileges:
         _drop_capabilities(copy)
+        _keep_privileges_down(copy)
     logging = copy.filled(copy.service.get("logging"))
     if isinstance(logging, dict) and logging.get("driver", "json-file") not in _DRIVERS:
         copy.remove("logging", "DoDo reads the logs")
@@ -43,6 +48,19 @@ def _limit(copy: ServiceCopy, key: str, word: str, default: int) -> None:
 
 def _is_limit(value: Any) -> bool:
     return value is not None and str(value).strip() not in _UNLIMITED
+
+
+def _limit_files(copy: ServiceCopy, size: int) -> None:
+    """The size of a file in bytes, and no core dumps, unless the service sets those."""
+    own = copy.service.get("ulimits")
+    copy.service["ulimits"] = {"core": 0, "fsize": size} | (own if isinstance(own, dict) else {})
+
+
+def _keep_privileges_down(copy: ServiceCopy) -> None:
+    """Programs such as sudo gain nothing, unless the service says that they do."""
+    own = list(copy.service.get("security_opt") or ())
+    if not any(str(copy.filled(word)).startswith("no-new-privileges") for word in own):
+        copy.service["security_opt"] = [*own, "no-new-privileges:true"]
 
 
 def _drop_capabilities(copy: ServiceCopy) -> None:

@@ -7,7 +7,13 @@ import pytest
 from dodo_dsl.plan.rewrite.container_limits import confine
 from tests.plan.rewrite.copies import copy
 
-DEFAULTS = {"pids_limit": 1024, "mem_limit": 2_000_000_000, "cap_drop": ["NET_RAW", "MKNOD"]}
+DEFAULTS = {
+    "pids_limit": 1024,
+    "mem_limit": 2_000_000_000,
+    "ulimits": {"core": 0, "fsize": 1_000_000_000},
+    "cap_drop": ["AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"],
+    "security_opt": ["no-new-privileges:true"],
+}
 
 
 @pytest.mark.parametrize(
@@ -20,7 +26,13 @@ DEFAULTS = {"pids_limit": 1024, "mem_limit": 2_000_000_000, "cap_drop": ["NET_RA
         ({"mem_limit": "${M:-8g}"}, {"mem_limit": "${M:-8g}"}),
         ({"mem_limit": "${M}"}, {"mem_limit": "${M}"}),
         ({"cap_drop": ["all"]}, {"cap_drop": ["all"]}),
-        ({"cap_drop": ["CAP_NET_RAW", "CHOWN"]}, {"cap_drop": ["CAP_NET_RAW", "CHOWN", "MKNOD"]}),
+        (
+            {"cap_drop": ["CAP_NET_RAW", "CHOWN"]},
+            {"cap_drop": ["CAP_NET_RAW", "CHOWN", "AUDIT_WRITE", "MKNOD", "SETFCAP", "SYS_CHROOT"]},
+        ),
+        ({"ulimits": {"core": -1, "nofile": 9}}, {"ulimits": {"core": -1, "fsize": 1_000_000_000, "nofile": 9}}),
+        ({"security_opt": ["no-new-privileges:false"]}, {"security_opt": ["no-new-privileges:false"]}),
+        ({"security_opt": ["${N:-no-new-privileges}"]}, {"security_opt": ["${N:-no-new-privileges}"]}),
         ({"logging": {"driver": "json-file"}}, {"logging": {"driver": "json-file"}}),
         ({"logging": {"driver": "${D:-syslog}"}}, {}),
         ({"labels": {"dodo.test": "x", "team": "a"}}, {"labels": {"team": "a"}}),
@@ -50,5 +62,5 @@ def test_limits_go_where_others_are() -> None:
 def test_on_a_rig_that_allows_privileges_capabilities_stay() -> None:
     own = copy({"privileged": True}, hil=True, privileged=True)
     confine(own)
-    assert "cap_drop" not in own.service
+    assert not {"cap_drop", "security_opt"} & set(own.service)
     assert own.service["pids_limit"] == 1024

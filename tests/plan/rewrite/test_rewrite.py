@@ -45,7 +45,13 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> 
 
 def test_own_network(tmp_path: Path) -> None:
     application = planned(tmp_path)
-    confined = {"pids_limit": 1024, "mem_limit": 2_000_000_000, "cap_drop": ["NET_RAW", "MKNOD"]}
+    confined = {
+        "pids_limit": 1024,
+        "mem_limit": 2_000_000_000,
+        "ulimits": {"core": 0, "fsize": 1_000_000_000},
+        "cap_drop": ["AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"],
+        "security_opt": ["no-new-privileges:true"],
+    }
     waits = {"sandbox": {"condition": "service_started"}, "track": {"condition": "service_healthy"}}
     assert application.folder == "../../team"
     assert application.compose == {
