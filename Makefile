@@ -4,8 +4,8 @@ DODO := .venv/bin/dodo
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
-# Tests in real time come first, beside nothing but the linters: each mostly waits for its rig
-RIGS ?= $(WORKERS)
+# Tests in real time come first, beside nothing but the linters: two at a time, as many have a rig
+RIGS ?= 2
 PARTS := realtime-tests engine-tests other-tests first then
 
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
