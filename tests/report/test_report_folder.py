@@ -101,7 +101,7 @@ def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
 
 
 def test_times_that_cannot_be_drawn_cost_no_report(tmp_path: Path) -> None:
-    (problem,) = write_report(tmp_path, [OUTCOME], {}, {"test": []})
+    (problem,) = write_report(tmp_path, [OUTCOME], {}, {"test": [], "other": []})
     assert problem.startswith("the times of these tests cannot be drawn: ")
     assert {p.name for p in tmp_path.iterdir()} == {"results.json", "junit.xml", "metrics.txt", "index.html"}
 

@@ -14,6 +14,7 @@ from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
 from dodo_dsl.cli.run.jobs import prepare
+from dodo_dsl.cli.run.loading import Loading, loading
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
 from dodo_dsl.opendlv.numbers import is_whole, number, whole
 from dodo_dsl.outcome import Outcome
@@ -102,10 +103,10 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
-    with work_folder() as folder:
+    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
         jobs, deployment = prepare(options, folder.path, stdout)
         _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-        runner = _runner(options, jobs, deployment, stdout, folder.lease.descriptor)
+        runner = _runner(options, jobs, deployment, stdout, load)
         outcomes, is_reported = _run(runner, jobs, options.report, stdout)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
@@ -122,7 +123,7 @@ def _refuse_to_keep(plans: Sequence[Plan]) -> None:
 
 
 def _runner(
-    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, descriptor: int
+    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, load: Loading
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or default_backend(plans)
@@ -130,12 +131,12 @@ def _runner(
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{forecast(order, jobs, backend)}\n")
     shown = progress.choose(stdout, [p.slug for p in plans])
-    backends = _backends(options, backend, plans, deployment, descriptor)
+    backends = _backends(options, backend, plans, deployment, load)
     return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
 
 
 def _backends(
-    options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, descriptor: int
+    options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, load: Loading
 ) -> Backends:
     if backend == "docker":
         if options.compiled and options.isolation not in (None, plans[0].isolation):
@@ -147,7 +148,8 @@ def _backends(
         raise UsageError(
             f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
         )
-    return Processes(deployment.cids, options.isolation, (descriptor,), _roots(options, deployment))
+    roots = _roots(options, deployment)
+    return Processes(deployment.cids, options.isolation, (load.descriptor,), roots, load.take())
 
 
 def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:

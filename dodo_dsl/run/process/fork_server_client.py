@@ -15,7 +15,10 @@ END_S = 10.0
 
 
 class ForkServer:
-    """The runner's end of the fork server, which ends when this is closed, or with the runner."""
+    """The runner's end of the fork server, which ends when this is closed, or with the runner.
+
+    It loads for a second before it serves; what is asked of it meanwhile waits.
+    """
 
     def __init__(self, descriptors: tuple[int, ...]) -> None:
         """``descriptors`` are those of leases that sandboxes hold, too."""
@@ -35,10 +38,19 @@ class ForkServer:
         """Starts a sandbox at the other end of ``channel``; raises OSError when the fork server has ended."""
         socket.send_fds(self._socket, [json.dumps({"slot": slot}).encode()], [channel.fileno(), log])
 
+    @property
+    def is_alive(self) -> bool:
+        return self._process.poll() is None
+
     def close(self) -> None:
         """Ends the fork server; the sandboxes stay."""
         self._socket.close()
         end(self._process)
+
+    def kill(self) -> None:
+        """Ends one that nothing was asked of, at once."""
+        self._process.kill()
+        self.close()
 
 
 class ForkedSandbox:
