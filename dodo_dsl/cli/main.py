@@ -1,40 +1,41 @@
 """``dodo``: parses the command line, calls one command, and turns every error into a sentence and an exit code."""
 
 import argparse
+import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from types import ModuleType
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from dodo_dsl import __version__
-from dodo_dsl.cli import compile as compile_command
-from dodo_dsl.cli import doctor as doctor_command
-from dodo_dsl.cli import explain as explain_command
-from dodo_dsl.cli import images as images_command
-from dodo_dsl.cli import list as list_command
-from dodo_dsl.cli import report as report_command
 from dodo_dsl.cli.errors import exit_code, sentence
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.cli.judge import command as judge_command
-from dodo_dsl.cli.new import command as new_command
-from dodo_dsl.cli.rec import command as rec_command
-from dodo_dsl.cli.rig import command as rig_command
-from dodo_dsl.cli.run import command as run_command
 from dodo_dsl.terminal import harmless_stream
 
-COMMANDS: dict[str, ModuleType] = {
-    "compile": compile_command,
-    "run": run_command,
-    "list": list_command,
-    "explain": explain_command,
-    "new": new_command,
-    "report": report_command,
-    "judge": judge_command,
-    "rec": rec_command,
-    "images": images_command,
-    "rig": rig_command,
-    "doctor": doctor_command,
+
+class Command(NamedTuple):
+    """A module below ``dodo_dsl.cli``, which is loaded only where its command is called, and what it does."""
+
+    module: str
+    summary: str
+
+    def load(self) -> ModuleType:
+        return importlib.import_module(f"dodo_dsl.cli.{self.module}")
+
+
+COMMANDS = {
+    "compile": Command("compile", "check tests and write their compose files and child pipeline"),
+    "run": Command("run.command", "run tests and judge the application"),
+    "list": Command("list", "list the tests and services"),
+    "explain": Command("explain", "explain a rule, or how a test is wired and what its application must provide"),
+    "new": Command("new.command", "write a new test, or what a repository with tests needs"),
+    "report": Command("report", "write the report of a finished run again"),
+    "judge": Command("judge.command", "judge the recording of a test again, also by other limits"),
+    "rec": Command("rec.command", "inspect, cut and export recordings"),
+    "images": Command("images", "build and push the images of DoDo's services"),
+    "rig": Command("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
+    "doctor": Command("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }
 
 DEBUG = "DODO_DEBUG"
@@ -47,8 +48,8 @@ _EXAMPLES = """examples:
 """
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
+def parser(called: Collection[str] = tuple(COMMANDS)) -> argparse.ArgumentParser:
+    """The command line, with the arguments of the commands that are ``called``."""
     top = argparse.ArgumentParser(
         prog="dodo",
         description="Declarative integration tests for robots and vehicles made of microservices.",
@@ -57,17 +58,18 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"dodo {__version__}")
     commands = top.add_subparsers(metavar="COMMAND", dest="command", required=True)
-    for name, module in COMMANDS.items():
-        summary = (module.__doc__ or "").splitlines()[0].split(": ", 1)[1].rstrip(".")
-        command = commands.add_parser(
+    for name, command in COMMANDS.items():
+        words = commands.add_parser(
             name,
-            help=summary,
-            description=summary,
-            epilog=module.EXAMPLES,
+            help=command.summary,
+            description=command.summary,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        module.add(command)
-        command.set_defaults(main=module.main)
+        if name in called:
+            module = command.load()
+            words.epilog = module.EXAMPLES
+            module.add(words)
+            words.set_defaults(main=module.main)
     return top
 
 
@@ -75,7 +77,7 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     """Runs one command. What it cannot do is one sentence here, and an exit code; so is argparse's SystemExit."""
     stdout, stderr = harmless_stream(stdout), harmless_stream(stderr)
     try:
-        options = parser().parse_args(argv)
+        options = parser(argv[:1]).parse_args(argv)
     except SystemExit as stop:
         return int(stop.code or 0)
     try:

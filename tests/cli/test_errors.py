@@ -32,7 +32,7 @@ def ended(error: BaseException, monkeypatch: pytest.MonkeyPatch, command: str = 
     def work(_options: Namespace, _stdout: TextIO, _stderr: TextIO) -> int:
         raise error
 
-    monkeypatch.setattr(COMMANDS[command], "main", work)
+    monkeypatch.setattr(COMMANDS[command].load(), "main", work)
     stdout, stderr = StringIO(), StringIO()
     code = main([command], stdout, stderr)
     assert stdout.getvalue() == ""

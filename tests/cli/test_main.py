@@ -1,5 +1,9 @@
 """The help of every command, which begins with its module's first line."""
 
+import ast
+import subprocess
+import sys
+
 import pytest
 
 from dodo_dsl.cli.main import COMMANDS, main, parser
@@ -11,7 +15,17 @@ def test_every_command_has_help_with_examples(command: str, capsys: pytest.Captu
     shown = capsys.readouterr().out
     assert f"usage: dodo {command}" in shown
     assert f"\nexamples:\n  dodo {command}" in shown
-    assert (COMMANDS[command].__doc__ or "").startswith(f"dodo {command}: ")
+    about = COMMANDS[command]
+    assert (about.load().__doc__ or "").startswith(f"dodo {command}: {about.summary}.")
+
+
+def test_help_loads_no_command() -> None:
+    """What every command needs is loaded, and nothing of what one of them does."""
+    shown = "import sys; from dodo_dsl.cli.main import main; main(['--help'], sys.stdout, sys.stderr); "
+    shown += "print([name for name in sys.modules if name.startswith('dodo_dsl.') or name in ('numpy', 'jinja2')])"
+    done = subprocess.run([sys.executable, "-c", shown], capture_output=True, text=True, check=True)
+    loaded = set(ast.literal_eval(done.stdout.splitlines()[-1]))
+    assert loaded <= {f"dodo_dsl.{name}" for name in ("cli", "cli.errors", "cli.exits", "cli.main", "terminal")}
 
 
 @pytest.mark.parametrize("words", [[], ["lst"], ["run", "--jobs"], ["rec", "info"]])
