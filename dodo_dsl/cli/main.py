@@ -14,7 +14,7 @@ from dodo_dsl.cli.exits import Exit
 from dodo_dsl.terminal import harmless_stream
 
 
-class Command(NamedTuple):
+class Subcommand(NamedTuple):
     """A module below ``dodo_dsl.cli``, which is loaded only where its command is called, and what it does."""
 
     module: str
@@ -25,17 +25,17 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
-    "compile": Command("compile", "check tests and write their compose files and child pipeline"),
-    "run": Command("run.command", "run tests and judge the application"),
-    "list": Command("list", "list the tests and services"),
-    "explain": Command("explain", "explain a rule, or how a test is wired and what its application must provide"),
-    "new": Command("new.command", "write a new test, or what a repository with tests needs"),
-    "report": Command("report", "write the report of a finished run again"),
-    "judge": Command("judge.command", "judge the recording of a test again, also by other limits"),
-    "rec": Command("rec.command", "inspect, cut and export recordings"),
-    "images": Command("images", "build and push the images of DoDo's services"),
-    "rig": Command("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
-    "doctor": Command("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
+    "compile": Subcommand("compile", "check tests and write their compose files and child pipeline"),
+    "run": Subcommand("run.command", "run tests and judge the application"),
+    "list": Subcommand("list", "list the tests and services"),
+    "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
+    "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),
+    "report": Subcommand("report", "write the report of a finished run again"),
+    "judge": Subcommand("judge.command", "judge the recording of a test again, also by other limits"),
+    "rec": Subcommand("rec.command", "inspect, cut and export recordings"),
+    "images": Subcommand("images", "build and push the images of DoDo's services"),
+    "rig": Subcommand("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
+    "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }
 
 DEBUG = "DODO_DEBUG"
