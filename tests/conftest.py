@@ -27,8 +27,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
-    A test in real time has two more tries, as other work on this machine may keep it waiting. Slow tests come first, so
-    that no worker is left with one at the end.
+    A test in real time has two more tries, as other work on this machine may keep it waiting.
     """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
@@ -37,7 +36,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -32,7 +32,7 @@ OF_ITS_ROOT = {
 CONTAINED = {"root": OF_ITS_IMAGE | OF_ITS_ENGINE | OF_ITS_NETWORK | OF_ITS_ROOT}
 CONTAINED["user"] = CONTAINED["root"] - OF_ITS_ROOT | {"has-capabilities"}
 CASES = [(user, name) for user, contained in CONTAINED.items() for name in sorted({*attacks.ATTACKS} - contained)]
-TEST = "sil-open-straight"
+TEST, LONG = "sil-closed-straight", {"track": {"with": {"max-time": "900 s"}}}
 MAY_HAVE = sum(1 << number for number in (0, 1, 3, 4, 5, 6, 7, 8, 10))
 """CHOWN, DAC_OVERRIDE, FOWNER, FSETID, KILL, SETGID, SETUID, SETPCAP, NET_BIND_SERVICE: to give up root."""
 
@@ -44,13 +44,13 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
 
 
 def attacked(user: str, folder: Path) -> dict[str, Any]:
-    spec = variant(registry(folder), TEST, "sil-attacked", clock="realtime")
+    spec = variant(registry(folder), TEST, "sil-attacked", clock="realtime", timeout="1000 s", evaluation=LONG)
     (folder / "application").mkdir()
     shutil.copy(attacks.__file__, folder / "application" / "attacks.py")
     service: dict[str, Any] = {
         "image": IMAGE,
         "entrypoint": ["python3", "-u", "/application/attacks.py"],
-        "command": "--cid=111 --name=video0.argb",
+        "command": "--ends --cid=111 --name=video0.argb",
         "volumes": ["./application:/application:ro"],
     }
     if user == "root":
@@ -67,10 +67,10 @@ def attacked(user: str, folder: Path) -> dict[str, Any]:
 
 @pytest.mark.parametrize("user", CONTAINED)
 def test_the_test_itself_goes_on(runs: dict[str, dict[str, Any]], user: str) -> None:
-    """The test is judged as if no attack had been tried: the application never answered."""
+    """The test goes on until the application ends, which is then to blame."""
     test = runs[user]["test"]
-    assert "no sample of groundSteering" in test["reason"], test
-    assert test["outcome"] == ("error" if test["machine"]["undecided"] else "failed"), test
+    assert test["outcome"] == "failed", test
+    assert test["reason"].startswith("application service 'stranger' ended with exit code 0 after "), test
 
 
 @pytest.mark.parametrize("user", CONTAINED)

@@ -1,7 +1,8 @@
 """Attacks of an application on the machine that tests it: each returns what it got hold of, or something false.
 
 Run as a program, it tries each in a process of its own, and prints a line of JSON an attack: its name, whether it got
-through, and how it ended. It needs only Python, as an application's own interpreter has it.
+through, and how it ended; then it waits, or ends with ``--ends``. It needs only Python, as an application's own
+interpreter has it.
 """
 
 import ctypes
@@ -408,7 +409,8 @@ def main() -> None:
     for name in ATTACKS:
         print(json.dumps({"attack": name, **_tried(name)}), flush=True)
     Path("/tmp/attacks-done").touch()
-    signal.pause()
+    if "--ends" not in sys.argv:
+        signal.pause()
 
 
 if __name__ == "__main__":
