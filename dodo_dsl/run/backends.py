@@ -62,6 +62,7 @@ class Processes:
     """Local processes, each test in namespaces of its own, or on the host in a leased slot, as on a real rig."""
 
     name = "process"
+    _fork_server: ForkServer | None = None
 
     def __init__(
         self,
@@ -69,18 +70,17 @@ class Processes:
         isolation: str | None,
         descriptors: tuple[int, ...],
         roots: Sequence[Path] = (),
-        fork_server: ForkServer | None = None,
+        loaded: Callable[[], ForkServer | None] = lambda: None,
     ) -> None:
         """``roots`` are the folders that tests come from, for the permission to use a rig.
 
-        A ``fork_server`` was started with the same ``descriptors``, to load while tests were compiled; it ends with
-        this, or at once where no test needs it.
+        ``loaded`` gives a fork server that was started with the same ``descriptors`` while tests were compiled.
         """
         self._cids = cids
         self._roots = roots
         self._isolation = isolation
         self._descriptors = descriptors
-        self._fork_server = fork_server
+        self._loaded = loaded
         self._alone = asyncio.Lock()
         self._problem = ""
         self._is_apart = True
@@ -93,9 +93,6 @@ class Processes:
         for left in leftovers.reap():
             note(f"removed what a killed run left: {left}")
         wanted = {self._isolation or plan.isolation for plan in plans}
-        if "network" not in wanted and self._fork_server is not None:
-            self._fork_server.kill()
-            self._fork_server = None
         if self._isolation is None and "network" in wanted:
             refusal = await asyncio.to_thread(host_isolation.namespaces_refusal)
             if refusal:
@@ -106,8 +103,11 @@ class Processes:
             self._is_apart = not refusal
             if refusal:
                 note(f"what an application starts may outlive its test on the host: {refusal}")
-        if "network" in wanted and self._fork_server is None:
-            self._fork_server = ForkServer(self._descriptors)
+        loaded = self._loaded()
+        if "network" in wanted:
+            self._fork_server = loaded or ForkServer(self._descriptors)
+        elif loaded is not None:
+            loaded.kill()
 
     def close(self) -> None:
         if self._fork_server is not None:

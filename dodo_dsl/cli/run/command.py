@@ -149,7 +149,7 @@ def _backends(
             f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
         )
     roots = _roots(options, deployment)
-    return Processes(deployment.cids, options.isolation, (load.descriptor,), roots, load.take())
+    return Processes(deployment.cids, options.isolation, (load.descriptor,), roots, load.take)
 
 
 def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:
