@@ -66,12 +66,12 @@ check:
 	@$(MAKE) --no-print-directory -j 3 style types quick-tests
 
 test:
-	@$(MAKE) --no-print-directory -j 2 dev tools
+	@$(MAKE) --no-print-directory -j 3 style types tools
 	@status=0; rm -f $(JUNIT)/*.xml; for part in first second third; do \
 		$(MAKE) --no-print-directory -j 3 --keep-going --output-sync=target $$part || status=$$?; done; \
 		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status
 
-first: realtime-tests style types
+first: realtime-tests
 
 second: engine-tests fast-tests
 

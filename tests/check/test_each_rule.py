@@ -11,6 +11,7 @@ import pytest
 
 from dodo_dsl import diagnostics
 from dodo_dsl.check import catalogue
+from dodo_dsl.cli.main import COMMANDS
 from dodo_dsl.diagnostics import Diagnostic
 from tests.check.test_bad_specs import CASES, expected, marked, said
 
@@ -25,6 +26,7 @@ def without(rule: str, patch: pytest.MonkeyPatch) -> None:
     def kept(found: Iterable[Diagnostic]) -> list[Diagnostic]:
         return _ordered(d for d in found if d.rule != rule)
 
+    COMMANDS["compile"].load()
     collectors = [m for m in sys.modules.values() if getattr(m, "ordered", None) is _ordered]
     assert {"dodo_dsl.compiler", "dodo_dsl.cli.compile"} <= {m.__name__ for m in collectors}
     for module in collectors:
