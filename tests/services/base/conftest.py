@@ -15,7 +15,10 @@ PATIENCE = 20.0
 
 
 class Process:
-    """A service as a process; every reading of its output has a limit in time."""
+    """A service as a process; every reading of its output has a limit in time.
+
+    What it says of updates that came late is left out: they are the machine's.
+    """
 
     def __init__(self, argv: list[str], environment: dict[str, str]) -> None:
         self.process = subprocess.Popen(
@@ -26,11 +29,22 @@ class Process:
             stderr=subprocess.PIPE,
             text=True,
         )
+        self._unread = b""
 
     def line(self) -> Any:
+        """The next line of its output, decoded."""
         assert self.process.stdout is not None
-        assert select.select([self.process.stdout], [], [], PATIENCE)[0], "the service is silent"
-        return json.loads(self.process.stdout.readline())
+        while True:
+            line, is_whole, rest = self._unread.partition(b"\n")
+            if is_whole:
+                self._unread = rest
+                if not _is_late(line):
+                    return json.loads(line)
+                continue
+            assert select.select([self.process.stdout], [], [], PATIENCE)[0], "the service is silent"
+            data = os.read(self.process.stdout.fileno(), 65_536)
+            assert data, "the service ended"
+            self._unread += data
 
     def stop(self) -> None:
         self.process.send_signal(signal.SIGTERM)
@@ -38,7 +52,12 @@ class Process:
     def end(self) -> tuple[int, str, str]:
         """Exit code, what is left of standard output, and standard error."""
         out, err = self.process.communicate(timeout=PATIENCE)
-        return self.process.returncode, out, err
+        left = (self._unread.decode() + out).splitlines(keepends=True)
+        return self.process.returncode, "".join(line for line in left if not _is_late(line.encode())), err
+
+
+def _is_late(line: bytes) -> bool:
+    return line.startswith(b'{"dodo": "late"')
 
 
 Start = Callable[..., Process]
