@@ -6,8 +6,6 @@ PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
 # `make test` has three parts, so that what takes the whole machine disturbs neither real time nor containers
 RIGS ?= 2
-# On machines that others share, a failure has to repeat to count; the output shows and counts what was tried again
-TWICE := --reruns 1
 PARTS := realtime-tests engine-tests fast-tests slow-tests first second third
 
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
@@ -50,13 +48,13 @@ realtime-tests:
 	$(PYTEST) -n $(RIGS) --dist loadgroup -m realtime --junitxml=$(JUNIT)/realtime.xml
 
 engine-tests:
-	$(PYTEST) $(TWICE) -m engine --junitxml=$(JUNIT)/engine.xml
+	$(PYTEST) -m engine --junitxml=$(JUNIT)/engine.xml
 
 fast-tests:
-	nice -n 5 $(PYTEST) $(TWICE) -m "not slow" --junitxml=$(JUNIT)/fast.xml
+	nice -n 5 $(PYTEST) -m "not slow" --junitxml=$(JUNIT)/fast.xml
 
 slow-tests:
-	$(PYTEST) $(TWICE) -n $(WORKERS) --dist loadgroup -m "slow and not engine and not realtime" --junitxml=$(JUNIT)/slow.xml
+	$(PYTEST) -n $(WORKERS) --dist loadgroup -m "slow and not engine and not realtime" --junitxml=$(JUNIT)/slow.xml
 
 tools:
 	@scripts/install-test-tools
