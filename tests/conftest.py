@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 
 from tests.faults import Book
 
-settings.register_profile("dodo", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
 settings.load_profile("dodo")  # how fast a machine is decides no test; `make check` chooses the other
 

@@ -26,7 +26,8 @@ from tests.run.desk import wait_for
 
 ROOT = Path(__file__).parents[2]
 HOSTILE = Path(__file__).parent / "hostile"
-DRIVE = "sil-closed-straight"
+DRIVES = ("sil-closed-straight",)
+LOCKSTEP = (*DRIVES, "dil-static-rig")
 HARMS = ("flood", "groups", "memory", "tmp")
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
@@ -67,72 +68,79 @@ def clean_engine() -> Iterator[None]:
 
 
 def compiled(folder: Path) -> Path:
-    """A drive in lockstep, with a minute for each answer, as this machine may be busy."""
+    """A drive and a recording for lockstep, with a minute for each answer, as this machine may be busy."""
     out, own = folder / "generated", folder / "deployment"
-    for name in ("maps", DRIVE):
+    for name in ("maps", "recordings", "truths", *LOCKSTEP):
         shutil.copytree(ROOT / "tests_registry" / name, own / "tests" / name)
     application = ROOT / "examples" / "kiwi" / "docker-compose.yml"
     (own / "dodo.yml").write_text(f"dodo: 1\nregistry: [tests]\napplication: {application}\n")
-    command = [sys.executable, "-m", "dodo_dsl", "compile", DRIVE, "-o", str(out)]
+    command = [sys.executable, "-m", "dodo_dsl", "compile", *LOCKSTEP, "-o", str(out)]
     subprocess.run(command, cwd=own, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True)
-    plan = json.loads((out / DRIVE / "test.json").read_text())
-    (clock,) = (service for service in plan["services"] if service["name"] == "dodo-clock")
-    clock["flags"].append({"name": "patience", "value": "60", "kind": "text"})
-    (out / DRIVE / "test.json").write_text(json.dumps(plan))
-    layer = out / DRIVE / "environment.compose.yml"
-    begin = re.compile(r"(  dodo-clock:\n.*?\n    command:\n)", re.DOTALL)
-    text, count = begin.subn(r'\1      - "--patience=60"\n', layer.read_text(), count=1)
-    assert count == 1
-    layer.write_text(text)
-    return out / DRIVE
+    for name in LOCKSTEP:
+        plan = json.loads((out / name / "test.json").read_text())
+        (clock,) = (service for service in plan["services"] if service["name"] == "dodo-clock")
+        clock["flags"].append({"name": "patience", "value": "60", "kind": "text"})
+        (out / name / "test.json").write_text(json.dumps(plan))
+        layer = out / name / "environment.compose.yml"
+        begin = re.compile(r"(  dodo-clock:\n.*?\n    command:\n)", re.DOTALL)
+        text, count = begin.subn(r'\1      - "--patience=60"\n', layer.read_text(), count=1)
+        assert count == 1
+        layer.write_text(text)
+    return out
 
 
-def lockstep(folder: Path, test: Path, backend: str) -> dict[str, Any]:
-    """The result of the drive."""
-    report = folder / backend
-    drive = start(folder, "--compiled", str(test), "--report", str(report), backend=backend)
-    said = drive.communicate(timeout=1800)[0]
-    assert drive.returncode == 0, said
-    return results(report)[DRIVE]
+def lockstep(folder: Path, out: Path, backend: str) -> dict[str, dict[str, Any]]:
+    """The results of both at once, each in a run and a report of its own."""
+    runs = {
+        name: start(folder, "--compiled", str(out / name), "--report", str(folder / backend / name), backend=backend)
+        for name in LOCKSTEP
+    }
+    said = {name: run.communicate(timeout=1800)[0] for name, run in runs.items()}
+    for name, run in runs.items():
+        assert run.returncode == 0, said[name]
+    return {name: results(folder / backend / name)[name] for name in LOCKSTEP}
 
 
 def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path) -> None:
-    """A drive beside a flood, traffic on all groups, memory scribbling and a full /tmp in another test."""
+    """Two tests at once, beside a flood, traffic on all groups, memory scribbling and a full /tmp in a third."""
     (tmp_path / "stop").mkdir()
-    test = compiled(tmp_path)
+    out = compiled(tmp_path)
     spec, compose = hostile_test(tmp_path)
     words = [str(spec), "--application", str(compose), "--report", str(tmp_path / "hostile")]
     hostile = start(tmp_path, *words)
     try:
         wait_for(hostile, "running")
-        theirs = lockstep(tmp_path, test, "docker")
+        theirs = lockstep(tmp_path, out, "docker")
         assert hostile.poll() is None
     finally:
         (tmp_path / "stop" / "now").touch()
         said, _ = hostile.communicate(timeout=600)
-    (harmed,) = results(tmp_path / "hostile").values()
-    assert harmed["outcome"] == "failed", said
-    assert re.match(r"application service '\w+' ended with exit code 0 after ", harmed["reason"]), harmed
+    (test,) = results(tmp_path / "hostile").values()
+    assert test["outcome"] == "failed", said
+    assert re.match(r"application service '\w+' ended with exit code 0 after ", test["reason"]), test
     for harm in HARMS:
         log = next((tmp_path / "hostile").glob(f"*/logs/application.{harm}.log")).read_text()
         assert log.startswith(f"hostile: {harm}")
-    same(theirs, lockstep(tmp_path, test, "process"))
-    checks = {check["name"]: check for check in theirs["checks"]}
-    assert set(checks) == {"time-to-goal", "wall-margin", "distance", "max-speed", "silence"}
-    assert checks["wall-margin"]["value"] > 0.03
-    kept = tmp_path / "docker" / DRIVE
-    assert (kept / "trajectory.png").is_file()
-    assert "frame 1:" in (kept / "logs" / "application.perception.log").read_text()
-    assert (kept / "test.rec").stat().st_size > 10_000
+    same(theirs, lockstep(tmp_path, out, "process"))
+    for slug in DRIVES:
+        checks = {c["name"]: c for c in theirs[slug]["checks"]}
+        assert set(checks) == {"time-to-goal", "wall-margin", "distance", "max-speed", "silence"}
+        assert checks["wall-margin"]["value"] > 0.03
+        assert (tmp_path / "docker" / slug / slug / "trajectory.png").is_file()
+        assert "frame 1:" in (tmp_path / "docker" / slug / slug / "logs" / "application.perception.log").read_text()
+        assert (tmp_path / "docker" / slug / slug / "test.rec").stat().st_size > 10_000
 
 
-def same(their: dict[str, Any], our: dict[str, Any]) -> None:
-    """Outcome, test time and values of a run in lockstep; libraries may be of other versions in images."""
-    for key in ("outcome", "clock", "sim_s"):
-        assert their[key] == our[key], key
-    assert our["clock"] == "lockstep"
-    values = [{c["name"]: c["value"] for c in t["checks"] if c["name"] != CHECK} for t in (our, their)]
-    assert values[0] == pytest.approx(values[1], rel=1e-3)
+def same(theirs: dict[str, dict[str, Any]], ours: dict[str, dict[str, Any]]) -> None:
+    """Outcome, test time and values of runs in lockstep; libraries may be of other versions in images."""
+    assert set(theirs) == set(ours)
+    for slug, our in ours.items():
+        their = theirs[slug]
+        for key in ("outcome", "clock", "sim_s"):
+            assert their[key] == our[key], (slug, key)
+        assert our["clock"] == "lockstep"
+        values = [{c["name"]: c["value"] for c in t["checks"] if c["name"] != CHECK} for t in (our, their)]
+        assert values[0] == pytest.approx(values[1], rel=1e-3)
 
 
 def hurry_emulators() -> None:
