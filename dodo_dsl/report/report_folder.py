@@ -70,7 +70,7 @@ def write_report(
 ) -> list[str]:
     """Writes the results first, draws each drive, and returns sentences on what could not be drawn.
 
-    ``times`` are those of all runs of these tests on this machine; of two tests and more they are drawn as well.
+    ``times`` are those of all runs of these tests on this machine; they are drawn as well.
     """
     outcomes = [results.writable(outcome) for outcome in outcomes]
     folder.mkdir(parents=True, exist_ok=True)
@@ -83,7 +83,7 @@ def write_report(
             except Exception as error:  # noqa: BLE001  (the data comes from services, and no plot may cost a verdict)
                 problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
     (folder / TIMES).unlink(missing_ok=True)
-    if times and len(times) > 1:
+    if times:
         try:
             with atomic.replacing(folder / TIMES) as part:
                 draw_times(times, platform.node() or "this machine", part)

@@ -100,16 +100,8 @@ def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
     assert (tmp_path / "project" / "logs").is_dir()
 
 
-def test_times_of_two_tests_are_drawn(tmp_path: Path) -> None:
-    assert write_report(tmp_path, [OUTCOME], {}, {"test": [(0.5, 1.0)], "other": [(0.4, 2.0), (0.6, 2.5)]}) == []
-    assert (tmp_path / "times.png").read_bytes().startswith(b"\x89PNG")
-    assert 'src="times.png"' in (tmp_path / "index.html").read_text()
-    assert write_report(tmp_path, [OUTCOME], {}, {"test": [(0.5, 1.0)]}) == []
-    assert not (tmp_path / "times.png").exists()
-
-
 def test_times_that_cannot_be_drawn_cost_no_report(tmp_path: Path) -> None:
-    (problem,) = write_report(tmp_path, [OUTCOME], {}, {"test": [], "other": []})
+    (problem,) = write_report(tmp_path, [OUTCOME], {}, {"test": []})
     assert problem.startswith("the times of these tests cannot be drawn: ")
     assert {p.name for p in tmp_path.iterdir()} == {"results.json", "junit.xml", "metrics.txt", "index.html"}
 
