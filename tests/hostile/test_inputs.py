@@ -9,10 +9,6 @@ from dodo_dsl.opendlv import regular_file
 from tests.hostile.command import dodo
 from tests.rec.conftest import video
 
-ROOT = Path(__file__).parents[2]
-STRANGER = 54_321
-
-
 READERS = {
     "info": ("rec", "info", "{}"),
     "cut": ("rec", "cut", "{}", "-o", "new.rec"),

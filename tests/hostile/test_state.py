@@ -9,9 +9,7 @@ import pytest
 from dodo_dsl.run import leases
 from dodo_dsl.run.history import History
 from dodo_dsl.state_folder import UnsafeFolder, secured
-
-ROOT = Path(__file__).parents[2]
-STRANGER = 54_321
+from tests.hostile.command import STRANGER
 
 
 @pytest.fixture

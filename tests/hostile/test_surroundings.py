@@ -12,7 +12,6 @@ from tests.hostile.command import dodo
 from tests.rec.conftest import video
 
 ROOT = Path(__file__).parents[2]
-STRANGER = 54_321
 
 
 def run(

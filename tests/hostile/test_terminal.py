@@ -14,10 +14,6 @@ from dodo_dsl.terminal import HarmlessStream, harmless_stream, json_text, printa
 from tests.hostile.command import dodo
 from tests.rec.conftest import BEGIN, dodo_rec, message
 
-ROOT = Path(__file__).parents[2]
-STRANGER = 54_321
-
-
 ATTACKS = {
     "title": "\x1b]0;owned\x07",
     "colour": "\x1b[31mred",

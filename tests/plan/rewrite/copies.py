@@ -4,6 +4,15 @@ from typing import Any
 
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 
+CONFINED: dict[str, Any] = {
+    "pids_limit": 1024,
+    "mem_limit": 2_000_000_000,
+    "ulimits": {"core": 0, "fsize": 1_000_000_000},
+    "cap_drop": ["AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"],
+    "security_opt": ["no-new-privileges:true"],
+}
+"""What confines a service that sets nothing."""
+
 
 def copy(
     service: dict[str, Any], *, isolation: str = "network", hil: bool = False, privileged: bool = False

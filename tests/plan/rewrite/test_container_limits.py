@@ -5,21 +5,13 @@ from typing import Any
 import pytest
 
 from dodo_dsl.plan.rewrite.container_limits import confine
-from tests.plan.rewrite.copies import copy
-
-DEFAULTS = {
-    "pids_limit": 1024,
-    "mem_limit": 2_000_000_000,
-    "ulimits": {"core": 0, "fsize": 1_000_000_000},
-    "cap_drop": ["AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"],
-    "security_opt": ["no-new-privileges:true"],
-}
+from tests.plan.rewrite.copies import CONFINED, copy
 
 
 @pytest.mark.parametrize(
     ("service", "changed"),
     [
-        ({}, DEFAULTS),
+        ({}, CONFINED),
         ({"pids_limit": 10, "mem_limit": "1g"}, {"pids_limit": 10, "mem_limit": "1g"}),
         ({"pids_limit": -1, "mem_limit": "0"}, {}),
         ({"mem_limit": "${M:-0}"}, {}),
@@ -42,7 +34,7 @@ DEFAULTS = {
 def test_what_a_service_gets(service: dict[str, Any], changed: dict[str, Any]) -> None:
     own = copy(service)
     confine(own)
-    assert own.service == {**DEFAULTS, **changed}
+    assert own.service == {**CONFINED, **changed}
 
 
 def test_limits_below_deploy_are_limits() -> None:

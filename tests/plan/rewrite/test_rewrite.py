@@ -5,6 +5,7 @@ from pathlib import Path
 from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Application
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from tests.plan.rewrite.copies import CONFINED
 
 COMPOSE = """\
 version: "3.6"
@@ -45,13 +46,6 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> 
 
 def test_own_network(tmp_path: Path) -> None:
     application = planned(tmp_path)
-    confined = {
-        "pids_limit": 1024,
-        "mem_limit": 2_000_000_000,
-        "ulimits": {"core": 0, "fsize": 1_000_000_000},
-        "cap_drop": ["AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"],
-        "security_opt": ["no-new-privileges:true"],
-    }
     waits = {"sandbox": {"condition": "service_started"}, "track": {"condition": "service_healthy"}}
     assert application.folder == "../../team"
     assert application.compose == {
@@ -63,14 +57,14 @@ def test_own_network(tmp_path: Path) -> None:
                 "volumes": ["tmp:/tmp:nocopy", "../../team/weights:/weights:ro"],
                 "command": "--cid=140 --name=video0.argb --threshold=${THRESHOLD:-3}",
                 "depends_on": waits,
-                **confined,
+                **CONFINED,
             },
             "steering": {
                 "image": "${DODO_IMAGE_STEERING:-registry.example.org/team/steering:latest}",
                 "environment": ["OD4SESSION_CID=140", "GAIN=2"],
                 "depends_on": {"perception": {"condition": "service_started"}, **waits},
                 "ipc": "service:sandbox",
-                **confined,
+                **CONFINED,
             },
         }
     }
