@@ -15,7 +15,7 @@ __all__ = ["record"]
 
 @pytest.fixture
 def strange(tmp_path: Path) -> Iterator[dict[str, Path]]:
-    """What is no file, by its kind; the devices are copies, so that a test that fails breaks no machine."""
+    """Paths that are not regular files, by kind. Devices are copies, so that a failing test damages nothing."""
     places = {name: tmp_path / f"strange-{name}" for name in ("fifo", "socket", "folder", "link", "device")}
     os.mkfifo(places["fifo"])
     listener = socket.socket(socket.AF_UNIX)

@@ -1,4 +1,4 @@
-"""Outputs replace files and nothing else, whatever the command and whoever made what is in their place."""
+"""The output of a command replaces regular files only, whoever made what is in its place."""
 
 import json
 import os
@@ -10,11 +10,10 @@ import pytest
 
 from dodo_dsl import atomic
 from dodo_dsl.report.report_folder import forget
-from tests.hostile.command import dodo
+from tests.hostile.command import STRANGER, dodo
 from tests.rec.conftest import Answer, dodo_rec, video
 
 ROOT = Path(__file__).parents[2]
-STRANGER = 54_321
 
 
 KINDS = {

@@ -1,4 +1,4 @@
-"""The fork server that loads while tests are compiled ends with whoever took it, or at once."""
+"""A fork server that was started early belongs to the backend that took it; one that nobody took is ended at once."""
 
 import argparse
 import tempfile
