@@ -17,7 +17,8 @@ settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCh
 settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
 settings.load_profile("dodo")  # how fast a machine is decides no test; `make check` chooses the other
 
-REALTIME_RERUNS, REALTIME_REST_S = 2, 5
+REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
+HANGS = "from pytest-timeout"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -27,13 +28,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
-    A test in real time has two more tries, as other work on this machine may keep it waiting.
+    A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs.
     """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.realtime)
         if item.get_closest_marker("realtime"):
-            item.add_marker(pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S))
+            item.add_marker(pytest.mark.timeout(REALTIME_LIMIT_S))
+            item.add_marker(
+                pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S, rerun_except=[HANGS])
+            )
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
 

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -41,8 +42,9 @@ def launch(module: str, folder: Path, *flags: str) -> subprocess.Popen[str]:
 
 def receive(session: Session, name: str, sender_stamp: int = 0) -> tuple[Envelope, Any]:
     """The next message of a name and sender stamp, with its envelope."""
+    end = time.monotonic() + PATIENCE
     while True:
-        envelope = session.receive(PATIENCE)
+        envelope = session.receive(max(0.0, end - time.monotonic()))
         assert envelope is not None, f"no {name} came"
         if (envelope.data_type, envelope.sender_stamp) == (session.messages.id(name), sender_stamp):
             return envelope, session.messages.decode(envelope.data_type, envelope.payload)

@@ -93,6 +93,7 @@ def test_what_a_killed_runner_leaves_misses_it_and_stops_the_rig(place: Place, c
         while receive(session, "dodo.Alive")[0].sent < ready:
             pass  # the gantry was not there yet
         while not any(place.rig.velocity):
+            assert gantry.poll() is None
             send(session, "opendlv.sim.KinematicState", vx=0.05)
             time.sleep(0.02)
         runner.kill()
@@ -108,6 +109,7 @@ def test_what_a_killed_runner_leaves_misses_it_and_stops_the_rig(place: Place, c
 def test_a_check_whose_runner_is_killed_stops_the_rig(place: Place) -> None:
     run = place.start("run", "hil-fake", *APPLICATION, "--backend", "process")
     while not place.rig.commands("CALIBRATE"):
+        assert run.poll() is None
         time.sleep(0.02)
     run.kill()
     run.wait()
