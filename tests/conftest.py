@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.faults import Book
+from tests.pressure import Pressure
 
 settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
@@ -19,6 +20,7 @@ settings.load_profile("dodo")  # how fast a machine is decides no test; `make ch
 
 REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"
+PRESSURE = Pressure()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -28,18 +30,26 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
-    A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs.
+    A test in real time has two more tries if other work on this machine kept it waiting; none if it hangs.
     """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.realtime)
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.timeout(REALTIME_LIMIT_S))
-            item.add_marker(
-                pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S, rerun_except=[HANGS])
-            )
+            tries = {"reruns": REALTIME_RERUNS, "reruns_delay": REALTIME_REST_S, "rerun_except": [HANGS]}
+            item.add_marker(pytest.mark.flaky(**tries, condition=PRESSURE.is_high))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
+
+
+@pytest.fixture(autouse=True)
+def pressure(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Measured for each try of a test in real time, and kept beside its result."""
+    PRESSURE.begin()
+    yield
+    if request.node.get_closest_marker("realtime") and PRESSURE.share is not None:
+        request.node.user_properties.append(("share of time in which programs waited", round(PRESSURE.share, 3)))
 
 
 @pytest.fixture(autouse=True, scope="session")
