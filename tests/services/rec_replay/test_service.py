@@ -176,10 +176,13 @@ def replayed_by_libcluon(cid: int, rec: Path) -> list[Envelope]:
     with Session(cid) as session:
         sink = subprocess.DEVNULL
         with subprocess.Popen([program, f"--cid={cid}", rec], stdout=sink, stderr=sink) as process:
-            heard = []
+            heard, last = [], time.monotonic()
             while (envelope := session.receive(0.3)) is not None or process.poll() is None:
                 if envelope is not None and envelope.data_type != STATUS:
                     heard.append(envelope)
+                    last = time.monotonic()
+                elif time.monotonic() > last + PATIENCE:
+                    process.kill()  # it has played all or hangs, which the messages tell
     return heard
 
 
