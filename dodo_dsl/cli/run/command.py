@@ -15,6 +15,7 @@ from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.loading import Loading, loading
+from dodo_dsl.cli.run.profile import COMMAND, FILE_NAME, Profile, ProfiledProgress
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
 from dodo_dsl.opendlv.numbers import is_whole, number, whole
 from dodo_dsl.outcome import Outcome
@@ -70,6 +71,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
     parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="folder of a compiled test")
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
+    parser.add_argument("--profile", action="store_true", help="show where the time went, and write DIR/profile.json")
     selection.add_application(parser)
 
 
@@ -101,17 +103,29 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     for signal_number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(signal_number, stop_like_interrupt)
     more_descriptors()
+    profile = Profile()
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
     with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
+        profile.enter(COMMAND, "compile")
         jobs, deployment = prepare(options, folder.path, stdout)
         _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-        runner = _runner(options, jobs, deployment, stdout, load)
-        outcomes, is_reported = _run(runner, jobs, options.report, stdout)
+        runner = _runner(options, jobs, deployment, stdout, load, profile)
+        outcomes, is_reported = _run(runner, jobs, options.report, stdout, profile)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
+    if options.profile:
+        _show(profile, options.report / FILE_NAME, stdout)
     return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
+
+
+def _show(profile: Profile, target: Path, stdout: TextIO) -> None:
+    profile.leave(COMMAND)
+    stdout.write("\n")
+    stdout.writelines(f"{printable(line)}\n" for line in profile.table())
+    profile.write(target)
+    stdout.write(f"profile: {target}\n")
 
 
 def _refuse_to_keep(plans: Sequence[Plan]) -> None:
@@ -123,14 +137,19 @@ def _refuse_to_keep(plans: Sequence[Plan]) -> None:
 
 
 def _runner(
-    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, load: Loading
+    options: argparse.Namespace,
+    jobs: Sequence[Job],
+    deployment: Deployment,
+    stdout: TextIO,
+    load: Loading,
+    profile: Profile,
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or default_backend(plans)
     order = schedule(options.jobs, expectation(backend), usage(backend))
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{forecast(order, jobs, backend)}\n")
-    shown = progress.choose(stdout, [p.slug for p in plans])
+    shown = ProfiledProgress(progress.choose(stdout, [p.slug for p in plans]), profile)
     backends = _backends(options, backend, plans, deployment, load)
     return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
 
@@ -158,12 +177,16 @@ def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:
     return [deployment.root, *named]
 
 
-def _run(runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO) -> tuple[list[Outcome], bool]:
+def _run(
+    runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO, profile: Profile
+) -> tuple[list[Outcome], bool]:
     """The outcomes, and whether the report holds all of them; they are printed in any case."""
     gone = forget(report.resolve(), [job.plan.slug for job in jobs])
+    profile.enter(COMMAND, "run")
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
     tests = {job.plan.slug: job.test for job in jobs}
+    profile.enter(COMMAND, "report")
     with undisturbed():
         history = History()
         history.add((tests[outcome.slug], outcome) for outcome in outcomes)
