@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 _KERNEL = Path("/proc/pressure/cpu")
-_BUSY = 0.3
-"""Share of the time; two tests in real time alone on two cores come to less."""
+_BUSY = 0.1
+"""Share of the time, as that for which an application may wait until a verdict is undecided."""
 
 
 def _waited() -> float | None:
