@@ -17,6 +17,7 @@ from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
+from dodo_dsl.run.process.commands import own_module
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.slot import Slot, new_key
 from dodo_dsl.run.protocol import Backend, BackendError
@@ -93,8 +94,9 @@ class Processes:
         for left in leftovers.reap():
             note(f"removed what a killed run left: {left}")
         wanted = {self._isolation or plan.isolation for plan in plans}
+        self._start_fork_server(plans if "network" in wanted else ())
         if self._isolation is None and "network" in wanted:
-            refusal = await asyncio.to_thread(host_isolation.namespaces_refusal)
+            refusal = await asyncio.to_thread(host_isolation.namespaces_refusal, self._fork_server)
             if refusal:
                 self._problem = f"the application cannot be isolated on this machine: {refusal}; {WAY_OUT}"
                 return
@@ -103,9 +105,13 @@ class Processes:
             self._is_apart = not refusal
             if refusal:
                 note(f"what an application starts may outlive its test on the host: {refusal}")
+
+    def _start_fork_server(self, plans: Sequence[Plan]) -> None:
+        """One for the services of these tests, none where there are none."""
         loaded = self._loaded()
-        if "network" in wanted:
+        if plans:
             self._fork_server = loaded or ForkServer(self._descriptors)
+            self._fork_server.load({own_module(service.process) for plan in plans for service in plan.services} - {""})
         elif loaded is not None:
             loaded.kill()
 

@@ -63,8 +63,8 @@ class Commands:
             KEY_VARIABLE: self.slot.key.hex(),
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
-        module = _is_module(service.process)
-        return Command(service.name, service.layer, words, environment, self.folder, service.judge, module)
+        is_module = bool(own_module(service.process))
+        return Command(service.name, service.layer, words, environment, self.folder, service.judge, is_module)
 
     def _flag(self, flag: Flag) -> str:
         values: dict[str, Callable[[], str]] = {
@@ -102,14 +102,13 @@ class Commands:
         return Command(service.name, "application", argv, environment, folder)
 
 
-def _is_module(process: Sequence[str]) -> bool:
-    """Whether a program is ``python -m`` with one of DoDo's own services."""
-    package, _, name = process[2].partition(".") if len(process) == 3 and process[:2] == ("python", "-m") else ("",) * 3
-    return (
-        package == "services"
-        and name.isidentifier()
-        and (package_data.root() / package / name / "__main__.py").is_file()
-    )
+def own_module(process: Sequence[str]) -> str:
+    """The module of ``python -m`` with one of DoDo's own services; empty for any other program."""
+    if len(process) != 3 or tuple(process[:2]) != ("python", "-m"):
+        return ""
+    package, _, name = process[2].partition(".")
+    is_ours = package == "services" and name.isidentifier()
+    return process[2] if is_ours and (package_data.root() / package / name / "__main__.py").is_file() else ""
 
 
 def ready_file(slot: str, service: str) -> str:

@@ -3,7 +3,8 @@
 Loading numpy, OpenCV and the like takes most of the processor time of a short test's set-up. Sandboxes with namespaces
 of their own are forked from here; their services are forks of them in turn.
 
-    runner to fork server   {"slot": name} with the sandbox's end of its channel and its log's descriptor
+    runner to fork server   {"load": [module of a service of DoDo's, ...]};
+                            {"slot": name} with the sandbox's end of its channel and its log's descriptor
 """
 
 import contextlib
@@ -14,6 +15,7 @@ import os
 import signal
 import socket
 import sys
+from collections.abc import Iterable
 
 from dodo_dsl.run.process import sandbox
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
@@ -28,40 +30,61 @@ LOADED = (
     "numpy",
     "cv2",
     "shapely",
-    "scipy.optimize",
-    "trimesh",
     "pyseccomp",
 )
-"""What services import; modules that are not installed are skipped."""
+"""What most services import."""
 
 
 def load() -> None:
-    """Imports LOADED without starting threads, and exempts it from the garbage collection of the forks."""
+    """Imports what most services need."""
+    _import(LOADED)
+    from dodo_dsl.opendlv.messages.message_set import MessageSet
+
+    MessageSet.standard()
+    _exempt()
+
+
+def load_services(modules: Iterable[str]) -> None:
+    """Imports what these services of DoDo's consist of, and what their packages name as LIBRARIES."""
+    for module in modules:
+        _import([module, f"{module}.__main__"])
+        sys.modules.pop(f"{module}.__main__", None)  # it runs as __main__
+        _import(getattr(sys.modules.get(module), "LIBRARIES", ()))
+    _exempt()
+
+
+def _import(names: Iterable[str]) -> None:
+    """Imports modules without starting threads; those that are not installed are skipped."""
     before = dict(os.environ)
     os.environ[_THREADS] = "1"
-    for name in LOADED:
+    for name in names:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
     os.environ.clear()
     os.environ.update(before)  # OpenCV sets some, too, and applications inherit them
-    from dodo_dsl.opendlv.messages.message_set import MessageSet
 
-    MessageSet.standard()
+
+def _exempt() -> None:
+    """Exempts all that is loaded from the garbage collection of the forks."""
     gc.collect()
     gc.freeze()
 
 
 def serve(runner: socket.socket) -> None:
-    """Forks a sandbox for each message, until the runner closes the socket."""
+    """Loads and forks as the runner's messages say, until it closes the socket."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel collects the forks
     while True:
         data, descriptors, _, _ = socket.recv_fds(runner, MAX_MESSAGE, 2)
         if not data:
             return
+        message = json.loads(data)
+        if "load" in message:
+            load_services(message["load"])
+            continue
         channel, log = descriptors
         if os.fork() == 0:
-            os._exit(_sandbox(runner, channel, log, json.loads(data)["slot"]))
+            os._exit(_sandbox(runner, channel, log, message["slot"]))
         os.close(channel)
         os.close(log)
 

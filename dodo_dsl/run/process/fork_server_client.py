@@ -1,5 +1,6 @@
 """The runner's end of the fork server, and of sandboxes that are its forks and not the runner's own children."""
 
+import contextlib
 import json
 import os
 import select
@@ -7,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterable
 
 from dodo_dsl.run.process.commands import package_path
 from dodo_dsl.run.process.environment import own_environment
@@ -33,6 +35,11 @@ class ForkServer:
                 start_new_session=True,
                 env={**own_environment(), "PYTHONPATH": package_path()},
             )
+
+    def load(self, modules: Iterable[str]) -> None:
+        """Lets the sandboxes to come have loaded these services of DoDo's."""
+        with contextlib.suppress(OSError):  # it has ended, which the next sandbox finds
+            self._socket.send(json.dumps({"load": sorted(modules)}).encode())
 
     def fork(self, channel: socket.socket, log: int, slot: str) -> None:
         """Starts a sandbox at the other end of ``channel``; raises OSError when the fork server has ended."""

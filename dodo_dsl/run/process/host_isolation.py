@@ -11,11 +11,13 @@ import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.process.confined.bubblewrap import PROGRAM
+from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
 from dodo_dsl.run.process.slot import Slot
@@ -24,21 +26,36 @@ from dodo_dsl.run.protocol import BackendError
 PROBE_S = 0.3
 
 
-def namespaces_refusal() -> str:
-    """Why tests and applications cannot have namespaces of their own on this machine; empty when they can."""
+def namespaces_refusal(fork_server: ForkServer | None = None) -> str:
+    """Why tests and applications cannot have namespaces of their own on this machine; empty when they can.
+
+    A sandbox tries it, which the fork server forks, where there is one.
+    """
+    answer = _probe(fork_server.fork) if fork_server is not None else {}
+    answer = answer or _probe(_start)
+    return str(answer.get("probe", answer.get("down", "the kernel refuses them")))
+
+
+def _probe(start: Callable[[socket.socket, int, str], "subprocess.Popen[bytes] | None"]) -> dict[str, Any]:
+    """What a sandbox answers that was started with its channel, its log and its slot; nothing when it ended."""
+    process = None
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    with ours, theirs:
-        argv = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(theirs.fileno()), "network"]
-        environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
-        process = subprocess.Popen(argv, pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL, env=environment)
-        theirs.close()
-        answer = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
+    with ours, Path(os.devnull).open("wb") as nowhere:
+        with theirs, contextlib.suppress(OSError):
+            process = start(theirs, nowhere.fileno(), "")
+        answer: dict[str, Any] = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
         if "up" in answer:
             ours.send(b'{"do": "probe"}')
             answer = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
-        ours.close()
+    if process is not None:
         process.wait()
-    return str(answer.get("probe", answer.get("down", "the kernel refuses them")))
+    return answer
+
+
+def _start(channel: socket.socket, _log: int, _slot: str) -> "subprocess.Popen[bytes]":
+    argv = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(channel.fileno()), "network"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+    return subprocess.Popen(argv, pass_fds=(channel.fileno(),), stdin=subprocess.DEVNULL, env=environment)
 
 
 def process_namespace_refusal() -> str:

@@ -14,7 +14,8 @@ import pytest
 
 from dodo_dsl.run import leases
 from dodo_dsl.run.process import leftovers
-from dodo_dsl.run.process.host_isolation import host_slot, runs_alone
+from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.host_isolation import host_slot, namespaces_refusal, runs_alone
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError
 from tests.run.desk import ROOT
@@ -117,3 +118,17 @@ def test_a_strange_record_removes_nothing_but_itself(slot: object, folder: Path)
     lease.leave()
     assert leftovers.reap() == []
     assert list(folder.glob("*.json")) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lives", [True, False])
+def test_a_fork_server_answers_as_a_sandbox_of_its_own_does(lives: bool) -> None:
+    """Also one that has ended, which says nothing about this machine."""
+    server = ForkServer(())
+    try:
+        if not lives:
+            server.kill()
+        assert namespaces_refusal(server) == namespaces_refusal()
+    finally:
+        if lives:
+            server.close()
