@@ -17,6 +17,7 @@ from dodo_dsl.emit.pipeline import pipeline_problems
 from dodo_dsl.emit.render import File, render_pipeline
 from dodo_dsl.plan.build import Compiled, build
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment.rig import PORT
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec, load_spec
 from dodo_dsl.spec.registry import locate
@@ -95,7 +96,8 @@ def load(
 def access(deployment: Deployment) -> Access:
     """What the deployment allows its application."""
     roots = (str(deployment.root),) if deployment.file else ()
-    return Access(roots, tuple(deployment.paths), deployment.environment, deployment.outside)
+    ports = tuple(port for rig in deployment.rigs.values() if (port := rig.text(PORT)))
+    return Access(roots, tuple(deployment.paths), deployment.environment, deployment.outside, ports=ports)
 
 
 def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Checked:

@@ -15,7 +15,7 @@ _TRIES_A_SECOND = 2
 class Container:
     """What the layer template needs of a service; ``after`` holds names with compose's condition.
 
-    ``ready_tries`` is how often its ready file is checked, twice a second.
+    ``ready_tries`` is how often its ready file is checked, twice a second. ``groups`` are those that may open devices.
     """
 
     name: str
@@ -27,6 +27,7 @@ class Container:
     after: tuple[tuple[str, str], ...]
     environment: tuple[tuple[str, str], ...]
     devices: tuple[str, ...]
+    groups: tuple[str, ...]
 
 
 def containers(plan: Plan, layer: str) -> list[Container]:
@@ -46,6 +47,7 @@ def containers(plan: Plan, layer: str) -> list[Container]:
             tuple(after),
             _environment(plan, service),
             service.devices,
+            ("dialout",) if service.port else ("video",) if service.devices else (),
         )
         for service in plan.layer(layer)
     ]

@@ -19,7 +19,7 @@ from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment.deployment import Deployment
-from dodo_dsl.spec.deployment.rig import EMULATED_FILE, Rig
+from dodo_dsl.spec.deployment.rig import EMULATED, EMULATED_FILE, PORT, Rig
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec
@@ -251,6 +251,7 @@ class _Builder:
             judge=use.layer == "evaluation",
             devices=_devices(service),
             setup_s=_setup_s(flags, manifest),
+            port=_port(service),
         )
         return hardware(planned, self.manifests, self._image(self.manifests[DRAWN].image))
 
@@ -278,6 +279,12 @@ def _devices(service: ResolvedService) -> tuple[str, ...]:
     """The device files among those that the manifest names; a rig's camera may have none (rpicam, a recording)."""
     named = (service.texts.get(device.strip("{}"), device) for device in service.manifest.devices)
     return tuple(device for device in named if is_device(device))
+
+
+def _port(service: ResolvedService) -> str:
+    """The port of the rig that a service moves, as its manifest declares; empty for the emulated rig."""
+    found = (a.text for a in service.arguments.values() if a.parameter.rig == PORT)
+    return next((port for port in found if port and port != EMULATED), "")
 
 
 def _setup_s(flags: Sequence[Flag], manifest: Manifest) -> float:

@@ -30,7 +30,7 @@ class PlannedService:
     """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts.
 
     ``devices`` are the device files that it needs, ``setup_s`` the seconds that it may take to get ready beyond
-    ``READY_S``.
+    ``READY_S``. ``port`` is the rig's, which no other service may open; empty where it moves none, or the emulated one.
     """
 
     layer: str
@@ -42,6 +42,7 @@ class PlannedService:
     judge: bool = False
     devices: tuple[str, ...] = ()
     setup_s: float = 0.0
+    port: str = ""
 
 
 @dataclass(frozen=True)

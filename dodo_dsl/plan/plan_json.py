@@ -91,6 +91,7 @@ def _problem(plan: Plan) -> str:
         "service layer": all(s.layer in LAYERS for s in plan.services),
         "flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),
         "set-up time": all(isinstance(s.setup_s, int | float) and 0 <= s.setup_s <= 86_400 for s in plan.services),
+        "port": all(isinstance(s.port, str) and "\0" not in s.port for s in plan.services),
         "device": all(is_device(d) for s in plan.services for d in s.devices),
         "command": all(isinstance(w, str) for s in services for w in s.process or ())
         and all(isinstance(w, str) for s in plan.application.services for w in s.command),
@@ -104,11 +105,11 @@ def _problem(plan: Plan) -> str:
 
 
 def _access(raw: dict[str, Any]) -> Access:
-    return Access(**{**raw, **{key: tuple(raw[key]) for key in ("roots", "paths", "passed")}})
+    return Access(**{**raw, **{key: tuple(raw[key]) for key in ("roots", "paths", "passed", "ports")}})
 
 
 def _is_access(access: Access) -> bool:
-    texts = (*access.roots, *access.paths, *access.passed)
+    texts = (*access.roots, *access.paths, *access.passed, *access.ports)
     flags = (access.outside, access.devices, access.privileged)
     return all(isinstance(text, str) for text in texts) and all(isinstance(flag, bool) for flag in flags)
 

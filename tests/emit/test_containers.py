@@ -55,3 +55,18 @@ def test_environment_has_what_has_a_value(plan: Plan) -> None:
         "DODO_RIG": "desk",
     }
     assert "./files:/dodo/files:ro" in vehicle.volumes, "the messages are there"
+
+
+def test_only_the_service_that_moves_the_rig_may_open_terminals(plan: Plan) -> None:
+    port = "/dev/ttyACM0"
+    services = (
+        PlannedService("action", "pose", "x", "image", (), devices=(port,), port=port),
+        PlannedService("action", "camera", "x", "image", (), devices=("/dev/video0",)),
+        PlannedService("action", "vehicle", "x", "image", ()),
+    )
+    found = containers(replace(plan, services=services), "action")
+    assert [(c.devices, c.groups) for c in found] == [
+        ((port,), ("dialout",)),
+        (("/dev/video0",), ("video",)),
+        ((), ()),
+    ]

@@ -31,7 +31,7 @@ def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator
     """Findings in what ``docker compose config --format json`` prints, each of which refuses the test."""
     rest = {key: value for key, value in config.items() if key != _SERVICES}
     yield from shared_findings(rest, test.paths, test.access.passed)
-    around = Surroundings(test.paths, {}, rest.get("volumes") or {}, compiled=True)
+    around = Surroundings(test.paths, {}, rest.get("volumes") or {}, compiled=True, ports=test.access.ports)
     for name, service in config.get(_SERVICES, {}).items():
         if name in test.application:
             found = [*service_findings(name, service, around), *_of_others(name, service, test)]

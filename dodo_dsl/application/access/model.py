@@ -8,7 +8,7 @@ from dodo_dsl.application.access.compose_keys import Rows
 from dodo_dsl.diagnostics import did_you_mean
 
 Steps = tuple[str | int, ...]
-Kind = Literal["refused", "unknown", "hardware", "privilege", "left out"]
+Kind = Literal["refused", "unknown", "hardware", "privilege", "port", "left out"]
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Access:
 
     ``roots`` are folders whose files are the application's own, beside those of its repository, ``paths`` others that
     it may mount, ``passed`` variables of DoDo's own environment. ``outside`` tells whether it may reach other networks,
-    ``devices`` and ``privileged`` what its rig allows.
+    ``devices`` and ``privileged`` what its rig allows. ``ports`` are those of the deployment's rigs: it gets none.
     """
 
     roots: tuple[str, ...] = ()
@@ -26,13 +26,15 @@ class Access:
     outside: bool = False
     devices: bool = False
     privileged: bool = False
+    ports: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class AccessFinding:
     """A key or value that a test may not have; ``steps`` lead to it from where the search began.
 
-    ``hardware`` and ``privilege`` stay on rigs that allow them; they and what is ``left out`` are not in the copy.
+    ``hardware`` and ``privilege`` stay on rigs that allow them; they, a rig's ``port`` and what is ``left out`` are not
+    in the copy.
     """
 
     steps: Steps

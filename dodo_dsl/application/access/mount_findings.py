@@ -1,9 +1,10 @@
 """What a service may not mount."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from dodo_dsl.application import host_access
+from dodo_dsl.application.access import rig_ports
 from dodo_dsl.application.access.compose_keys import MOUNT
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.model import AccessFinding, Steps, key_findings
@@ -16,9 +17,9 @@ _WITHOUT = "is left out of sil and dil tests, which have no hardware"
 
 
 def mount_findings(
-    name: str, service: Mapping[str, Any], paths: HostPaths, volumes: Mapping[str, Any]
+    name: str, service: Mapping[str, Any], paths: HostPaths, volumes: Mapping[str, Any], ports: Sequence[str] = ()
 ) -> Iterator[AccessFinding]:
-    """Mounts of the host, of its hardware, and of ``volumes`` that others use, too."""
+    """Mounts of the host, of its hardware, of rigs' ``ports``, and of ``volumes`` that others use, too."""
     written = service.get("volumes")
     for item, volume in enumerate(written if isinstance(written, list) else ()):
         found = host_access.mount(volume)
@@ -27,7 +28,7 @@ def mount_findings(
             yield from (f.below(*steps) for f in _long_form(name, volume))
             steps = (*steps, "source") if "source" in volume else steps
         if _is_bind(volume, found.source):
-            yield from (f.below(*steps) for f in _bind(name, found, paths))
+            yield from (f.below(*steps) for f in _bind(name, found, paths, ports))
             continue
         about = volumes.get(found.source)
         if host_access.is_external(about) and not found.read_only:
@@ -41,7 +42,7 @@ def _is_bind(volume: Any, source: str) -> bool:
     return is_path(source)
 
 
-def _bind(name: str, found: host_access.Mount, paths: HostPaths) -> Iterator[AccessFinding]:
+def _bind(name: str, found: host_access.Mount, paths: HostPaths, ports: Sequence[str]) -> Iterator[AccessFinding]:
     problem, hint = "", ""
     seen = host_access.Mount(paths.whole(found.source), found.target, found.read_only)
     if "$" in found.source:
@@ -50,6 +51,8 @@ def _bind(name: str, found: host_access.Mount, paths: HostPaths) -> Iterator[Acc
         problem, hint = f"'{found.source}' belongs to the host, so tests would share it", _SOCKET_HINT
     elif host_access.is_of_machine(seen.source):
         problem, hint = f"'{found.source}' gives access to the host's disks or memory", "remove it"
+    elif rig_ports.is_port(seen.source, ports):
+        yield AccessFinding((), f"'{found.source}' of '{name}' {rig_ports.WHY}", rig_ports.HINT, "port")
     elif host_access.is_hardware(seen) and found.source.startswith("/"):
         yield AccessFinding((), f"'{found.source}' of '{name}' {_WITHOUT}", kind="hardware")
     else:

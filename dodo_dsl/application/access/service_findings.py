@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.application import host_access
+from dodo_dsl.application.access import rig_ports
 from dodo_dsl.application.access.build_findings import build_findings
 from dodo_dsl.application.access.compose_keys import SERVICE
 from dodo_dsl.application.access.host_paths import ASK, HostPaths
-from dodo_dsl.application.access.model import AccessFinding, key_findings
+from dodo_dsl.application.access.model import AccessFinding, Steps, key_findings
 from dodo_dsl.application.access.mount_findings import mount_findings
 
 PROFILE_HINT = "give the service a profile, so that it starts with 'docker compose --profile' and not in a test"
@@ -23,23 +24,24 @@ _RULE_OF_CHARACTERS = re.compile(r"c [0-9*]+:[0-9*]+ [rwm]+")
 class Surroundings:
     """What a service's values are judged by: the host's paths, and the application's containers and volumes.
 
-    ``compiled`` tells that the service is a test's copy, from which much has been removed.
+    ``compiled`` tells that the service is a test's copy, from which much has been removed. ``ports`` are those of rigs.
     """
 
     paths: HostPaths
     containers: Mapping[str, str] = field(default_factory=dict)
     volumes: Mapping[str, Any] = field(default_factory=dict)
     compiled: bool = False
+    ports: tuple[str, ...] = ()
 
 
 def service_findings(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
     """Everything that ``service`` may not have; ``name`` is how messages call it."""
     yield from key_findings(f"'{name}'", _WITHOUT_SPECIAL, service, around.compiled)
     yield from _namespaces(service, around)
-    yield from mount_findings(name, service, around.paths, around.volumes)
+    yield from mount_findings(name, service, around.paths, around.volumes, around.ports)
     yield from _strangers(service, around)
     yield from _files(service, around.paths)
-    yield from _hardware(name, service)
+    yield from _hardware(name, service, around.ports)
     yield from _confinement(name, service)
     yield from _hooks(name, service)
     if service.get("build") is not None:
@@ -87,28 +89,39 @@ def _files(service: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]
             yield AccessFinding(steps, problem, ASK)
 
 
-def _hardware(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
+def _hardware(name: str, service: dict[str, Any], ports: tuple[str, ...]) -> Iterator[AccessFinding]:
     if host_access.is_true(service.get("privileged", False)):
         yield AccessFinding(("privileged",), f"'privileged' of '{name}' {_WITHOUT}", kind="privilege")
+    yield from _devices(name, service, ports)
+    for item, word in enumerate(_items(service.get("cap_add"))):
+        if not host_access.is_harmless_capability(word):
+            yield AccessFinding(("cap_add", item), f"capability '{word}' of '{name}' {_WITHOUT}", kind="privilege")
+
+
+def _devices(name: str, service: dict[str, Any], ports: tuple[str, ...]) -> Iterator[AccessFinding]:
     for item, word in enumerate(_items(service.get("devices"))):
         shown = word.get("source") if isinstance(word, dict) else word
         steps = ("devices", item, "source") if isinstance(word, dict) else ("devices", item)
         if host_access.is_of_machine(shown):
             message = f"device '{shown}' gives access to the host's disks or memory"
             yield AccessFinding(steps, message, "remove it")
+        elif rig_ports.holds_port(rig_ports.source(word), ports):
+            yield _port(steps, f"device '{shown}' of '{name}'")
         else:
             yield AccessFinding(steps, f"device '{shown}' of '{name}' {_WITHOUT}", kind="hardware")
     for item, word in enumerate(_items(service.get("device_cgroup_rules"))):
-        if "$" in str(word) or _RULE_OF_CHARACTERS.fullmatch(str(word)):
-            yield AccessFinding(
-                ("device_cgroup_rules", item), f"device '{word}' of '{name}' {_WITHOUT}", kind="hardware"
-            )
+        steps = ("device_cgroup_rules", item)
+        if rig_ports.is_rule_for_port(word, ports):
+            yield _port(steps, f"rule '{word}' of '{name}'")
+        elif "$" in str(word) or _RULE_OF_CHARACTERS.fullmatch(str(word)):
+            yield AccessFinding(steps, f"device '{word}' of '{name}' {_WITHOUT}", kind="hardware")
         else:
             message = f"the rule '{word}' gives access to the host's disks"
-            yield AccessFinding(("device_cgroup_rules", item), message, "name character devices, for example c 81:* rw")
-    for item, word in enumerate(_items(service.get("cap_add"))):
-        if not host_access.is_harmless_capability(word):
-            yield AccessFinding(("cap_add", item), f"capability '{word}' of '{name}' {_WITHOUT}", kind="privilege")
+            yield AccessFinding(steps, message, "name character devices, for example c 81:* rw")
+
+
+def _port(steps: Steps, what: str) -> AccessFinding:
+    return AccessFinding(steps, f"{what} {rig_ports.WHY}", rig_ports.HINT, "port")
 
 
 def _confinement(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:

@@ -1,13 +1,17 @@
 """``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
 
-``rig-isolation``: hardware is on the host's network. ``rig-device``: a test moves the rig that it names and no other.
+``rig-isolation``: hardware is on the host's network. ``rig-device``: a test moves the rig that it names and no other,
+and only the service that moves it opens its port.
 """
 
+import os
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.spec.deployment.rig import EMULATED, is_simulated
+from dodo_dsl.spec.arguments import Argument
+from dodo_dsl.spec.deployment.rig import EMULATED, PORT, is_simulated
+from dodo_dsl.spec.model import Use
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
@@ -36,10 +40,27 @@ def _devices(context: RuleContext) -> Iterator[Diagnostic]:
     rig = context.rig
     for service in context.services:
         for argument in service.arguments.values():
-            port = argument.value.text if argument.value and argument.parameter.rig == "serial" else EMULATED
-            if is_simulated(port) or (rig is not None and port == rig.text("serial")):
+            if argument.parameter.rig != PORT:
+                yield from _strangers(context, service.use, argument)
+                continue
+            port = argument.value.text if argument.value else EMULATED
+            if is_simulated(port) or (rig is not None and port == rig.text(PORT)):
                 continue
             span = argument.entry.value.span if argument.entry else service.use.span
             owner = f"rig '{rig.name}' does not have it" if rig else "the test runs on no rig"
             message = f"'{service.use.name}' would move what is at '{port}', and {owner}"
             yield Diagnostic(span, "rig-device", message, "name the rig of dodo.yml that has the port with 'rig'")
+
+
+def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[Diagnostic]:
+    """Ports of rigs in other parameters: their services do not move the rig, and may not open its port."""
+    written = argument.text or ""
+    if argument.entry is None or not written.startswith(("/", "socket:")):
+        return
+    names = {written, os.path.realpath(written)}
+    for rig in context.deployment.rigs.values():
+        port = rig.text(PORT)
+        if port and not names.isdisjoint({port, os.path.realpath(port)}):
+            message = f"'{use.name}' would open '{written}', the port of rig '{rig.name}'"
+            hint = "only the service that moves the rig opens its port; name another device"
+            yield Diagnostic(argument.entry.value.span, "rig-device", message, hint)

@@ -1,9 +1,10 @@
 """Removes a service's access to the host: hardware, privileges, names, ports, restarts."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 from dodo_dsl.application import host_access
+from dodo_dsl.application.access import rig_ports
 from dodo_dsl.application.access.compose_keys import BUILD, SERVICE, removed
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
@@ -59,6 +60,7 @@ def remove_hardware(copy: ServiceCopy) -> None:
         build = service.get("build")
         if isinstance(build, dict):
             _remove_from_build(copy, build, ("privileged",))
+    _remove_ports(copy)
     if setting.hil:
         return
     for key in host_access.HARDWARE_KEYS:
@@ -71,6 +73,21 @@ def remove_hardware(copy: ServiceCopy) -> None:
         else:
             kept.append(volume)
     copy.keep_items("volumes", kept)
+
+
+def _remove_ports(copy: ServiceCopy) -> None:
+    """The ports of rigs, which their own services open."""
+    ports = copy.setting.ports
+    tests: dict[str, Callable[[Any], bool]] = {
+        "devices": lambda word: rig_ports.holds_port(rig_ports.source(word), ports),
+        "device_cgroup_rules": lambda word: rig_ports.is_rule_for_port(word, ports),
+        "volumes": lambda word: rig_ports.is_port(host_access.mount(word).source, ports),
+    }
+    for key, leads in tests.items():
+        words = copy.service.get(key)
+        if isinstance(words, list) and (taken := [word for word in words if leads(copy.filled(word))]):
+            copy.note(f"{key}: the rig's port removed")
+            copy.keep_items(key, [word for word in words if word not in taken])
 
 
 def _remove_capabilities(copy: ServiceCopy) -> None:

@@ -42,8 +42,8 @@ def plan_application(
     """
     base = _relative(application.folder, folder)
     names = frozenset(application.services)
-    containers, known = application.containers, application.known
-    setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits)
+    containers, known, ports = application.containers, application.known, application.access.ports
+    setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits, ports)
     changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
     path_variables: set[str] = set()
 

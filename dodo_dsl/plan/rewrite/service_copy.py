@@ -13,7 +13,7 @@ class Setting:
     """Properties of a test; ``waits`` are the services of DoDo after which the application starts.
 
     ``names`` are the application's services that start, ``containers`` their names by ``container_name``, ``known`` the
-    variables whose values are known, and ``limits`` what a service gets that sets none.
+    variables whose values are known, ``limits`` what a service gets that sets none, and ``ports`` those of rigs.
     """
 
     cid: int
@@ -25,6 +25,7 @@ class Setting:
     privileged_allowed: bool = False
     known: Mapping[str, str] = field(default_factory=dict)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
+    ports: tuple[str, ...] = ()
 
     @property
     def own_network(self) -> bool:

@@ -6,6 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from dodo_dsl.run.application_files import application_paths, env_file_findings,
 from dodo_dsl.run.docker.masks import masks
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.rigs.ports import known_ports
 
 _BUILD_PROJECT = "dodo-build"
 _OVERLAP = "overlaps"
@@ -64,7 +66,8 @@ class Compose:
         names = {service.name for service in plan.services} | {SANDBOX}
         own_network = plan.isolation == "network"
         application = {service.name for service in plan.application.services}
-        return CompiledTest(application, names, images, own_network, plan.application.access, self._paths)
+        access = replace(plan.application.access, ports=tuple(known_ports(plan)))
+        return CompiledTest(application, names, images, own_network, access, self._paths)
 
     @staticmethod
     def _refuse(findings: Iterable[AccessFinding]) -> None:

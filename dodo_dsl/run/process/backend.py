@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +117,8 @@ class ProcessBackend:
         output = ServiceOutput(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
         self._pids[command.name] = asyncio.get_running_loop().create_future()
-        words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module}
+        hidden = command.masked if self.isolation == "host" and self.is_apart else ()
+        words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module, "masked": hidden}
         message = {"do": "start", "id": command.name, "confined": self._confined(command), **words}
         try:
             self._sandbox.send({**message, "env": changes(own_environment(), command.environment)}, (output.writer,))
@@ -130,7 +132,8 @@ class ProcessBackend:
             return None
         application = self.plan.application
         hidden = hidden_folders(application, self._folder, self.report)
-        return confinement(command.folder, self.isolation, self.cid, application.limits, hidden).to_json()
+        confined = confinement(command.folder, self.isolation, self.cid, application.limits, hidden)
+        return replace(confined, masked=command.masked).to_json()
 
     async def next_event(self) -> Event:
         return await self._events.get()

@@ -51,8 +51,19 @@ class Children:
         """Forks this process for a Python module, and gives the process id; raises OSError."""
         return self._add(name, ForkedModule(words, environment, folder, output))
 
-    def start(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> int:
-        """Starts a program, and gives its process id; raises OSError, SubprocessError and ValueError."""
+    def start(
+        self,
+        name: str,
+        words: Sequence[str],
+        environment: dict[str, str],
+        folder: str,
+        output: int,
+        masked: Sequence[str] = (),
+    ) -> int:
+        """Starts a program that does not see ``masked`` devices, and gives its process id.
+
+        Raises OSError, SubprocessError and ValueError.
+        """
         child = subprocess.Popen(
             words,
             env=environment,
@@ -61,7 +72,7 @@ class Children:
             stdout=output,
             stderr=output,
             start_new_session=True,
-            preexec_fn=functools.partial(namespaces.end_with, os.getpid()),  # noqa: PLW1509  (it has one thread)
+            preexec_fn=functools.partial(_begin, os.getpid(), masked),  # noqa: PLW1509  (it has one thread)
         )
         return self._add(name, child)
 
@@ -134,6 +145,12 @@ class Children:
                     os.kill(pid, signal.SIGKILL)
             time.sleep(_KILL_S)
             self.reap()
+
+
+def _begin(parent: int, masked: Sequence[str]) -> None:
+    """Between fork and exec."""
+    namespaces.mask(masked)
+    namespaces.end_with(parent)
 
 
 def _within(bubblewrap: int) -> Iterator[int]:

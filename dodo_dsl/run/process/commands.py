@@ -19,6 +19,7 @@ from dodo_dsl.run.process.environment import (
     own_environment,
 )
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
+from dodo_dsl.run.rigs.ports import masked
 
 OWN_VARIABLES = ("PYTHONPATH", SLOT_VARIABLE)
 """Variables with other values in the sandbox than in the runner: they are always set."""
@@ -36,6 +37,8 @@ class Command:
     is_evaluator: bool = False
     is_module: bool = False
     """Whether it is one of DoDo's own Python modules, which may be forked from a process with their libraries."""
+    masked: tuple[str, ...] = ()
+    """Device files that it must not see: the ports of rigs that it does not move."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ class Commands:
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         is_module = bool(own_module(service.process))
-        return Command(service.name, service.layer, words, environment, self.folder, service.judge, is_module)
+        hidden = tuple(masked(self.plan, service))
+        return Command(service.name, service.layer, words, environment, self.folder, service.judge, is_module, hidden)
 
     def _flag(self, flag: Flag) -> str:
         values: dict[str, Callable[[], str]] = {
@@ -99,7 +103,8 @@ class Commands:
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.slot.cid), self.slot.memory_prefix)
         environment = {**inherited, **own, SLOT_VARIABLE: self.slot.name}
-        return Command(service.name, "application", argv, environment, folder)
+        hidden = tuple(masked(self.plan, None))
+        return Command(service.name, "application", argv, environment, folder, masked=hidden)
 
 
 def own_module(process: Sequence[str]) -> str:

@@ -11,11 +11,12 @@ import os
 import signal
 import socket
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 _CLONE_NEWNS, _CLONE_NEWIPC, _CLONE_NEWUSER = 0x00020000, 0x08000000, 0x10000000
 _CLONE_NEWPID, _CLONE_NEWNET = 0x20000000, 0x40000000
-_MS_BIND, _MS_REC, _MS_PRIVATE, _MS_NOSUID, _MS_NODEV = 4096, 16384, 1 << 18, 2, 4
+_MS_BIND, _MS_REC, _MS_PRIVATE, _MS_SLAVE, _MS_NOSUID, _MS_NODEV = 4096, 16384, 1 << 18, 1 << 19, 2, 4
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _SIOCSIFFLAGS, _IFF_UP, _IFF_RUNNING = 0x8914, 1, 64
 _RTM_NEWROUTE, _NLM_F_REQUEST, _NLM_F_ACK, _NLM_F_CREATE = 24, 1, 4, 0x400
@@ -60,9 +61,22 @@ def adopt_orphans() -> None:
     _call("prctl", _PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
+def mask(devices: Sequence[str]) -> None:
+    """This process, and what it starts, sees /dev/null in the place of device files; raises OSError."""
+    if not devices:
+        return
+    _unshare(_CLONE_NEWNS)
+    _call("mount", b"none", b"/", None, _MS_REC | _MS_SLAVE, None)
+    for device in devices:
+        bind(Path("/dev/null"), Path(device), deep=False)
+
+
 def unshare() -> None:
     """Leaves the host's namespaces; the next fork is process 1 of its own. Raises OSError where the kernel refuses."""
-    flags = _CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID
+    _unshare(_CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID)
+
+
+def _unshare(flags: int) -> None:
     user, group = os.getuid(), os.getgid()
     if user == 0:
         _call("unshare", flags)

@@ -6,16 +6,17 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
 
     runner to sandbox   {"do": "start", "id", "argv", "env", "cwd", "fork"} with the output's descriptor,
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
-                        is a Python module for which a fork of the sandbox will do, "confined" the
-                        application's confinement or null; {"do": "close"}; {"do": "probe"};
-                        {"do": "send", "cid", "data"}; {"do": "keep"} with the descriptors of outputs and logs;
-                        {"do": "load"}
+                        is a Python module for which a fork of the sandbox will do, "masked" the device files
+                        that it must not see, "confined" the application's confinement or null;
+                        {"do": "close"}; {"do": "probe"}; {"do": "send", "cid", "data"}; {"do": "load"};
+                        {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or {"unstartable": id, "why"};
                         {"exited": id, "code", "used", "failed"}; {"load": snapshot or null};
                         {"probe": why an application cannot be confined, or ""}
 """
 
 import contextlib
+import functools
 import json
 import os
 import select
@@ -125,7 +126,8 @@ class Sandbox:
     def _do_start(self, descriptors: list[int], **command: Any) -> None:
         name, words, output = command["id"], command["argv"], descriptors[0]
         environment = {k: v for k, v in {**os.environ, **command["env"]}.items() if v is not None}
-        start = self.children.fork if self.forks and command["fork"] else self.children.start
+        is_fork = self.forks and command["fork"] and not command["masked"]
+        start = self.children.fork if is_fork else functools.partial(self.children.start, masked=command["masked"])
         try:
             if command["confined"] is not None:
                 pid = self._confine(name, words, environment, output, Confinement.from_json(command["confined"]))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.rigs.devices import identity
+from dodo_dsl.run.rigs.ports import refuse_shared_port
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in
 from dodo_dsl.spec.deployment import machine as operator
@@ -40,7 +41,8 @@ def refuse_forbidden(devices: Iterable[str], limits: Mapping[str, float], roots:
 
 
 def refuse_test(plan: Plan, roots: Sequence[Path]) -> None:
-    """The same for a test on a real rig, by the flags of all its services."""
+    """The same for a test on a real rig, by the flags of all its services; also where two would open one port."""
+    refuse_shared_port(plan)
     words = {flag.name: flag.value for service in plan.services if service.uses == _GANTRY for flag in service.flags}
     limits = {name: float(words[flag]) for name, flag in LIMIT_FLAGS.items() if flag in words}
     devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)

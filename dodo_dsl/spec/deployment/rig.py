@@ -8,6 +8,8 @@ from dodo_dsl.source import Entry, Mapping, Node, Scalar, parse
 
 EMULATED = "emulated"
 EMULATED_FILE = "the emulated rig"
+PORT = "serial"
+"""The key of a rig's port. A service whose manifest takes a parameter from it moves the rig."""
 
 _EMULATED = """
 kind: dynamic

@@ -108,6 +108,20 @@ def test_rigs_do_not_give_disks_or_the_host() -> None:
     ]
 
 
+def test_no_rig_gives_its_port() -> None:
+    every = Access(devices=True, privileged=True, ports=("/dev/ttyACM0",))
+    service = {
+        "devices": [{"source": "/dev/video0"}, {"source": "/dev/ttyACM0"}],
+        "device_cgroup_rules": ["c 166:* rw"],
+        "volumes": [{"type": "bind", "source": "/dev/serial", "target": "/s"}],
+    }
+    assert found(service, every) == [
+        "services.driver.volumes[0].source",
+        "services.driver.devices[1].source",
+        "services.driver.device_cgroup_rules[0]",
+    ]
+
+
 def test_services_that_the_test_does_not_have() -> None:
     test = CompiledTest([], [], [], True, Access(), HostPaths(FOLDER, (FOLDER,)))
     assert [f.message for f in compiled_findings({"services": {"x": {}}}, test)] == ["the test has no service 'x'"]

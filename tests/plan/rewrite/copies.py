@@ -15,8 +15,14 @@ CONFINED: dict[str, Any] = {
 
 
 def copy(
-    service: dict[str, Any], *, isolation: str = "network", hil: bool = False, privileged: bool = False
+    service: dict[str, Any],
+    *,
+    isolation: str = "network",
+    hil: bool = False,
+    privileged: bool = False,
+    ports: tuple[str, ...] = (),
 ) -> ServiceCopy:
     """A service beside ``eyes``, whose container is ``camera``."""
     names, containers = frozenset(["a", "eyes"]), {"camera": "eyes"}
-    return ServiceCopy("a", service, Setting(140, isolation, ("judge",), names, containers, hil, privileged), [])
+    setting = Setting(140, isolation, ("judge",), names, containers, hil, privileged, ports=ports)
+    return ServiceCopy("a", service, setting, [])

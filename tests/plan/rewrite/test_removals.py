@@ -96,3 +96,18 @@ def test_privileged_false_is_not_worth_a_note() -> None:
     own = copy({"privileged": False})
     remove_hardware(own)
     assert (own.service, own.changes) == ({}, [])
+
+
+@pytest.mark.parametrize("privileged", [False, True])
+def test_a_rig_s_port_is_removed_on_the_rig_too(privileged: bool) -> None:
+    devices = ["/dev/video0:/dev/video0", "/dev/ttyACM0:/dev/tty0", {"source": "/dev/serial/by-id/x", "target": "/x"}]
+    rest = {"device_cgroup_rules": ["c 81:* rw", "c *:* rwm"], "volumes": ["/dev:/dev", "${P:-/dev/ttyACM0}:/x"]}
+    own = copy({"devices": devices, **rest}, hil=True, privileged=privileged, ports=("/dev/ttyACM0",))
+    remove_hardware(own)
+    assert own.service == {
+        "devices": devices[:1],
+        "device_cgroup_rules": ["c 81:* rw"],
+        "volumes": ["/dev:/dev"],
+    }
+    keys = ("devices", "device_cgroup_rules", "volumes")
+    assert own.changes == [f"a: {key}: the rig's port removed" for key in keys]

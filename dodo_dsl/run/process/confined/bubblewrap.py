@@ -15,6 +15,8 @@ _MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 _KEPT = ("CAP_SETUID", "CAP_SETGID", "CAP_SETPCAP")
 """What ``setpriv`` needs to give up root and then itself gives up."""
 
+_TO_UNMASK = ("CAP_SYS_ADMIN", "CAP_MKNOD", "CAP_DAC_READ_SEARCH", "CAP_SYS_MODULE", "CAP_SYS_RAWIO")
+
 
 @dataclass(frozen=True)
 class Mounts:
@@ -37,7 +39,7 @@ def words(
     always = [PROGRAM, "--unshare-pid", "--die-with-parent", "--json-status-fd", str(status_fd)]
     chdir = ["--chdir", confined.folder]
     if mounts is None:
-        return [*always, "--dev-bind", "/", "/", "--proc", "/proc", *chdir, "--"]
+        return [*always, "--dev-bind", "/", "/", *_masked(confined.masked), "--proc", "/proc", *chdir, "--"]
     seen = _seen(confined, mounts, program)
     filtered = ["--seccomp", str(filter_fd)]
     unshared = ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try"]
@@ -45,6 +47,12 @@ def words(
         return [*always, *unshared, *seen, *chdir, "--cap-drop", "ALL", *filtered, "--"]
     kept = [word for name in _KEPT for word in ("--cap-add", name)]
     return [*always, *unshared, *seen, *chdir, "--cap-drop", "ALL", *kept, *filtered, "--", *_as_user(user)]
+
+
+def _masked(devices: Iterable[str]) -> list[str]:
+    """Nothing in the place of devices; root then has no capability to look behind, or to make the device anew."""
+    binds = [word for path in devices for word in ("--dev-bind", "/dev/null", path)]
+    return [*binds, *(word for name in _TO_UNMASK for word in ("--cap-drop", name))] if binds else []
 
 
 def _as_user(user: int) -> list[str]:

@@ -17,7 +17,8 @@ FIRST_USER = 64_000
 class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
-    With ``isolation`` ``host`` it has only processes of its own, and sees what DoDo sees. ``cid`` tells users apart.
+    With ``isolation`` ``host`` it has only processes of its own, and sees what DoDo sees but for ``masked`` devices.
+    ``cid`` tells users apart.
     """
 
     folder: str
@@ -26,13 +27,14 @@ class Confinement:
     reads: tuple[str, ...] = ()
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
+    masked: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
 
     @classmethod
     def from_json(cls, raw: Mapping[str, Any]) -> "Confinement":
-        lists = {name: tuple(raw[name]) for name in ("reads", "hidden")}
+        lists = {name: tuple(raw[name]) for name in ("reads", "hidden", "masked")}
         limits = SandboxLimits(**{**raw["limits"], "reads": tuple(raw["limits"]["reads"])})
         return cls(**{**raw, **lists, "limits": limits})
 

@@ -23,7 +23,9 @@ def test_what_is_hidden_lies_in_its_folder(tmp_path: Path) -> None:
 
 
 def test_it_goes_to_the_sandbox_and_back() -> None:
-    one = Confinement("/app", "network", 130, ("/usr/x",), ("/app/tests",), SandboxLimits(memory=5, reads=("a",)))
+    one = Confinement(
+        "/app", "network", 130, ("/usr/x",), ("/app/tests",), SandboxLimits(memory=5, reads=("a",)), ("/dev/x",)
+    )
     assert Confinement.from_json(one.to_json()) == one
 
 
