@@ -84,7 +84,7 @@ def load(
     found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
     source = None
     if files := application or deployment.application:
-        source, problems = read_application(files, access(deployment))
+        source, problems = read_application(files, access(deployment), deployment.sandbox)
         found.extend(problems)
     specs = (applied(spec, settings) for instances, _ in loaded for spec in instances)
     tests = tuple(resolve(specs, manifests, deployment, source))

@@ -11,6 +11,7 @@ from dodo_dsl.application.access.host_paths import HostPaths, repository
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 SANDBOX = "sandbox"
 KEYS = ("x-dodo", "x-dodo-process")
@@ -61,7 +62,8 @@ class ApplicationSource:
     ``services`` are those that start, by name; ``rest`` has every other top-level key. Paths are relative to
     ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the services by their
     ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set the secret ones
-    among them. ``known`` are all variables whose values are known, ``access`` is what the deployment allows.
+    among them. ``known`` are all variables whose values are known, ``access`` is what the deployment allows,
+    ``limits`` are the highest that the services may set.
     """
 
     path: Path
@@ -73,6 +75,7 @@ class ApplicationSource:
     secrets: Mapping[str, Path] = field(default_factory=dict)
     known: Mapping[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
+    limits: SandboxLimits = field(default_factory=SandboxLimits)
 
     @functools.cached_property
     def paths(self) -> HostPaths:

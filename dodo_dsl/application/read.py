@@ -11,6 +11,7 @@ from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.access import filled, secret_problems
 from dodo_dsl.application.access.access_diagnostics import diagnostic
 from dodo_dsl.application.access.filled import known_variables
+from dodo_dsl.application.access.limit_findings import volume_findings
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.access.shared_findings import shared_findings
 from dodo_dsl.application.application_problems import application_problems
@@ -22,6 +23,7 @@ from dodo_dsl.application.service_environment import cid_variables, env_files
 from dodo_dsl.application.service_problems import unknown_keys
 from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.source import Entry
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.schema import validate
 
 MAX_SERVICES = 256
@@ -31,8 +33,12 @@ _OURS = ("services", "version", "name", "networks", "include")
 def read_application(
     path: Path | Sequence[Path],
     access: Access = Access(),  # noqa: B008  (it is frozen)
+    limits: SandboxLimits = SandboxLimits(),  # noqa: B008
 ) -> tuple[ApplicationSource | None, list[Diagnostic]]:
-    """An application from one compose file, or from several that are merged in order, and its problems."""
+    """An application from one compose file, or from several that are merged in order, and its problems.
+
+    ``access`` is what the deployment allows it, ``limits`` are the highest that it may set.
+    """
     paths = [path] if isinstance(path, Path) else list(path)
     files = ComposeFiles()
     document = load(files, paths)
@@ -48,7 +54,7 @@ def read_application(
         found.extend(validate(document, "application"))
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
-    application = _application(paths[0].resolve(), document, services, files, access)
+    application = _application(paths[0].resolve(), document, services, files, access, limits)
     found.extend(_shared(document, application))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
@@ -60,7 +66,12 @@ def read_application(
 
 
 def _application(
-    path: Path, document: source.Mapping, services: source.Mapping, files: ComposeFiles, access: Access
+    path: Path,
+    document: source.Mapping,
+    services: source.Mapping,
+    files: ComposeFiles,
+    access: Access,
+    limits: SandboxLimits,
 ) -> ApplicationSource:
     variables = files.variables
     dropped = {name: why for name, entry in services.entries.items() if (why := _why_dropped(plain(entry.value)))}
@@ -80,13 +91,16 @@ def _application(
         secrets=files.secrets,
         known=known_variables(variables, os.environ, str(path.parent), access.passed),
         access=access,
+        limits=limits,
     )
 
 
 def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:
     """Problems of everything beside the services."""
     seen = filled.node(document, application.known)
-    for finding in shared_findings(plain(seen), application.paths, application.access.passed):
+    raw = plain(seen)
+    cut = volume_findings(raw.get("volumes") or {}, application.limits, compiled=False)
+    for finding in (*shared_findings(raw, application.paths, application.access.passed), *cut):
         yield diagnostic(finding, document, document.span)
 
 

@@ -35,7 +35,8 @@ class Written:
     def of(cls, service: ComposeService, application: ApplicationSource, volumes: Mapping[str, Any]) -> "Written":
         """The service among the others of its application; ``volumes`` are the application's named ones."""
         others, containers = frozenset(application.services), dict(application.containers)
-        around = Surroundings(application.paths, containers, volumes, ports=application.access.ports)
+        ports, limits = application.access.ports, application.limits
+        around = Surroundings(application.paths, containers, volumes, ports=ports, limits=limits)
         seen = filled.node(service.node, application.known)
         return cls(service.name, service.node, service.span, others, application.dropped, containers, seen, around)
 

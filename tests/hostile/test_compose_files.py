@@ -72,6 +72,14 @@ def test_what_is_left_out(attack: dict[str, Any], tmp_path: Path) -> None:
     gone(attack, application)
 
 
+@pytest.mark.parametrize("attack", attacks("cut"))
+def test_what_is_cut(attack: dict[str, Any], tmp_path: Path) -> None:
+    """Limits beyond those of the test are cut to them, with a warning."""
+    application, problems = found(attack, tmp_path)
+    assert {(problem.severity, problem.rule) for problem in problems} == {("warning", "application-limit")}
+    gone(attack, application)
+
+
 @pytest.mark.parametrize("attack", attacks("removed"))
 def test_what_is_removed(attack: dict[str, Any], tmp_path: Path) -> None:
     """What would set the host or other tests is removed from the test's copy."""

@@ -1,7 +1,7 @@
 """Findings as diagnostics, at their places in the compose files.
 
 ``application-isolation``: access to the host that tests would share. ``application-hardware``: hardware, which is left
-out of tests without a rig.
+out of tests without a rig. ``application-limit``: a limit beyond that of the test, which takes its place.
 """
 
 from dodo_dsl import source
@@ -16,6 +16,8 @@ def diagnostic(finding: AccessFinding, node: Node, key: Span) -> Diagnostic:
     if finding.kind == "unknown":
         last = finding.steps[-1]
         return Diagnostic(_key(node, finding.steps, span), "unknown-key", finding.message, finding.hint or _new(last))
+    if finding.kind == "limit":
+        return Diagnostic(span, "application-limit", finding.message, finding.hint, "warning")
     if finding.kind == "left out":
         return Diagnostic(span, "application-isolation", finding.message, finding.hint, "warning")
     if finding.kind != "refused":

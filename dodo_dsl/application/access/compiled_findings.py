@@ -1,15 +1,17 @@
 """A compiled test as the engine would see it: what its services may not have, and no rule of a test has removed."""
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access.build_findings import short_name
 from dodo_dsl.application.access.host_paths import HostPaths
+from dodo_dsl.application.access.limit_findings import volume_findings
 from dodo_dsl.application.access.model import Access, AccessFinding, Steps
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
-from dodo_dsl.application.access.shared_findings import shared_findings
+from dodo_dsl.application.access.shared_findings import OWN_VOLUMES, shared_findings
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _SERVICES = "services"
 _DRIVERS = ("json-file", "local", "")
@@ -25,17 +27,21 @@ class CompiledTest:
     own_network: bool
     access: Access
     paths: HostPaths
+    limits: SandboxLimits = field(default_factory=SandboxLimits)
 
 
 def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator[AccessFinding]:
     """Findings in what ``docker compose config --format json`` prints, each of which refuses the test."""
     rest = {key: value for key, value in config.items() if key != _SERVICES}
     yield from shared_findings(rest, test.paths, test.access.passed)
-    around = Surroundings(test.paths, {}, rest.get("volumes") or {}, compiled=True, ports=test.access.ports)
+    volumes = rest.get("volumes") or {}
+    others = {name: about for name, about in volumes.items() if name not in OWN_VOLUMES}
+    yield from volume_findings(others, test.limits, compiled=True)
+    around = Surroundings(test.paths, {}, volumes, compiled=True, ports=test.access.ports, limits=test.limits)
     for name, service in config.get(_SERVICES, {}).items():
         if name in test.application:
-            found = [*service_findings(name, service, around), *_of_others(name, service, test)]
-            yield from (f.below(_SERVICES, name) for f in found if not _is_allowed(f, test.access))
+            every = [*service_findings(name, service, around), *_of_others(name, service, test)]
+            yield from (f.below(_SERVICES, name) for f in every if not _is_allowed(f, test.access))
         elif name not in test.own:
             yield AccessFinding((_SERVICES, name), f"the test has no service '{name}'")
 

@@ -8,7 +8,7 @@ from dodo_dsl.application.access.compose_keys import Rows
 from dodo_dsl.diagnostics import did_you_mean
 
 Steps = tuple[str | int, ...]
-Kind = Literal["refused", "unknown", "hardware", "privilege", "port", "left out"]
+Kind = Literal["refused", "unknown", "hardware", "privilege", "port", "limit", "left out"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class AccessFinding:
     """A key or value that a test may not have; ``steps`` lead to it from where the search began.
 
     ``hardware`` and ``privilege`` stay on rigs that allow them; they, a rig's ``port`` and what is ``left out`` are not
-    in the copy.
+    in the copy, which has the test's own ``limit``.
     """
 
     steps: Steps

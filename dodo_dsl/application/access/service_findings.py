@@ -10,8 +10,10 @@ from dodo_dsl.application.access import rig_ports
 from dodo_dsl.application.access.build_findings import build_findings
 from dodo_dsl.application.access.compose_keys import SERVICE
 from dodo_dsl.application.access.host_paths import ASK, HostPaths
+from dodo_dsl.application.access.limit_findings import limit_findings
 from dodo_dsl.application.access.model import AccessFinding, Steps, key_findings
 from dodo_dsl.application.access.mount_findings import mount_findings
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 PROFILE_HINT = "give the service a profile, so that it starts with 'docker compose --profile' and not in a test"
 RUNTIMES = ("nvidia", "runc", "runsc")
@@ -25,6 +27,7 @@ class Surroundings:
     """What a service's values are judged by: the host's paths, and the application's containers and volumes.
 
     ``compiled`` tells that the service is a test's copy, from which much has been removed. ``ports`` are those of rigs.
+    ``limits`` are the highest that the service may set.
     """
 
     paths: HostPaths
@@ -32,6 +35,7 @@ class Surroundings:
     volumes: Mapping[str, Any] = field(default_factory=dict)
     compiled: bool = False
     ports: tuple[str, ...] = ()
+    limits: SandboxLimits = field(default_factory=SandboxLimits)
 
 
 def service_findings(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
@@ -42,6 +46,7 @@ def service_findings(name: str, service: dict[str, Any], around: Surroundings) -
     yield from _strangers(service, around)
     yield from _files(service, around.paths)
     yield from _hardware(name, service, around.ports)
+    yield from limit_findings(name, service, around.limits, around.compiled)
     yield from _confinement(name, service)
     yield from _hooks(name, service)
     if service.get("build") is not None:

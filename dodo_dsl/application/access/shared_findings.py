@@ -10,6 +10,8 @@ from dodo_dsl.application.access.compose_keys import CONFIG, NETWORK, SECRET, TO
 from dodo_dsl.application.access.host_paths import ASK, HostPaths
 from dodo_dsl.application.access.model import AccessFinding, key_findings
 
+OWN_VOLUMES = ("tmp", "report")
+"""The names of DoDo's own volumes in a test; an application's volumes of these names get others."""
 _TABLES: dict[str, tuple[str, Rows]] = {
     "volumes": ("the volume", VOLUME),
     "secrets": ("the secret", SECRET),

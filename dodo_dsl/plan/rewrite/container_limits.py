@@ -1,7 +1,8 @@
-"""Limits and confinement of a service: what it has unless its file says so, and what it never has."""
+"""Limits and confinement of a service: what it has unless its file sets less, and what it never has."""
 
 from typing import Any
 
+from dodo_dsl.application.access.limit_findings import Excess, service_excesses
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
@@ -10,16 +11,20 @@ DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
 What a program that starts as root needs to give up root, it keeps.
 """
 _DRIVERS = ("json-file", "local")
-_RESERVED_LABELS = ("com.docker.", "dodo.")
+_NUMBERS = ("pids_limit", "mem_limit", "cpus", "pids", "memory")
 _UNLIMITED = ("", "0", "-1")
+_RESERVED_LABELS = ("com.docker.", "dodo.")
 
 
 def confine(copy: ServiceCopy) -> None:
     """Limits of processes, memory and files, no way to more privileges, logs that DoDo reads, labels of its own."""
     limits = copy.setting.limits
+    _cut(copy)
     _limit(copy, "pids_limit", "pids", limits.processes)
     _limit(copy, "mem_limit", "memory", limits.memory)
-    _limit_files(copy, limits.file_size)
+    if limits.cpus is not None and "cpu_quota" not in copy.service:
+        _limit(copy, "cpus", "cpus", limits.cpus)
+    _limit_files(copy)
     if not copy.setting.keeps_privileges:
         _drop_capabilities(copy)
         _keep_privileges_down(copy)
@@ -29,31 +34,55 @@ def confine(copy: ServiceCopy) -> None:
     _own_labels(copy)
 
 
-def _limit(copy: ServiceCopy, key: str, word: str, default: int) -> None:
+def _cut(copy: ServiceCopy) -> None:
+    """Puts the test's limits in the place of what goes beyond them."""
+    for excess in list(service_excesses(copy.filled(copy.service), copy.setting.limits)):
+        if not _is_removed(copy, excess):
+            put(copy.service, excess)
+        copy.note(f"{excess.shown} is {excess.allowed}")
+
+
+def _is_removed(copy: ServiceCopy, excess: Excess) -> bool:
+    """Whether a number was removed that sets no limit: ``_limit`` puts the default where compose wants it."""
+    *way, last = excess.steps
+    holder: Any = copy.service
+    for step in way:
+        holder = holder.get(step) if isinstance(holder, dict) else None
+    if last not in _NUMBERS or str(copy.filled(holder[last])).strip() not in _UNLIMITED:
+        return False
+    del holder[last]
+    return True
+
+
+def put(written: Any, excess: Excess) -> None:
+    """Changes a plain value in place, so that it has what is allowed."""
+    *way, last = excess.steps
+    for step in way:
+        if isinstance(written, dict) and not isinstance(written.get(step), dict | list):
+            written[step] = {}
+        written = written[step]
+    written[last] = excess.allowed
+
+
+def _limit(copy: ServiceCopy, key: str, word: str, default: float) -> None:
     """A limit as the file has it, else the default: below ``deploy`` where limits are set there, as compose wants."""
     limits: Any = copy.service.get("deploy")
     for part in ("resources", "limits"):
         limits = limits.get(part) if isinstance(limits, dict) else None
-    own, below = copy.service.get(key), limits.get(word) if isinstance(limits, dict) else None
-    if _is_limit(copy.filled(own)) or (own is None and _is_limit(copy.filled(below))):
+    if copy.service.get(key) is not None or (isinstance(limits, dict) and limits.get(word) is not None):
         return
-    if own is not None or below is not None:
-        copy.note(f"{key} is {default}")
     copy.service.pop(key, None)
     if isinstance(limits, dict):
-        limits[word] = str(default) if word == "memory" else default
+        limits[word] = default if word == "pids" else str(default)
     else:
         copy.service[key] = default
 
 
-def _is_limit(value: Any) -> bool:
-    return value is not None and str(value).strip() not in _UNLIMITED
-
-
-def _limit_files(copy: ServiceCopy, size: int) -> None:
-    """The size of a file in bytes, and no core dumps, unless the service sets those."""
-    own = copy.service.get("ulimits")
-    copy.service["ulimits"] = {"core": 0, "fsize": size} | (own if isinstance(own, dict) else {})
+def _limit_files(copy: ServiceCopy) -> None:
+    """The size of a file in bytes, files that are open, and no core dumps, unless the service sets lower ones."""
+    own, limits = copy.service.get("ulimits"), copy.setting.limits
+    most = {"core": 0, "fsize": limits.file_size, "nofile": limits.files}
+    copy.service["ulimits"] = most | (own if isinstance(own, dict) else {})
 
 
 def _keep_privileges_down(copy: ServiceCopy) -> None:

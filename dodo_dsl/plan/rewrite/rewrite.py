@@ -60,7 +60,7 @@ def plan_application(
         if isinstance(rest.get(key), dict):
             rest[key] = {name: volumes.without_name(about) for name, about in rest[key].items()}
     if "volumes" in rest:
-        rest["volumes"] = volumes.own_volumes(rest["volumes"], changes)
+        rest["volumes"] = volumes.own_volumes(rest["volumes"], changes, limits, known)
     planned = tuple(_planned(service, cid) for service in application.services.values())
     carried = variables.carried(application, cid, base, path_variables)
     secrets = {name: _relative(file, folder) for name, file in application.secrets.items()}

@@ -1,21 +1,23 @@
 """Volumes of a service: ``/tmp``, shared memory and named volumes are the test's own."""
 
-from collections.abc import MutableSequence
+from collections.abc import Mapping, MutableSequence
 from typing import Any
 
 from dodo_dsl.application import host_access
+from dodo_dsl.application.access import filled
+from dodo_dsl.application.access.limit_findings import volume_excesses
+from dodo_dsl.application.access.shared_findings import OWN_VOLUMES
 from dodo_dsl.application.interpolation import split_outside
+from dodo_dsl.plan.rewrite.container_limits import put
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
-
-TAKEN = ("tmp", "report")
-"""The names of DoDo's own volumes."""
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _DISPLAYS = "/tmp/.X11-unix"
 
 
 def renamed(name: str) -> str:
     """The name of an application's volume in the test's project."""
-    return f"application-{name}" if name in TAKEN else name
+    return f"application-{name}" if name in OWN_VOLUMES else name
 
 
 def own_mounts(copy: ServiceCopy) -> None:
@@ -31,7 +33,7 @@ def own_mounts(copy: ServiceCopy) -> None:
 
 def _renamed(copy: ServiceCopy, volume: Any) -> Any:
     found = host_access.mount(volume)
-    if found.source not in TAKEN or (isinstance(volume, dict) and volume.get("type", "volume") != "volume"):
+    if found.source not in OWN_VOLUMES or (isinstance(volume, dict) and volume.get("type", "volume") != "volume"):
         return volume
     copy.note(f"volume {found.source} renamed to {renamed(found.source)}")
     if isinstance(volume, dict):
@@ -62,9 +64,20 @@ def without_name(about: Any) -> Any:
     return {key: value for key, value in about.items() if key != "name"} if isinstance(about, dict) else about
 
 
-def own_volumes(volumes: Any, changes: MutableSequence[str]) -> dict[str, Any]:
-    """Top-level ``volumes``: each test has its own, so names that all of the host would share are removed."""
+def own_volumes(
+    volumes: Any,
+    changes: MutableSequence[str],
+    limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
+    known: Mapping[str, str] | None = None,
+) -> dict[str, Any]:
+    """Top-level ``volumes``: each test has its own, so names that all of the host would share are removed.
+
+    File systems in memory get no more than a service may have; ``known`` are variables whose values are known.
+    """
     found = {}
+    for excess in list(volume_excesses(filled.value(volumes or {}, known or {}), limits)):
+        put(volumes, excess)
+        changes.append(f"volume {excess.steps[0]}: o is {excess.allowed}")
     for name, about in (volumes or {}).items():
         is_external = host_access.is_external(about)
         if isinstance(about, dict) and "name" in about and not is_external:

@@ -67,7 +67,7 @@ class Compose:
         own_network = plan.isolation == "network"
         application = {service.name for service in plan.application.services}
         access = replace(plan.application.access, ports=tuple(known_ports(plan)))
-        return CompiledTest(application, names, images, own_network, access, self._paths)
+        return CompiledTest(application, names, images, own_network, access, self._paths, plan.application.limits)
 
     @staticmethod
     def _refuse(findings: Iterable[AccessFinding]) -> None:

@@ -1,4 +1,4 @@
-"""What the application may use and see where it runs as processes: the key ``sandbox`` of ``dodo.yml``."""
+"""What the application may use, and what it sees where it runs as processes: the key ``sandbox`` of ``dodo.yml``."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,8 @@ from dodo_dsl.spec.quantity import convert
 class SandboxLimits:
     """``memory`` in bytes of a service with all its processes; ``file_size`` in bytes; ``files`` open in a process.
 
-    ``processes`` counts threads, too. ``reads`` are paths beside the application's own folder that it may read.
+    ``processes`` counts threads, too. ``cpus`` are the processors of a container, None for all.
+    ``reads`` are paths beside the application's own folder that it may read.
     """
 
     memory: int = 2 * 10**9
@@ -18,6 +19,7 @@ class SandboxLimits:
     files: int = 1024
     file_size: int = 10**9
     reads: tuple[str, ...] = ()
+    cpus: float | None = None
 
 
 def sandbox_limits(entry: Entry | None) -> SandboxLimits:
@@ -33,6 +35,7 @@ def sandbox_limits(entry: Entry | None) -> SandboxLimits:
         _count(node.get("files"), default.files),
         _bytes(node.get("file-size"), default.file_size),
         tuple(i.text for i in reads.items if isinstance(i, Scalar)) if isinstance(reads, Sequence) else (),
+        float(str(cpus.value)) if isinstance(cpus := node.get("cpus"), Scalar) else None,
     )
 
 

@@ -27,8 +27,10 @@ SHOWN = {
     "entrypoint": None,
     "networks": {"default": None},
     "ipc": "service:sandbox",
-    "pids_limit": 2048,
-    "mem_limit": "4294967296",
+    "pids_limit": 512,
+    "mem_limit": "1073741824",
+    "tmpfs": ["/run:size=2000000000"],
+    "ulimits": {"core": {}, "nofile": {"soft": 512, "hard": 1024}},
     "cap_drop": ["NET_RAW"],
     "volumes": [
         {"type": "volume", "source": "tmp", "target": "/tmp", "volume": {}},

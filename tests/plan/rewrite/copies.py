@@ -3,11 +3,12 @@
 from typing import Any
 
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 CONFINED: dict[str, Any] = {
     "pids_limit": 1024,
     "mem_limit": 2_000_000_000,
-    "ulimits": {"core": 0, "fsize": 1_000_000_000},
+    "ulimits": {"core": 0, "fsize": 1_000_000_000, "nofile": 1024},
     "cap_drop": ["AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"],
     "security_opt": ["no-new-privileges:true"],
 }
@@ -21,8 +22,9 @@ def copy(
     hil: bool = False,
     privileged: bool = False,
     ports: tuple[str, ...] = (),
+    limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
 ) -> ServiceCopy:
     """A service beside ``eyes``, whose container is ``camera``."""
     names, containers = frozenset(["a", "eyes"]), {"camera": "eyes"}
-    setting = Setting(140, isolation, ("judge",), names, containers, hil, privileged, ports=ports)
+    setting = Setting(140, isolation, ("judge",), names, containers, hil, privileged, {}, limits, ports)
     return ServiceCopy("a", service, setting, [])

@@ -20,8 +20,8 @@ def test_without_it_the_defaults_hold(tmp_path: Path) -> None:
 
 
 def test_all_that_can_be_said(tmp_path: Path) -> None:
-    text = "sandbox: {memory: 4 GB, processes: 20, files: 100, file-size: 1.5 MB, read: [~/models, /srv]}\n"
-    limits = SandboxLimits(4 * 10**9, 20, 100, 1_500_000, ("~/models", "/srv"))
+    text = "sandbox: {memory: 4 GB, processes: 20, files: 100, file-size: 1.5 MB, cpus: 2.5, read: [~/models, /srv]}\n"
+    limits = SandboxLimits(4 * 10**9, 20, 100, 1_500_000, ("~/models", "/srv"), 2.5)
     assert deployed(tmp_path, text) == (limits, [])
 
 
@@ -31,6 +31,7 @@ def test_all_that_can_be_said(tmp_path: Path) -> None:
         ("memory: 4", "'4' has no unit, expected a size in B"),
         ("memory: 4 s", "'4 s' is a time, expected a size in B"),
         ("processes: 1", "1"),
+        ("cpus: 0", "0"),
         ("reads: [x]", "reads"),
     ],
 )
