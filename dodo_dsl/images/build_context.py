@@ -10,7 +10,8 @@ from dodo_dsl import __version__, package_data
 from dodo_dsl.images.names import Image
 
 DEFINITION = "docker-bake.json"
-CONSTRAINTS = "constraints.txt"
+LOCK = "locks/base.txt"
+"""Versions of all packages, with the hashes of their wheels."""
 REQUIREMENTS = "services/requirements"
 _DOCKERFILE = "services/Dockerfile"
 _FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf")
@@ -18,13 +19,14 @@ _FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf")
 
 
 def assemble(folder: Path, wheels: Path | None) -> None:
-    """Copies sources, constraints and wheels into an empty folder, with their dates.
+    """Copies sources, versions and wheels into an empty folder, with their dates.
 
     The engine identifies a context by its folder's name and transfers only files whose date has changed.
     """
     root, package = package_data.root(), Path(package_data.__file__).parent
     no_bytecode = shutil.ignore_patterns("__pycache__")
-    shutil.copy2(root / CONSTRAINTS, folder / CONSTRAINTS)
+    (folder / LOCK).parent.mkdir()
+    shutil.copy2(root / LOCK, folder / LOCK)
     shutil.copytree(root / "services", folder / "services", ignore=no_bytecode)
     shutil.copytree(package / "opendlv", folder / "dodo_dsl" / "opendlv", ignore=no_bytecode)
     shutil.copy2(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")

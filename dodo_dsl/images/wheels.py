@@ -10,7 +10,7 @@ from pathlib import Path
 
 from dodo_dsl import atomic, package_data
 from dodo_dsl.images import docker_command
-from dodo_dsl.images.build_context import CONSTRAINTS, REQUIREMENTS
+from dodo_dsl.images.build_context import LOCK, REQUIREMENTS
 
 _OLDEST_GLIBC = 17  # manylinux2014 is glibc 2.17
 _QUESTION = "import platform, sys; print(*sys.version_info[:2], platform.machine(), platform.libc_ver()[1] or '-')"
@@ -60,29 +60,38 @@ def cache_folder() -> Path:
 
 
 def provide(python: Python, cache: Path) -> Path:
-    """A folder with a wheel for each requirement and nothing else; raises WheelsError.
+    """A folder with a wheel for each requirement and nothing else, all with locked hashes; raises WheelsError.
 
     It is named after its requirements, and appears only when it is complete.
     """
     requirements = sorted((package_data.root() / REQUIREMENTS).glob("*.txt"))
-    constraints = package_data.root() / CONSTRAINTS
+    locked = [_locked(file) for file in requirements]
     digest = hashlib.sha256(repr(python).encode())
-    for file in (*requirements, constraints):
-        digest.update(file.read_bytes())
+    for text in locked:
+        digest.update(text.encode())
     folder = cache / digest.hexdigest()[:16]
     if not folder.is_dir():
         with contextlib.suppress(FileExistsError), atomic.new_folder(folder) as part:  # another build may be faster
-            _download(python, requirements, constraints, part)
+            _download(python, "".join(locked), part)
     return folder
 
 
-def _download(python: Python, requirements: list[Path], constraints: Path, folder: Path) -> None:
+def _locked(requirements: Path) -> str:
+    """The versions and hashes of a file of names, as the image build has them, too; raises WheelsError."""
+    root = package_data.root()
+    words = ["sh", str(root / REQUIREMENTS / "locked"), str(requirements), str(root / LOCK)]
+    result = subprocess.run(words, capture_output=True, text=True, check=False)
+    if result.returncode:
+        raise WheelsError(f"{requirements.name}: {result.stderr.strip()}; run scripts/lock")
+    return result.stdout
+
+
+def _download(python: Python, locked: str, folder: Path) -> None:
     words = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "download"]
-    words += ["--dest", str(folder), "--only-binary", ":all:", "--implementation", "cp"]
-    words += ["--python-version", python.tag, "--constraint", str(constraints)]
+    words += ["--dest", str(folder), "--only-binary", ":all:", "--implementation", "cp", "--no-deps"]
+    words += ["--python-version", python.tag, "--require-hashes", "--requirement", "/dev/stdin"]
     words += [word for platform in python.platforms() for word in ("--platform", platform)]
-    words += [word for file in requirements for word in ("--requirement", str(file))]
-    result = subprocess.run(words, capture_output=True, text=True, errors="replace", check=False)
+    result = subprocess.run(words, input=locked, capture_output=True, text=True, errors="replace", check=False)
     if result.returncode:
         said = [line.strip() for line in result.stderr.splitlines() if line.strip()]
         why = next((line for line in reversed(said) if line.startswith("ERROR")), said[-1] if said else "")

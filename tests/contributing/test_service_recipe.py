@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text()
-NEEDED = ("docs", "dodo_dsl", "schemas", "services", "templates", "tests", "tests_registry", "examples")
+NEEDED = ("docs", "dodo_dsl", "locks", "schemas", "services", "templates", "tests", "tests_registry", "examples")
 FILES = ("README.md", "constraints.txt", "dodo.yml", "pyproject.toml")
 
 _BLOCK = re.compile(

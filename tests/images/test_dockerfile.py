@@ -43,17 +43,23 @@ def test_shared_stages_are_a_chain_so_that_layers_are_shared() -> None:
     ]
 
 
-def test_constraints_pin_every_requirement() -> None:
-    lines = (ROOT / "constraints.txt").read_text().splitlines()
-    pinned = {re.sub(r"[-_.]+", "-", line.partition("==")[0]).lower() for line in lines}
-    wanted = [
-        line
-        for file in (ROOT / "services" / "requirements").glob("*.txt")
-        for line in file.read_text().splitlines()
-        if not line.startswith("#")
-    ]
-    assert len(wanted) >= 7
-    assert {re.sub(r"[-_.]+", "-", name).lower() for name in wanted} <= pinned
+def test_every_requirement_is_locked() -> None:
+    folder, names = ROOT / "services" / "requirements", []
+    for file in folder.glob("*.txt"):
+        words = ["sh", str(folder / "locked"), str(file), str(ROOT / "locks" / "base.txt")]
+        lines = subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()
+        names += [line.partition("==")[0].lower() for line in lines if not line.startswith(" ")]
+        assert len([line for line in lines if line.strip().startswith("--hash=sha256:")]) >= len(names) > 0
+        wanted = [line.lower() for line in file.read_text().splitlines() if not line.startswith("#")]
+        assert sorted(names[-len(wanted) :]) == sorted(wanted)
+    assert len(names) >= 7
+
+
+def test_a_requirement_that_is_not_locked_ends_the_build(tmp_path: Path) -> None:
+    (tmp_path / "radar.txt").write_text("# radar\nnumpy\nlibradar\n")
+    words = ["sh", str(ROOT / "services" / "requirements" / "locked"), str(tmp_path / "radar.txt")]
+    done = subprocess.run([*words, str(ROOT / "locks" / "base.txt")], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "libradar is not locked\n")
 
 
 def test_the_example_stands_on_this_version() -> None:
