@@ -103,15 +103,13 @@ def access(deployment: Deployment) -> Access:
 def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Checked:
     """The same without shipped tests that need what the application does not send, but for the files ``named``.
 
-    Warnings about shipped tests go, too, as the user did not write these tests.
+    Warnings about shipped tests go, too, also about those ``named``, as the user did not write these tests.
     """
     first = {test.spec.path: test.spec for test in reversed(checked.tests)}
-    shipped = {
-        path
-        for path, spec in first.items()
-        if path not in named and package_data.is_shipped(spec.location.root, checked.deployment.root)
-    }
-    left_out = {path for path in shipped if any(d.rule in UNSATISFIED for d in checked.by_rules[path])}
+    root = checked.deployment.root
+    shipped = {path for path, spec in first.items() if package_data.is_shipped(spec.location.root, root)}
+    unfed = {path for path in shipped if any(d.rule in UNSATISFIED for d in checked.by_rules[path])}
+    left_out = unfed - set(named)
     kept = {d for path in first.keys() - left_out for d in checked.by_rules[path]}
     gone = {d for path in left_out for d in checked.by_rules[path]} - kept
     files = {str(path) for path in shipped}

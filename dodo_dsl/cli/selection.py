@@ -2,16 +2,18 @@
 
 import argparse
 import fnmatch
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from dodo_dsl import package_data
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, format_text, has_errors
-from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment.deployment import FILE_NAME, SHIPPED, Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.registry import SUFFIX
+from dodo_dsl.spec.registry import SUFFIX, locate
 from dodo_dsl.spec.settings import Settings
 from dodo_dsl.terminal import printable
 
@@ -71,7 +73,7 @@ def select(
         if paths:
             checked = load([*paths, *checked.deployment.registry], application, settings=settings)
         others = [spec for spec in checked.specs if spec.path not in given]
-        chosen = {spec.slug for word in names for spec in _named(word, others)}
+        chosen = {spec.slug for word in names for spec in _named(word, others, checked.deployment)}
         checked = _narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
         given |= {spec.path for spec in others if any(_is_name(word, spec) for word in names)}
     if levels:
@@ -94,13 +96,30 @@ def _is_name(word: str, spec: Spec) -> bool:
     return word in (spec.location.stem, spec.title, spec.slug)
 
 
-def _named(word: str, specs: Sequence[Spec]) -> list[Spec]:
+def _named(word: str, specs: Sequence[Spec], deployment: Deployment) -> list[Spec]:
     found = [s for s in specs if _is_name(word, s)]
     found = found or [s for s in specs if _matches(s, word)]
     if not found:
-        hint = did_you_mean(word, list(dict.fromkeys(s.location.stem for s in specs)))
+        hint = _shipped_hint(word, deployment) or did_you_mean(
+            word, list(dict.fromkeys(s.location.stem for s in specs))
+        )
         raise NoSuchTest(f"there is no test '{word}'" + (f"; {hint}" if hint else ""))
     return found
+
+
+def _shipped_hint(word: str, deployment: Deployment) -> str:
+    """A hint where the word means a test that ships with DoDo and that the deployment leaves out."""
+    if package_data.registry() in deployment.registry:
+        return ""
+    shipped = [location.stem for location in locate([], [package_data.registry()])[0]]
+    names = [name for name in shipped if fnmatch.fnmatchcase(name, word) or re.split(r"\[|--", word)[0] == name]
+    if not names:
+        return ""
+    if names == [word]:
+        said = "it ships"
+    else:
+        said = f"'{names[0]}' ships" if len(names) == 1 else f"'{names[0]}' and {len(names) - 1} more ship"
+    return f"{said} with DoDo: add \"{SHIPPED}\" to 'registry' in {FILE_NAME}"
 
 
 def _matches(spec: Spec, pattern: str) -> bool:

@@ -1,22 +1,27 @@
 """dodo new: write a new test, or what a repository with tests needs."""
 
 import argparse
+import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import package_data
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.cli.new import scaffold
-from dodo_dsl.cli.new.scaffold import New
+from dodo_dsl.cli.new import scaffold, starts
+from dodo_dsl.cli.new.destination import Destination, destination
+from dodo_dsl.cli.new.new_file import New
+from dodo_dsl.cli.new.questions import Questions, Wanted
+from dodo_dsl.cli.new.repository_files import COMPOSE_FILES, deployment_files
 from dodo_dsl.cli.new.shipped_copy import copied_files
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import shown_path
-from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment
-from dodo_dsl.spec.model import KINDS, LEVELS
+from dodo_dsl.spec.model import KINDS, LEVELS, Spec
 
 EXAMPLES = """examples:
+  dodo new                                             asks, or lists what a test may begin with
   dodo new sil-my-curve                                a closed-loop simulation that compiles
   dodo new hil-my-curve --level hil                    the same on a rig, at first the emulated one
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
@@ -26,8 +31,8 @@ EXAMPLES = """examples:
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("name", nargs="?", metavar="NAME", help="name of the new test")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("name", nargs="?", metavar="NAME", help="name of the new test; without it, DoDo asks")
     what.add_argument(
         "--deployment", action="store_true", help="write what a repository with tests needs into this folder"
     )
@@ -40,62 +45,78 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return _deployment(options, stdout) if options.deployment else _test(options, stdout)
 
 
+@dataclass(frozen=True)
+class _Tests:
+    """The repository's tests, and those that ship with DoDo."""
+
+    checked: Checked
+    shipped: Checked
+    root: Path
+
+    @property
+    def copied(self) -> list[Spec]:
+        """The shipped tests, which are copied; none where DoDo's own repository is the one that has them."""
+        return [spec for spec in self.shipped.specs if package_data.is_shipped(spec.location.root, self.root)]
+
+    @property
+    def own(self) -> list[Spec]:
+        return [spec for spec in self.checked.specs if not package_data.is_shipped(spec.location.root, self.root)]
+
+
 def _test(options: argparse.Namespace, stdout: TextIO) -> int:
+    if options.extends and (options.level or options.kind):
+        raise UsageError("--level and --kind do not apply with --extends: they are those of the extended test")
     checked = load([])
-    specs = list(checked.specs)
-    scaffold.check_name(options.name, [spec.location.stem for spec in specs])
-    root = checked.deployment.root.resolve()
-    note = ""
-    if options.extends:
-        if options.level or options.kind:
-            raise UsageError("--level and --kind do not apply with --extends: they are those of the extended test")
-        files, note = _from_another(options, checked, root)
-    else:
-        level, kind = options.level or "sil", options.kind or "closed-loop"
-        files = scaffold.test_files(options.name, level, kind, _registry(checked.deployment), root)
-    there = [file.path for file in files if file.path.exists()]
+    tests = _Tests(checked, load([package_data.registry()]), checked.deployment.root.resolve())
+    taken = [spec.location.stem for spec in checked.specs]
+    if options.name is None and not (sys.stdin.isatty() and stdout.isatty()):
+        stdout.write(starts.listing(tests.shipped.specs))
+        return Exit.USAGE
+    place = destination(checked)
+    wanted = Wanted(options.name or "", options.level or "", options.kind or "", options.extends or "")
+    if options.name is None:
+        questions = Questions(sys.stdin, stdout, lambda name: scaffold.check_name(name, taken))
+        wanted = questions.ask(tests.shipped.specs, wanted)
+    scaffold.check_name(wanted.name, taken)
+    made, note = _files(wanted, tests, place)
+    there = [file.path for file in made if file.path.exists()]
     if there:
         raise UsageError(f"'{shown_path(str(there[0]))}' exists already; nothing was written")
-    _write(files, stdout)
+    _write([*place.files, *made], stdout)
     stdout.write(note)
-    spec = shown_path(str(files[0].path))
-    _next([f"make {spec} yours", "dodo compile --check", f"dodo run {options.name}"], stdout)
+    todo = [place.todo] if place.todo else []
+    spec = shown_path(str(made[0].path))
+    _next([f"make {spec} yours", "dodo compile --check", *todo, f"dodo run {wanted.name}"], stdout)
     return Exit.OK
 
 
-def _from_another(options: argparse.Namespace, checked: Checked, root: Path) -> tuple[list[New], str]:
-    """A test that extends one of the repository, or a copy of one that ships with DoDo; with a note for the user."""
-    own = [spec for spec in checked.specs if not package_data.is_shipped(spec.location.root, root)]
-    shipped = load([package_data.registry()])
-    others = [spec for spec in shipped.specs if package_data.is_shipped(spec.location.root, root)]
-    base = scaffold.base_test(options.extends, [*own, *others])
-    if not package_data.is_shipped(base.location.root, root):
-        if not base.location.root.resolve().is_relative_to(root):
-            raise UsageError(f"'{options.extends}' is outside this repository; a test extends tests of its registry")
-        return scaffold.extending_files(options.name, base, root), ""
-    instances = [spec for spec in others if spec.path == base.path]
-    files = copied_files(options.name, instances, shipped.manifests, _registry(checked.deployment), root)
-    return (
-        files,
-        f"copied, because '{options.extends}' ships with DoDo and a test extends only tests of its own registry\n",
-    )
+def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New], str]:
+    """The test's own files, its spec first; with a note for the user."""
+    if wanted.extends:
+        note = f"copied, because '{wanted.extends}' ships with DoDo and a test extends only tests of its own registry\n"
+        return _from_another(wanted.name, wanted.extends, tests, place, note)
+    start = starts.start(wanted.level or starts.LEVEL, wanted.kind or starts.KIND, wanted.name)
+    if start.shipped:
+        note = f"copied from '{start.shipped}', because a {start.level} test of kind {start.kind} {start.why}\n"
+        return _from_another(wanted.name, start.shipped, tests, place, note)
+    return scaffold.test_files(wanted.name, start.template, place.registry, place.root), ""
 
 
-def _registry(deployment: Deployment) -> Path:
-    """The first registry that belongs to the repository itself, and not to a DoDo that is installed in it."""
-    if deployment.file is None:
-        raise UsageError(f"there is no {FILE_NAME} in this folder or above; dodo new --deployment writes one")
-    root = deployment.root.resolve()
-    for registry in deployment.registry:
-        if registry.resolve().is_relative_to(root) and not package_data.is_shipped(registry, root):
-            return registry
-    raise UsageError(f"{shown_path(str(deployment.file))} has no folder of this repository in 'registry'")
+def _from_another(name: str, base_name: str, tests: _Tests, place: Destination, note: str) -> tuple[list[New], str]:
+    """A test that extends one of the repository, or a copy of one that ships with DoDo, which ``note`` explains."""
+    base = scaffold.base_test(base_name, [*tests.own, *tests.copied])
+    if not package_data.is_shipped(base.location.root, place.root):
+        if not base.location.root.resolve().is_relative_to(place.root):
+            raise UsageError(f"'{base_name}' is outside this repository; a test extends tests of its registry")
+        return scaffold.extending_files(name, base, place.root), ""
+    instances = [spec for spec in tests.copied if spec.path == base.path]
+    return copied_files(name, instances, tests.shipped.manifests, place.registry, place.root), note
 
 
 def _deployment(options: argparse.Namespace, stdout: TextIO) -> int:
     if options.level or options.kind or options.extends:
         raise UsageError("--level, --kind and --extends apply to a test, not to --deployment")
-    files = scaffold.deployment_files(Path.cwd())
+    files = deployment_files(Path.cwd())
     there = [file for file in files if file.path.exists()]
     _write([file for file in files if file not in there], stdout)
     for file in there:
@@ -103,7 +124,7 @@ def _deployment(options: argparse.Namespace, stdout: TextIO) -> int:
     if len(there) == len(files):
         stdout.write("\nnothing to write\n")
         return Exit.OK
-    steps = [f"name your services in {next(f.path.name for f in files if f.path.name in scaffold.COMPOSE_FILES)}"]
+    steps = [f"name your services in {next(f.path.name for f in files if f.path.name in COMPOSE_FILES)}"]
     if any(file.path.name == ".gitlab-ci.yml" for file in there):
         steps.append("include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml")
     _next([*steps, "dodo new sil-first", "dodo compile --check", "commit and push; GitLab runs it"], stdout)

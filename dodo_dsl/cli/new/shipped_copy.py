@@ -7,7 +7,8 @@ from pathlib import Path
 import yaml
 
 from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.new.scaffold import New, spec_files
+from dodo_dsl.cli.new.new_file import New
+from dodo_dsl.cli.new.scaffold import spec_files
 from dodo_dsl.plan.test_files import copies
 from dodo_dsl.source import Mapping as Written
 from dodo_dsl.source import plain, read

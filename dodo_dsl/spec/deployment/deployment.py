@@ -5,7 +5,7 @@ import os
 import posixpath
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import __version__, package_data
@@ -21,6 +21,7 @@ FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
 _FROM_HERE = "paths are relative to the folder of dodo.yml"
+_NOT_YET = f"dodo new NAME makes it, with a first test; {_FROM_HERE}"
 _NETWORK = "for example 10.213.0.0/16"
 DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
@@ -30,12 +31,14 @@ class Deployment:
     """Where tests and application are; ``root`` is the folder of ``dodo.yml``, or the working folder without one.
 
     ``environment`` names variables of DoDo's own environment that the application gets, ``paths`` are files and folders
-    of the host that it may mount, and ``outside`` tells whether it may reach other networks than its test's.
+    of the host that it may mount, and ``outside`` tells whether it may reach other networks than its test's. ``absent``
+    are folders of the registry that do not exist.
     """
 
     root: Path
     file: Path | None = None
     registry: tuple[Path, ...] = ()
+    absent: tuple[Path, ...] = ()
     services: tuple[Path, ...] = ()
     messages: tuple[Path, ...] = ()
     application: tuple[Path, ...] = ()
@@ -81,10 +84,12 @@ def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
     problems: list[Diagnostic] = []
     rigs = _rigs(node.entries.get("rigs"), problems)
     reserved = {r.cid for r in rigs.values()}
+    registry, absent = _registry(path.parent, node.entries.get("registry"), problems)
     deployment = Deployment(
         root=path.parent,
         file=path,
-        registry=_folders(path.parent, node.entries.get("registry"), problems) or (package_data.registry(),),
+        registry=registry or (package_data.registry(),),
+        absent=absent,
         services=_folders(path.parent, node.entries.get("services"), problems),
         messages=_files(path.parent, node.entries.get("messages"), problems),
         application=_files(path.parent, node.entries.get("application"), problems),
@@ -109,6 +114,18 @@ def _texts(entry: Entry | None) -> Iterator[Scalar]:
     for item in value.items if isinstance(value, Sequence) else (value,):
         if isinstance(item, Scalar):
             yield item
+
+
+def _registry(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """The folders with tests, and those that do not exist."""
+    found: list[Diagnostic] = []
+    folders = _folders(root, entry, found)
+    missing = (path for item in _texts(entry) if item.text != SHIPPED and (path := path_of(root, item.text)))
+    absent = tuple(path for path in missing if not path.exists() and path.is_relative_to(root.resolve()))
+    if absent and all(package_data.is_shipped(folder, root) for folder in folders):
+        found = [replace(d, hint=_NOT_YET) for d in found]
+    problems.extend(found)
+    return folders, absent
 
 
 def _folders(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:

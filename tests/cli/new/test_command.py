@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import sys
 from io import StringIO
 from pathlib import Path
 
@@ -9,8 +10,12 @@ import pytest
 import yaml
 
 from dodo_dsl import package_data
+from dodo_dsl.cli.errors import NO_APPLICATION
 from dodo_dsl.cli.main import main
+from dodo_dsl.cli.new.starts import kinds
 from dodo_dsl.compiler import load
+from dodo_dsl.spec.model import LEVELS
+from tests.cli.terminal import Terminal
 
 
 def dodo(*words: str) -> tuple[int, str, str]:
@@ -36,15 +41,22 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-@pytest.mark.parametrize(
-    ("level", "kind"), [(None, None), ("sil", "closed-loop"), ("sil", "open-loop"), ("hil", "closed-loop")]
-)
+DETECTIONS = [f"opendlv.logic.perception.Detection{part}" for part in ("Type", "Property", "BoundingBox")]
+DECLARED = f"{{in: [], out: [{', '.join(DETECTIONS)}], answers: [{DETECTIONS[2]}]}}"
+PERCEPTION = f"services: {{app: {{image: example, command: --cid=111, x-dodo: {DECLARED}}}}}\n"
+KINDS = [(level, kind) for level in LEVELS for kind in kinds(level)]
+
+
+@pytest.mark.parametrize(("level", "kind"), [(None, None), *KINDS])
 def test_a_new_test_compiles_at_once(repository: Path, level: str | None, kind: str | None) -> None:
     options = [*(("--level", level) if level else ()), *(("--kind", kind) if kind else ())]
     code, out, err = dodo("new", "my-test", *options)
     assert (code, err) == (0, "")
     assert "wrote tests/my-test/my-test.dodo.yml\n" in out
-    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+    if kind == "perception":  # the application that the repository began with steers
+        (repository / "docker-compose.yml").write_text(PERCEPTION)
+    code, out, err = dodo("compile", "--check")
+    assert (code, err, out.partition(" checked: ")[2]) == (0, "", "no problems\n")
     spec = yaml.safe_load((repository / "tests/my-test/my-test.dodo.yml").read_text())
     assert (spec["level"], spec["kind"]) == (level or "sil", kind or "closed-loop")
     assert (repository / "tests/my-test/README.md").read_text().startswith("# my-test\n")
@@ -78,8 +90,6 @@ def test_editors_find_the_schema(repository: Path) -> None:
         (["new", "--extends", "there", "--level", "hil"], "--level and --kind do not apply with --extends"),
         (["new", "--level", "dil"], "a dil test cannot be closed-loop"),
         (["new", "--level", "dil"], "; try: dodo new new --level dil --kind open-loop"),
-        (["new", "--level", "hil", "--kind", "open-loop"], "a new hil test is closed-loop; open-loop tests are"),
-        (["new", "--level", "hil", "--kind", "open-loop"], "; try: dodo new new --kind open-loop"),
         (["--deployment", "--level", "hil"], "--level, --kind and --extends apply to a test"),
     ],
     ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
@@ -97,28 +107,110 @@ def test_what_cannot_be_begun_is_said_and_writes_nothing(repository: Path, words
     assert contents(repository) == before
 
 
-@pytest.mark.parametrize(
-    ("level", "kind"), [("sil", "perception"), ("dil", "perception"), ("dil", "open-loop"), ("hil", "perception")]
-)
-def test_what_no_start_is_made_up_for_has_a_test_to_copy(repository: Path, level: str, kind: str) -> None:
-    code, _, err = dodo("new", "mine", "--level", level, "--kind", kind)
-    assert code == 2
-    assert err.startswith(f"dodo new: a {level} test of kind {kind} needs ")
-    assert dodo(*err.rpartition("dodo ")[2].split())[0] == 0
+@pytest.mark.parametrize(("level", "kind"), [("sil", "perception"), ("dil", "open-loop"), ("hil", "open-loop")])
+def test_what_no_template_is_for_begins_as_a_copy(repository: Path, level: str, kind: str) -> None:
+    code, out, err = dodo("new", "mine", "--level", level, "--kind", kind)
+    assert (code, err) == (0, "")
+    assert f", because a {level} test of kind {kind} needs " in out
     spec = load([repository / "tests"]).specs[0]
     assert (spec.name, spec.level, spec.kind) == ("mine", level, kind)
 
 
-def test_outside_a_deployment_it_says_the_way(empty: Path) -> None:
-    code, _, err = dodo("new", "first")
+def test_an_empty_folder_becomes_a_repository(empty: Path) -> None:
+    code, out, err = dodo("new", "first")
+    assert (code, err) == (0, "")
+    written = {line.removeprefix("wrote ") for line in out.splitlines() if line.startswith("wrote ")}
+    assert written == set(contents(empty))
+    assert {
+        "dodo.yml",
+        ".dodo/dodo.schema.json",
+        "tests/first/first.dodo.yml",
+        "tests/maps/straight/map.json",
+    } < written
+    assert "name it in dodo.yml: application: docker-compose.yml\n" in out
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+    assert dodo("new", "second")[0] == 0
+    assert dodo("run", "first")[2] == f"dodo run: {NO_APPLICATION}\n"
+
+
+def test_an_application_that_is_there_is_named(empty: Path) -> None:
+    (empty / "compose.yaml").write_text("services: {app: {image: example, command: --cid=111}}\n")
+    assert "name it in" not in dodo("new", "first")[1]
+    assert yaml.safe_load((empty / "dodo.yml").read_text())["application"] == "compose.yaml"
+    assert dodo("compile") == (0, "1 test compiled into generated\n", "")
+
+
+def test_a_folder_of_the_registry_is_made(empty: Path) -> None:
+    (empty / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:", own/tests]\napplication: docker-compose.yml\n')
+    code, out, _ = dodo("compile", "--check")
+    assert code == 2
+    assert "there is no folder 'own/tests'\n" in out
+    assert "hint: dodo new NAME makes it, with a first test; paths are relative to the folder of dodo.yml\n" in out
+    code, out, err = dodo("new", "first")
+    assert (code, err) == (0, "")
+    assert "wrote own/tests/first/first.dodo.yml\n" in out
+    assert "own/tests'" not in dodo("compile", "--check")[1]
+
+
+@pytest.mark.parametrize(
+    ("registry", "said"),
+    [
+        ('registry: ["dodo:"]', 'dodo.yml names no folder for own tests; write in it: registry: [tests, "dodo:"]'),
+        ("registry: [../theirs]", 'dodo.yml names no folder for own tests; write in it: registry: [tests, "dodo:"]'),
+        ("registri: [tests]", "dodo.yml has problems:\n  dodo.yml:2:1: error[unknown-key]: unknown key 'registri'\n"),
+    ],
+)
+def test_a_deployment_that_takes_no_test_is_left_alone(empty: Path, registry: str, said: str) -> None:
+    (empty / "dodo.yml").write_text(f"dodo: 1\n{registry}\n")
+    before = contents(empty)
+    code, out, err = dodo("new", "first")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"dodo new: {said}")
+    assert contents(empty) == before
+
+
+def test_without_a_name_it_lists_what_there_is(empty: Path) -> None:
+    code, out, err = dodo("new")
+    assert (code, err, list(empty.iterdir())) == (2, "", [])
+    rows = {row[0].strip(): row[2] for line in out.splitlines() if (row := line.strip().partition("  "))[1]}
+    assert {words for words in rows if words.startswith("--level")} == {
+        f"--level {level} --kind {kind}" for level, kind in KINDS
+    }
+    assert [words.split()[1] for words in rows if words.startswith("--extends")] == SHIPPED
+
+
+def asked(patch: pytest.MonkeyPatch, answers: str, *words: str) -> tuple[int, str, str]:
+    """What it does in a terminal."""
+    stdin, stdout, stderr = Terminal(answers), Terminal(), StringIO()
+    patch.setattr(sys, "stdin", stdin)
+    return main(["new", *words], stdout, stderr), stdout.getvalue(), stderr.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("answers", "words", "expected"),
+    [
+        ("\n\n\n\n", [], ("sil-first", "sil", "closed-loop", False)),
+        ("1\nopen-loop\n2\nmine\n", [], ("mine", "sil", "open-loop", True)),
+        ("9\nhil\n3\n1\nBad\nfine\n", [], ("fine", "hil", "perception", True)),
+        ("\n\nmine\n", ["--level", "dil"], ("mine", "dil", "open-loop", True)),
+        ("\n", ["--extends", "sil-open-straight"], ("my-sil-open-straight", "sil", "open-loop", True)),
+    ],
+)
+def test_in_a_terminal_it_asks(
+    empty: Path, monkeypatch: pytest.MonkeyPatch, answers: str, words: list[str], expected: tuple[str, str, str, bool]
+) -> None:
+    code, out, err = asked(monkeypatch, answers, *words)
+    assert (code, err) == (0, ""), out
+    (spec,) = {spec.path: spec for spec in load([empty / "tests"]).specs}.values()
+    assert (spec.name, spec.level, spec.kind, "copied" in out) == expected
+    assert ("'9' is none of them, expected a number from 1 to 3\n" in out) is ("9" in answers)
+    assert ("'Bad' is not a valid test name" in out) is ("Bad" in answers)
+
+
+def test_who_answers_no_more_gets_nothing(empty: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code, _, err = asked(monkeypatch, "1\n")
     assert (code, list(empty.iterdir())) == (2, [])
-    assert err == "dodo new: there is no dodo.yml in this folder or above; dodo new --deployment writes one\n"
-
-
-def test_a_deployment_without_folders_of_its_own_is_said(empty: Path) -> None:
-    (empty / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:"]\n')
-    code, _, err = dodo("new", "first")
-    assert (code, err) == (2, "dodo new: dodo.yml has no folder of this repository in 'registry'\n")
+    assert err == "dodo new: nothing was written, as the input ended before all was answered\n"
 
 
 def with_shipped(repository: Path, registry: str = '["dodo:", tests]') -> None:
@@ -192,7 +284,8 @@ def test_an_installed_dodo_is_no_folder_of_the_repository(repository: Path, monk
     with_shipped(repository, '["dodo:"]')
     installed_in(repository, monkeypatch)
     code, out, err = dodo("new", "first")
-    assert (code, out, err) == (2, "", "dodo new: dodo.yml has no folder of this repository in 'registry'\n")
+    assert (code, out) == (2, "")
+    assert err.startswith("dodo new: dodo.yml names no folder for own tests; ")
 
 
 def test_a_deployment_is_written_once(repository: Path) -> None:

@@ -1,0 +1,53 @@
+"""Files that a repository with tests needs: dodo.yml, schemas for editors, and those of ``dodo new --deployment``."""
+
+from pathlib import Path
+
+from dodo_dsl import package_data
+from dodo_dsl.cli.new.new_file import New, filled
+from dodo_dsl.spec.deployment.deployment import FILE_NAME
+
+COMPOSE_FILES = ("docker-compose.yml", "docker-compose.yaml", "compose.yml", "compose.yaml")
+REGISTRY = "tests"
+_SCHEMAS = ".dodo"
+_SPEC_SCHEMA = "dodo.schema.json"
+
+
+def compose_file(root: Path) -> str:
+    """The name of the compose file in a folder, empty when there is none."""
+    return next((name for name in COMPOSE_FILES if (root / name).is_file()), "")
+
+
+def schema_of_specs(root: Path) -> Path:
+    """Where editors find the schema of specs in a repository, whether it is there yet or not."""
+    own = root / "schemas" / _SPEC_SCHEMA
+    return own if own.is_file() else root / _SCHEMAS / _SPEC_SCHEMA
+
+
+def missing_schemas(root: Path) -> list[New]:
+    """The schemas for editors, as far as the repository lacks them."""
+    return [] if schema_of_specs(root).is_file() else [file for file in _schemas(root) if not file.path.exists()]
+
+
+def _schemas(root: Path) -> list[New]:
+    paths = [package_data.schemas() / name for name in ("deployment.schema.json", _SPEC_SCHEMA)]
+    return [New(root / _SCHEMAS / path.name, path.read_bytes()) for path in paths]
+
+
+def dodo_yml(root: Path, application: str) -> New:
+    """A dodo.yml; ``application`` is the name of its compose file, empty when there is none yet."""
+    return New(root / FILE_NAME, filled("deployment/dodo.yml", application=application, registry=REGISTRY))
+
+
+def deployment_files(root: Path) -> list[New]:
+    """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas."""
+    application = compose_file(root) or COMPOSE_FILES[0]
+    pipelines = sorted((package_data.templates() / "gitlab").iterdir())
+    return [
+        dodo_yml(root, application),
+        New(root / application, filled("deployment/docker-compose.yml")),
+        New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
+        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml")),
+        *(New(root / ".gitlab" / "dodo" / path.name, path.read_bytes()) for path in pipelines),
+        *_schemas(root),
+        New(root / ".gitignore", filled("deployment/gitignore")),
+    ]
