@@ -94,6 +94,32 @@ def _filled(match: re.Match[str], known: Mapping[str, str], unset: bool) -> str:
     return found or ""
 
 
+def with_values(text: str, values: Mapping[str, str]) -> str:
+    """The text with the variables of ``values`` filled in, and all others left for compose."""
+    parts, place = [], 0
+    while (dollar := text.find("$", place)) >= 0:
+        end = end_of_variable(text, dollar)
+        match = _VARIABLE.fullmatch(text, dollar, end)
+        parts += [text[place:dollar], _with_value(match, values) if match else text[dollar:end]]
+        place = end
+    return "".join([*parts, text[place:]])
+
+
+def _with_value(match: re.Match[str], values: Mapping[str, str]) -> str:
+    value, word = values.get(match["bare"] or match["name"] or ""), match["word"]
+    if value is None:
+        inner = match.span("word")
+        return (
+            match[0] if word is None else f"${match.string[match.start() + 1 : inner[0]]}{with_values(word, values)}}}"
+        )
+    present = bool(value) or not match["colon"]
+    if match["operator"] == "+":
+        return with_values(word, values) if present else ""
+    if present:
+        return value.replace("$", "$$")
+    return match[0] if match["operator"] == "?" else with_values(word, values)
+
+
 def dotenv(text: str) -> dict[str, str]:
     """The variables of a ``.env`` file as compose reads it; a literal ``$`` is doubled.
 

@@ -19,6 +19,7 @@ from dodo_dsl.check.rules import (
     references,
     rigs,
     services,
+    variables,
 )
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment.deployment import Deployment
@@ -37,6 +38,7 @@ RULES: tuple[Rule, ...] = (
     references.check,
     limits.check,
     producers.check,
+    variables.check,
 )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.diagnostics import shown_path
+from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.deployment.rig import EMULATED_FILE
@@ -54,7 +55,10 @@ class Asked:
 
 @dataclass(frozen=True)
 class Explanation:
-    """The fields of ``dodo explain --json``; ``undeclared`` names services of the application without x-dodo."""
+    """The fields of ``dodo explain --json``.
+
+    ``variables`` are those that the test sets for the application, whose services without x-dodo ``undeclared`` names.
+    """
 
     name: str
     slug: str
@@ -63,6 +67,7 @@ class Explanation:
     kind: str
     rig: str
     services: tuple[ServiceExplained, ...]
+    variables: tuple[ArgumentExplained, ...]
     wiring: tuple[Line, ...]
     asked: tuple[Asked, ...]
     has_application: bool
@@ -80,6 +85,7 @@ def explain(test: ResolvedTest) -> Explanation:
         spec.kind or "?",
         spec.rig or "",
         tuple(_service(test, use) for use in spec.uses),
+        tuple(_variable(name, entry) for name, entry in spec.variables.items()),
         tuple(_lines(wiring)),
         tuple(_asked(wiring)),
         wiring.has_application,
@@ -92,6 +98,11 @@ def _service(test: ResolvedTest, use: Use) -> ServiceExplained:
     given = service.arguments.values() if service else ()
     shown = tuple(_argument(test.spec, use, argument) for argument in given if argument.value or argument.problem)
     return ServiceExplained(use.layer, use.name, use.uses.text, shown)
+
+
+def _variable(name: str, entry: Entry) -> ArgumentExplained:
+    value = entry.value.text if isinstance(entry.value, Scalar) else "?"
+    return ArgumentExplained(name, value, "", f"{shown_path(entry.key.file)}:{entry.key.line}")
 
 
 def _argument(spec: Spec, use: Use, argument: Argument) -> ArgumentExplained:

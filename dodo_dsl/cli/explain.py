@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TextIO
 
 from dodo_dsl.check import catalogue
-from dodo_dsl.check.explanation import Asked, Explanation, Line, explain
+from dodo_dsl.check.explanation import ArgumentExplained, Asked, Explanation, Line, explain
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
@@ -82,12 +82,15 @@ def _services(one: Explanation) -> str:
     lines = []
     for service in one.services:
         lines.append(printable(f"{service.layer}: {service.name} ({service.uses})") + "\n")
-        rows = [
-            [a.name, f"{a.value} {a.unit}".strip(), a.origin.replace(f"{one.file}:", "line ")]
-            for a in service.arguments
-        ]
-        lines.append(_table(rows, "  "))
+        lines.append(_arguments(service.arguments, one))
+    if one.variables:
+        lines += ["application: its variables\n", _arguments(one.variables, one)]
     return "".join(lines)
+
+
+def _arguments(arguments: Sequence[ArgumentExplained], one: Explanation) -> str:
+    rows = [[a.name, f"{a.value} {a.unit}".strip(), a.origin.replace(f"{one.file}:", "line ")] for a in arguments]
+    return _table(rows, "  ")
 
 
 def _wiring(one: Explanation) -> str:
@@ -138,7 +141,9 @@ def _differences(instances: Sequence[Explanation]) -> str:
 
 def _values(one: Explanation) -> dict[str, str]:
     top = {"level": one.level, "kind": one.kind, "rig": one.rig}
-    return top | {f"{s.name}.{a.name}": f"{a.value} {a.unit}".strip() for s in one.services for a in s.arguments}
+    variables = {a.name: a.value for a in one.variables}
+    services = {f"{s.name}.{a.name}": f"{a.value} {a.unit}".strip() for s in one.services for a in s.arguments}
+    return top | services | variables
 
 
 def _table(rows: Sequence[Sequence[str]], indent: str) -> str:

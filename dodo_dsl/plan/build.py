@@ -17,6 +17,7 @@ from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
+from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.deployment.rig import EMULATED, EMULATED_FILE, PORT, Rig
@@ -55,7 +56,12 @@ def build(
 
     @functools.cache
     def rewritten(
-        cid: int, isolated: str, evaluators: tuple[str, ...], hardware: bool, privileged: bool
+        cid: int,
+        isolated: str,
+        evaluators: tuple[str, ...],
+        hardware: bool,
+        privileged: bool,
+        given: tuple[tuple[str, str], ...],
     ) -> Application:
         planned = plan_application(
             application,
@@ -66,6 +72,7 @@ def build(
             hil=hardware,
             privileged_allowed=privileged,
             limits=_limits(application, deployment),
+            given=dict(given),
         )
         return replace(planned, hidden=_hidden(application, deployment))
 
@@ -121,7 +128,7 @@ class _Builder:
         cid: int,
         index: int,
         tree: Callable[[Path, Path], list[FileCopy]],
-        rewritten: Callable[[int, str, tuple[str, ...], bool, bool], Application],
+        rewritten: Callable[[int, str, tuple[str, ...], bool, bool, tuple[tuple[str, str], ...]], Application],
     ) -> None:
         self.test = test
         self.spec = test.spec
@@ -180,7 +187,7 @@ class _Builder:
             tag=rig.tag if rig else "sil",
             sandbox_image=self._image("sandbox"),
             services=services,
-            application=self.rewritten(self.cid, isolated, evaluators, hardware, privileged),
+            application=self.rewritten(self.cid, isolated, evaluators, hardware, privileged, self._variables()),
             lockstep=lockstep(spec, self.application.declared, self.settings.wall_timeout_s),
             rig=rig.name if rig else "",
             messages=messages,
@@ -189,6 +196,12 @@ class _Builder:
             truth_delay_s=truth_delay_s(self.test) if truth else 0.0,
             source_map=self.places,
         )
+
+    def _variables(self) -> tuple[tuple[str, str], ...]:
+        """Variables that the test sets for its application."""
+        for name, entry in self.spec.variables.items():
+            self._place(f"application.env.{name}", entry.key)
+        return tuple((name, e.value.text) for name, e in self.spec.variables.items() if isinstance(e.value, Scalar))
 
     def _messages(self) -> tuple[str, ...]:
         """The deployment's messages, copied beside the test for its services to read."""

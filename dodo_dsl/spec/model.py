@@ -18,7 +18,7 @@ LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
 LEVELS = ("sil", "dil", "hil")
 KINDS = ("perception", "open-loop", "closed-loop")
-_MAPPINGS = (*LAYERS, matrix.KEY, "record", "response")
+_MAPPINGS = (*LAYERS, matrix.KEY, "record", "response", "application")
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
 
@@ -41,6 +41,7 @@ class Spec:
     ``isolation`` is None where the spec leaves it to the rig, ``frames_hz`` is 0 where no frames are recorded.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
+    ``variables`` are those that the application gets from the test.
     ``is_whole`` is False where services could not be read, so that missing producers are not reported.
     """
 
@@ -59,6 +60,7 @@ class Spec:
     max_response_s: float | None = None
     response_over: float = 0.0
     uses: tuple[Use, ...] = ()
+    variables: dict[str, Entry] = field(default_factory=dict)
     choice: Choice = field(default_factory=Choice)
     spans: dict[str, Span] = field(default_factory=dict)
     is_whole: bool = True
@@ -189,11 +191,17 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         max_response_s=longest,
         response_over=over or 0.0,
         uses=uses,
+        variables=_variables(node.get("application")),
         choice=choice,
         spans={key: entry.value.span for key, entry in node.entries.items()},
         is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),
     )
     return spec, [*found, *more, *also, *most]
+
+
+def _variables(application: Node | None) -> dict[str, Entry]:
+    written = _part(application, "env")
+    return dict(written.entries) if isinstance(written, Mapping) else {}
 
 
 def _has_stranger(node: Mapping) -> bool:

@@ -13,6 +13,7 @@ from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
 
 _UNIT = "x-unit"
+_HINT = "x-hint"
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
     "array": "a list",
@@ -121,6 +122,7 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{place.name} {found}, expected {' or '.join(names)}"
     is_scalar = isinstance(error.instance, int | float)
     hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
+    hint = hint or error.schema.get(_HINT, "")
     if not hint and wanted == "array" and "examples" in error.schema:
         hint = f"write for example {place.name[1:-1]}: [{', '.join(error.schema['examples'][0])}]"
     yield Diagnostic(place.span, "wrong-type", message, hint)

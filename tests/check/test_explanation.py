@@ -28,6 +28,10 @@ action:
   vehicle: {uses: dynamic-model, with: {frame-id: "${matrix.frame-id}"}}
   pose: {uses: integrator, with: {yaw: "${matrix.yaw}", frame-id: "${matrix.frame-id}"}}
 """
+VARIABLES = """\
+matrix: {speed: [0.5, 1]}
+application: {env: {SPEED: "${matrix.speed}", MODE: careful}}
+"""
 DECLARED = """\
 # docker-compose.yml
 services:
@@ -38,7 +42,7 @@ services:
       in: [opendlv.logic.perception.DetectionType]
       out: [opendlv.proxy.GroundSteeringRequest]
 """
-CASES = {"plain": "", "hil": HIL, "matrix": MATRIX, "declared": DECLARED}
+CASES = {"plain": "", "hil": HIL, "matrix": MATRIX, "variables": VARIABLES, "declared": DECLARED}
 
 
 def explained(*words: str) -> tuple[int, str, str]:

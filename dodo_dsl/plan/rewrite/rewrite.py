@@ -1,13 +1,15 @@
 """``plan_application``: a test's own copy of the application's compose file."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, environment, plain, text
+from dodo_dsl.application.test_variables import with_variables
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.plan.rewrite import cid_and_image, container_limits, removals, service_namespaces, variables, volumes
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
@@ -35,16 +37,20 @@ def plan_application(
     hil: bool = False,
     privileged_allowed: bool = False,
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
+    given: Mapping[str, str] = MappingProxyType({}),
 ) -> Application:
     """The application as a test runs it; ``folder`` is the compiled test's, ``after`` the services it waits for.
 
-    Devices stay only with ``hil``, privileges only with ``privileged_allowed`` as well.
+    Devices stay only with ``hil``, privileges only with ``privileged_allowed`` as well. ``given`` are variables
+    that the test sets.
     """
+    application = with_variables(application, given)
     base = _relative(application.folder, folder)
     names = frozenset(application.services)
     containers, known, ports = application.containers, application.known, application.access.ports
     setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits, ports)
     changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
+    changes += [f"all services: {name} as the test sets it" for name in given]
     path_variables: set[str] = set()
 
     def change(path: str) -> str:
