@@ -4,6 +4,7 @@ Plain scalars follow the core schema of YAML 1.2 (``on`` and ``yes`` are strings
 without recursion, so that nesting, size and aliases of hostile files are bounded before anything is built.
 """
 
+import codecs
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,6 +14,8 @@ from typing import Any
 import yaml
 
 from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.slips import slip
+from dodo_dsl.slips.failure import Failure
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
@@ -24,6 +27,8 @@ Plain = str | int | float | bool | None
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INT = re.compile(r"[-+]?[0-9]{1,300}\Z|0o[0-7]{1,300}\Z|0x[0-9a-fA-F]{1,300}\Z")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
+_DASHES = re.compile(r"-[^-\s]\S*(\s+-[^-\s]\S*)+")
+"""Items of a list that would be one text."""
 _SPECIAL: dict[str, Plain] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -104,9 +109,9 @@ def resolve(text: str) -> Plain:
 
 
 class _Stop(Exception):
-    def __init__(self, span: Span, rule: str, message: str) -> None:
+    def __init__(self, span: Span, rule: str, message: str, hint: str = "") -> None:
         super().__init__(message)
-        self.diagnostic = Diagnostic(span, rule, message)
+        self.diagnostic = Diagnostic(span, rule, message, hint)
 
 
 @dataclass
@@ -167,6 +172,8 @@ class _Builder:
     def _scalar(self, event: Any) -> None:
         span = self.span(event)
         is_plain = event.implicit[0]
+        if is_plain and event.end_mark.line > event.start_mark.line and _DASHES.fullmatch(event.value):
+            raise _Stop(span, "yaml-syntax", "a space is missing after '-'", f"write '- {event.value.split()[0][1:]}'")
         value = resolve(event.value) if is_plain else event.value
         self._add(Scalar(span, value, event.value, self._tag(event)), 1, event.anchor)
 
@@ -177,9 +184,8 @@ class _Builder:
     def _alias(self, event: Any) -> None:
         span = self.span(event)
         if event.anchor not in self.anchors:
-            raise _Stop(
-                span, "yaml-syntax", f"alias '*{event.anchor}' refers to an anchor that is missing or incomplete"
-            )
+            message = f"alias '*{event.anchor}' refers to an anchor that is missing or incomplete"
+            raise _Stop(span, "yaml-syntax", message, "a text that begins with '*' needs quotes")
         node, weight, depth = self.anchors[event.anchor]
         self._check_depth(span, len(self.stack) + depth)
         self._add(node, weight, None, span, depth)
@@ -257,32 +263,21 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
     if mark is None:
         position = int(getattr(error, "position", 0) or 0)
         before = text[:position]
-        return Diagnostic(
-            Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1),
-            "yaml-syntax",
-            f"not YAML: {problem}",
-        )
-    lines = text.splitlines()
-    begin = getattr(error, "context_mark", None)
-    if mark.line >= len(lines) and begin:  # what is never closed is shown where it is opened
+        span = Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
+        return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}")
+    begin, context = getattr(error, "context_mark", None), getattr(error, "context", None) or ""
+    began = (begin.line, begin.column) if begin else None
+    failure = Failure(text, problem, (mark.line, mark.column), context, began, _LOADER)
+    if found := slip(failure):
+        rule = "yaml-tab" if found.is_tab else "yaml-syntax"
+        return Diagnostic(Span(file, found.line + 1, found.column + 1), rule, found.message, found.hint)
+    if begin and mark.line >= len(failure.lines):  # what is never closed is shown where it is opened
         mark = begin
-    context = getattr(error, "context", None) or ""
     if "simple key" in context and begin:
         key = Span(file, begin.line + 1, begin.column + 1)
         return Diagnostic(key, "yaml-syntax", "not YAML: expected 'key: value', with a space after the colon")
-    span = Span(file, mark.line + 1, mark.column + 1)
-    line = lines[mark.line] if mark.line < len(lines) else ""
-    indent = line[: len(line) - len(line.lstrip())]
-    if "\t" in indent or line[mark.column : mark.column + 1] == "\t":
-        column = line.index("\t") + 1
-        return Diagnostic(
-            Span(file, span.line, column),
-            "yaml-tab",
-            "this line is indented with a tab",
-            "indent with spaces",
-        )
     where = f" {context} that begins in line {begin.line + 1}" if context and begin else ""
-    return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}{where}")
+    return Diagnostic(Span(file, mark.line + 1, mark.column + 1), "yaml-syntax", f"not YAML: {problem}{where}")
 
 
 def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:
@@ -320,6 +315,8 @@ def read(path: Path) -> tuple[Node | None, list[Diagnostic]]:
         return None, [Diagnostic(Span(file), "unreadable-file", f"cannot read the file: {error.strerror}")]
     if len(raw) > MAX_BYTES:
         return None, [Diagnostic(Span(file), "too-large", f"the file is larger than {MAX_BYTES // 1024} KiB")]
+    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return None, [Diagnostic(Span(file, length=0), "yaml-encoding", "the file is UTF-16", "save it as UTF-8")]
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -9,8 +9,10 @@ from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
+from dodo_dsl.spec.consequences import unindented, without_consequences
 
 _UNIT = "x-unit"
 _HINT = "x-hint"
@@ -46,7 +48,8 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
     """All violations of ``schemas/<schema>.schema.json``; tags are refused as well."""
     found = list(_tags(node))
     validator = _validator(schema)
-    for error in itertools.islice(validator.iter_errors(plain(node)), MAX_PROBLEMS):
+    errors = itertools.islice(validator.iter_errors(plain(node)), MAX_PROBLEMS)
+    for error in without_consequences(error for error in errors if not _is_of_rules(error)):
         place = _locate(node, error.absolute_path)
         if not error.absolute_path:
             place.about = validator.schema.get("properties", {})
@@ -54,10 +57,20 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
     return found
 
 
+def _is_of_rules(error: Any) -> bool:
+    """Whether a rule says more: which type and unit a parameter's value has."""
+    path = error.absolute_path
+    return (
+        error.validator == "type" and len(path) == 4 and path[2] == "with" and isinstance(error.instance, dict | None)
+    )
+
+
 def _tags(node: Node) -> Iterator[Diagnostic]:
     if node.tag:
         tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-        yield Diagnostic(node.span, "yaml-tag", f"tag '{tag}' is not supported", "remove the tag")
+        yield Diagnostic(
+            node.span, "yaml-tag", f"tag '{tag}' is not supported", "remove the tag, or write a text in quotes"
+        )
     if isinstance(node, Mapping):
         for entry in node.entries.values():
             yield from _tags(entry.value)
@@ -98,9 +111,18 @@ def _shown(value: object) -> str:
 
 def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
     known = error.schema.get("properties", {})
+    beside = unindented(error.instance, known)
     unknown = (name for name in error.instance if name not in known)
     for name in itertools.islice(unknown, MAX_PROBLEMS):
-        yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
+        found = slip_in_key(name, known, is_empty=error.instance[name] is None)
+        if found:
+            yield Diagnostic(place.key(name), "unknown-key", found.message, found.hint)
+        elif name not in beside:
+            yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
+        elif name == next(key for key in beside if beside[key] == beside[name]):
+            message = f"{_shown(name)} stands beside '{beside[name]}', which is empty"
+            hint = f"indent what belongs to '{beside[name]}'"
+            yield Diagnostic(place.key(name), "unknown-key", message, hint)
 
 
 def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -125,7 +147,10 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     hint = hint or error.schema.get(_HINT, "")
     if not hint and wanted == "array" and "examples" in error.schema:
         hint = f"write for example {place.name[1:-1]}: [{', '.join(error.schema['examples'][0])}]"
-    yield Diagnostic(place.span, "wrong-type", message, hint)
+    span = place.span
+    if isinstance(place.node, Sequence) and wanted == "object":
+        span, hint = place.node.span, hint or "write 'key: value' in place of list items"
+    yield Diagnostic(span, "wrong-type", message, hint)
 
 
 def _kind(value: object) -> str:
@@ -145,7 +170,10 @@ def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
     choices = [str(v) for v in error.validator_value]
     message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(choices)}"
     hint = did_you_mean(str(error.instance), choices)
-    yield Diagnostic(place.span, "wrong-value", message, hint if hint.startswith("did") else "")
+    hint = hint if hint.startswith("did") else ""
+    if "#" in str(error.instance):
+        hint = "a comment begins with ' #', after a space"
+    yield Diagnostic(place.span, "wrong-value", message, hint)
 
 
 def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:

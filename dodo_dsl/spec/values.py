@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
-from dodo_dsl.source import Node, Scalar, Sequence, path_of
+from dodo_dsl.source import Mapping, Node, Scalar, Sequence, path_of
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Parameter
 
@@ -63,7 +63,9 @@ def _name(parameter: Parameter) -> str:
 
 def _scalar(parameter: Parameter, node: Node, expected: str) -> Scalar:
     if not isinstance(node, Scalar) or node.value is None:
-        found = "is empty" if isinstance(node, Scalar) else "is a list"
+        found = (
+            "is empty" if isinstance(node, Scalar) else "is a list" if isinstance(node, Sequence) else "is a mapping"
+        )
         raise ValueProblem(node.span, "wrong-type", f"{_name(parameter)} {found}, expected {expected}")
     return node
 
@@ -159,6 +161,9 @@ def _output(parameter: Parameter, node: Node, _: Path) -> Value:
 
 def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     items = node.items if isinstance(node, Sequence) else (node,)
+    if isinstance(node, Mapping):
+        hint = f"write [{', '.join(list(node.entries)[:3])}]"
+        raise ValueProblem(node.span, "wrong-type", f"{_name(parameter)} is a mapping, expected a list", hint)
     texts = []
     for item in items:
         text = _text(parameter, item, root).text

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.slips.keys import meant, slip_in_key
+from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.arguments import ResolvedService
 
 
@@ -24,10 +26,24 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
     for name, entry in service.use.parameters.items():
         argument = service.arguments.get(name)
         if argument is None:
-            message = f"service '{service.manifest.name}' has no parameter '{name}'"
-            yield Diagnostic(entry.key, "unknown-parameter", message, did_you_mean(name, service.manifest.parameters))
+            known = service.manifest.parameters
+            slip = slip_in_key(name, known, is_empty=_is_empty(entry))
+            message = slip.message if slip else f"service '{service.manifest.name}' has no parameter '{name}'"
+            hint = slip.hint if slip else did_you_mean(name, known)
+            yield Diagnostic(entry.key, "unknown-parameter", message, hint)
         elif argument.problem:
             yield argument.problem
+
+
+def _is_empty(entry: Entry) -> bool:
+    return isinstance(entry.value, Scalar) and entry.value.value is None
+
+
+def _misspelt(service: ResolvedService) -> set[str]:
+    """The parameters that unknown ones most likely mean, which are not missing as well."""
+    known = service.manifest.parameters
+    unknown = ((name, entry) for name, entry in service.use.parameters.items() if name not in known)
+    return {meant(name, known, is_empty=_is_empty(entry)) for name, entry in unknown}
 
 
 def _from_elsewhere(service: ResolvedService) -> Iterator[Diagnostic]:
@@ -38,9 +54,9 @@ def _from_elsewhere(service: ResolvedService) -> Iterator[Diagnostic]:
 
 
 def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnostic]:
-    use, manifest = service.use, service.manifest
+    use, manifest, misspelt = service.use, service.manifest, _misspelt(service)
     for parameter in manifest.parameters.values():
-        if not parameter.required or parameter.name in use.parameters:
+        if not parameter.required or parameter.name in use.parameters or parameter.name in misspelt:
             continue
         if parameter.rig and context.rig and context.rig.entry(parameter.rig):
             continue

@@ -1,0 +1,36 @@
+"""What is wrong with text that is not YAML, in the words of its author: the commonest slips of the pen."""
+
+from collections.abc import Callable, Iterator
+
+from dodo_dsl.slips import blocks, brackets, characters, quotes
+from dodo_dsl.slips.failure import Failure, Slip
+
+_DETECTORS: tuple[Callable[[Failure], Iterator[Slip]], ...] = (
+    characters.conflict,
+    characters.tab,
+    characters.foreign_blank,
+    quotes.unclosed,
+    quotes.text_behind,
+    quotes.escape,
+    blocks.no_blank_after_colon,
+    blocks.colon_in_text,
+    blocks.no_colon,
+    blocks.too_deep,
+    blocks.dash,
+    blocks.list_with_key,
+    blocks.list_behind_key,
+    brackets.one_too_many,
+    blocks.between_levels,
+    brackets.unclosed,
+    brackets.wrong_kind,
+    brackets.no_comma,
+    brackets.no_value,
+    characters.first_character,
+    characters.block_text,
+    blocks.unexpected,
+)
+
+
+def slip(failure: Failure) -> Slip | None:
+    """The first explanation that fits what the parser stumbled over; None when there is none."""
+    return next((found for detector in _DETECTORS for found in detector(failure)), None)

@@ -1,0 +1,58 @@
+"""Slips of single characters: tabs, blanks that are none, and characters with a meaning in YAML."""
+
+import re
+import unicodedata
+from collections.abc import Iterator
+
+from dodo_dsl.slips.failure import Failure, Slip
+
+_CONFLICT = re.compile(r"(<{7}|>{7}|\|{7}) |={7}$")
+_BLANKS = "\u00a0\u1680\u2000-\u200b\u202f\u205f\u3000\ufeff"
+_FOREIGN = re.compile(rf"(?:^\s*|:)(?P<blank>[{_BLANKS}])")
+
+
+def conflict(failure: Failure) -> Iterator[Slip]:
+    for number, line in enumerate(failure.lines):
+        if _CONFLICT.match(line):
+            hint = "keep one of the two versions, and remove the lines that git added"
+            yield Slip(number, 0, "a conflict of git is not resolved", hint)
+
+
+def tab(failure: Failure) -> Iterator[Slip]:
+    for number in (failure.mark[0], failure.above(failure.mark[0])):
+        line = failure.line(number)
+        head = line[: len(line) - len(line.lstrip())]
+        if "\t" in head:
+            message = "this line is indented with a tab"
+            yield Slip(number, line.index("\t"), message, "indent with spaces", is_tab=True)
+    if failure.here.startswith("\t"):
+        yield Slip(*failure.mark, "a tab where a space is expected", "write a space", is_tab=True)
+
+
+def foreign_blank(failure: Failure) -> Iterator[Slip]:
+    """As word processors and web pages have them."""
+    first = failure.begin[0] if failure.begin else failure.mark[0]
+    for number in range(min(first, failure.above(failure.mark[0])), failure.mark[0] + 1):
+        found = _FOREIGN.search(failure.line(number))
+        if found:
+            blank = found["blank"]
+            name = unicodedata.name(blank, "unnamed").lower()
+            message = f"this blank is not a space but a {name} (U+{ord(blank):04X})"
+            yield Slip(number, found.start("blank"), message, "write a space")
+
+
+def first_character(failure: Failure) -> Iterator[Slip]:
+    """Characters that mean something else, or nothing, at the begin of a value."""
+    reasons = {"&": "begins an anchor", "*": "begins an alias", "!": "begins a tag", "%": "begins a directive"}
+    sign = failure.before[-1:] if "anchor" in failure.context or "alias" in failure.context else failure.here[:1]
+    column = failure.mark[1] - (sign != failure.here[:1])
+    if sign and ("cannot start any token" in failure.problem or sign in "&*"):
+        why = f", which {reasons[sign]}" if sign in reasons else ""
+        yield Slip(failure.mark[0], column, f"a text cannot begin with '{sign}'{why}", "write the text in quotes")
+
+
+def block_text(failure: Failure) -> Iterator[Slip]:
+    if "block scalar" in failure.context:
+        sign = failure.line(failure.begin[0])[failure.begin[1]] if failure.begin else "|"
+        message = f"text stands behind '{sign}', expected it in the lines below"
+        yield Slip(*failure.mark, message, f"remove the '{sign}', or write the text indented into the next line")
