@@ -4,7 +4,7 @@ import difflib
 import functools
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -130,28 +130,24 @@ def format_json(diagnostics: Sequence[Diagnostic]) -> str:
 
 
 def format_gitlab(diagnostics: Sequence[Diagnostic]) -> str:
-    """GitLab's code quality report; a fingerprint stays the same when lines move."""
-    rows = []
-    seen: dict[str, int] = {}
-    for d in diagnostics:
-        path = shown_path(d.span.file)
-        identity = f"{path}\0{d.rule}\0{d.message}"
-        seen[identity] = seen.get(identity, 0) + 1
-        fingerprint = hashlib.sha256(f"{identity}\0{seen[identity]}".encode()).hexdigest()
-        rows.append(
-            {
-                "description": d.message + (f" ({d.hint})" if d.hint else ""),
-                "check_name": d.rule,
-                "fingerprint": fingerprint,
-                "severity": "major" if d.severity == "error" else "minor",
-                "location": {"path": path, "lines": {"begin": d.span.line}},
-            }
-        )
+    """GitLab's code quality report."""
+    rows = [
+        {
+            "description": d.message + (f" ({d.hint})" if d.hint else ""),
+            "check_name": d.rule,
+            "fingerprint": fingerprint,
+            "severity": "major" if d.severity == "error" else "minor",
+            "location": {"path": shown_path(d.span.file), "lines": {"begin": d.span.line}},
+        }
+        for d, fingerprint in zip(diagnostics, fingerprints(diagnostics), strict=True)
+    ]
     return json_text(rows)
 
 
-FORMATS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {
-    "text": format_text,
-    "json": format_json,
-    "gitlab": format_gitlab,
-}
+def fingerprints(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
+    """A digest of each, which stays the same when lines move."""
+    seen: dict[str, int] = {}
+    for d in diagnostics:
+        identity = f"{shown_path(d.span.file)}\0{d.rule}\0{d.message}"
+        seen[identity] = seen.get(identity, 0) + 1
+        yield hashlib.sha256(f"{identity}\0{seen[identity]}".encode()).hexdigest()

@@ -8,15 +8,16 @@ from typing import TextIO
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.formats import FORMATS, rendered
 from dodo_dsl.compiler import Checked, NoApplication, plan
-from dodo_dsl.diagnostics import FORMATS, Diagnostic, has_errors, ordered
+from dodo_dsl.diagnostics import Diagnostic, format_text, has_errors, ordered
 from dodo_dsl.emit.output_folder import differences, stale_folders, write
 
 EXAMPLES = """examples:
   dodo compile                             all tests of the deployment, into generated/
   dodo compile tests/my-test -o out        one folder of tests
   dodo compile --check                     problems of all tests; writes nothing
-  dodo compile --check --format gitlab     the same as a code quality report
+  dodo compile --check --format gitlab     the same as a code quality report; sarif and junit are others
 """
 
 
@@ -36,9 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
     parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
-    parser.add_argument(
-        "--format", choices=sorted(FORMATS), default="text", help="format of the diagnostics (default: text)"
-    )
+    parser.add_argument("--format", choices=FORMATS, default="text", help="format of the diagnostics (default: text)")
     selection.add_application(parser)
 
 
@@ -50,11 +49,11 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return _write(checked, options, stdout)
 
 
-def _show(diagnostics: list[Diagnostic], style: str, stdout: TextIO) -> None:
+def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: TextIO) -> None:
     if style != "text":
-        stdout.write(FORMATS[style](diagnostics))
+        stdout.write(rendered(style, diagnostics, [str(spec.path) for spec in checked.specs]))
     elif diagnostics:
-        stdout.write(FORMATS[style](diagnostics[:_MOST_PROBLEMS]))
+        stdout.write(format_text(diagnostics[:_MOST_PROBLEMS]))
         if len(diagnostics) > _MOST_PROBLEMS:
             stdout.write(f"... {len(diagnostics) - _MOST_PROBLEMS} more problems\n")
         rules = {diagnostic.rule for diagnostic in diagnostics}
@@ -68,7 +67,7 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)
-    _show(diagnostics, options.format, stdout)
+    _show(diagnostics, options.format, checked, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
     outdated = f"{options.output} is stale; dodo compile brings it up to date"
@@ -97,14 +96,14 @@ def _names(names: Sequence[str]) -> str:
 
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int:
     if not checked.ok:
-        _show(list(checked.diagnostics), options.format, stdout)
+        _show(list(checked.diagnostics), options.format, checked, stdout)
         return Exit.USAGE
     try:
         made = plan(checked, options.output)
     except NoApplication:
         raise UsageError(NO_APPLICATION) from None
     diagnostics = ordered([*checked.diagnostics, *made.problems])
-    _show(diagnostics, options.format, stdout)
+    _show(diagnostics, options.format, checked, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]

@@ -27,22 +27,23 @@ def write(path: Path, outcomes: Sequence[Outcome], attachments: dict[str, str]) 
 def _case(outcome: Outcome, attachment: str | None) -> Any:
     from junitparser import Error, Failure, TestCase
 
-    case = TestCase(_xml_text(outcome.name), classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
-    case._elem.set("file", _xml_text(outcome.spec))
+    case = TestCase(xml_text(outcome.name), classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
+    case._elem.set("file", xml_text(outcome.spec))
     if outcome.outcome != "passed":
         kind = Failure if outcome.outcome == "failed" else Error
-        result = kind(_xml_text(outcome.reason), outcome.outcome)
-        result.text = _xml_text("\n".join([outcome.reason, *outcome.last_lines]))
+        result = kind(xml_text(outcome.reason), outcome.outcome)
+        result.text = xml_text("\n".join([outcome.reason, *outcome.last_lines]))
         case.result = [result]
     lines = [check_line(check) for check in outcome.checks] + [f"note: {note}" for note in outcome.notes]
     if attachment:
         lines.append(f"[[ATTACHMENT|{attachment}]]")
     if lines:
-        case.system_out = _xml_text("\n".join(lines))
+        case.system_out = xml_text("\n".join(lines))
     return case
 
 
-def _xml_text(text: str) -> str:
+def xml_text(text: str) -> str:
+    """The text without what XML cannot hold."""
     return _NOT_XML.sub("\ufffd", text)
 
 
