@@ -4,6 +4,7 @@ It ends with 0 whatever a child ends with, so that the child is run by its own f
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -19,12 +20,25 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 PROGRAMS = CACHE / "dodo/gitlab-ci-local/node_modules/.bin"
+FOREIGN = """\
+include:
+  - local: .gitlab/dodo/application.gitlab-ci.yml
+  - local: .gitlab/dodo/deployment.gitlab-ci.yml
+stages: [prepare, test, release]
+default: {before_script: [echo of foreign jobs only]}
+variables: {DODO_COMPOSE_FILE: kiwi/docker-compose.yml, DODO_RUN_OPTIONS: "", DODO_REGISTRY: ""}
+configure: {stage: prepare, script: [echo configured]}
+lint: {script: [echo linted]}
+publish: {stage: release, script: [echo published]}
+dodo-images: {script: ["echo DODO_IMAGE_STEERING=example > dodo-images.env; touch dodo-deployment.gitlab-ci.yml"]}
+"""
+"""Both templates in a pipeline with stages, jobs and defaults of its own. Its images are built elsewhere."""
 TESTS = ("sil-closed-left-curve", "sil-closed-straight")
 
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
-    """A repository with two of the shipped simulations, the example application, and the pipeline of `dodo new`."""
+    """A repository with two of the shipped simulations, the example application, and a pipeline around DoDo's jobs."""
     if not (PROGRAMS / "gitlab-ci-local").exists() or not shutil.which("rsync"):
         pytest.skip("gitlab-ci-local or rsync is not installed; scripts/install-gitlab-ci-local installs them")
     skipped = shutil.ignore_patterns("__pycache__")
@@ -35,6 +49,7 @@ def repository(tmp_path: Path) -> Path:
     run(tmp_path, sys.executable, "-m", "dodo_dsl", "new", "--deployment")
     for words in (["init", "-q", "-b", "main"], ["remote", "add", "origin", "git@gitlab.example.org:team/tests.git"]):
         run(tmp_path, "git", *words)
+    (tmp_path / ".gitlab-ci.yml").write_text(FOREIGN)
     commit(tmp_path)
     return tmp_path
 
@@ -68,7 +83,12 @@ def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> 
     result = pipeline(repository)
     assert result.returncode == 0, result.stdout[-4000:] + result.stderr[-2000:]
     assert (repository / "gl-code-quality-report.json").read_text().strip() == "[]"
-    assert artifact(repository, "pipeline", "generated/child.gitlab-ci.yml").is_file()
+    assert artifact(repository, "dodo-pipeline", "generated/child.gitlab-ci.yml").is_file()
+    said = re.findall(r"^(?:\x1b\[[0-9;]*m)*([\w-]+)(?:\x1b\[[0-9;]*m)* +.*> *(.*)", result.stdout, re.MULTILINE)
+    foreign = {name for name, words in said if "of foreign jobs only" in words}
+    assert foreign == {"configure", "lint", "publish"}
+    image = artifact(repository, "compile", f"generated/{TESTS[0]}/.env").read_text().splitlines()[-1]
+    assert image == "DODO_IMAGE_STEERING=example"
     for name in TESTS:
         (case,) = ElementTree.parse(artifact(repository, name, "dodo-report/junit.xml")).iter("testcase")
         assert (case.get("name"), case.get("classname")) == (name, "sil")

@@ -64,6 +64,28 @@ def test_the_child_is_triggered_as_its_jobs_need_it(template: Path) -> None:
     assert jobs["compile"]["artifacts"]["paths"] == ["generated/"]
 
 
+def test_jobs_of_both_templates_are_the_same() -> None:
+    """A pipeline that includes both has each of them once, whatever the order: GitLab merges jobs of one name."""
+    first, second = (yaml.safe_load(template.read_text()) for template in TEMPLATES)
+    shared = first.keys() & second.keys() - {"variables"}
+    assert shared == {".dodo", ".dodo-rules", "dodo-check", "compile", "dodo-pipeline", "dodo-tests"}
+    assert {name: first[name] for name in shared} == {name: second[name] for name in shared}
+    variables = (template["variables"] for template in (first, second))
+    assert all(
+        a == b for a, b in zip(*(map(v.get, ("DODO_TAG", "DODO_COMPILE_OPTIONS")) for v in variables), strict=True)
+    )
+
+
+@pytest.mark.parametrize("template", TEMPLATES, ids=lambda p: p.name)
+def test_a_template_is_a_guest_in_the_repository_s_pipeline(template: Path) -> None:
+    """No workflow, stages or defaults, which would change other jobs; and no job but ``compile`` of a common name."""
+    found = yaml.safe_load(template.read_text())
+    assert not found.keys() & {"workflow", "stages", "default", "image", "before_script", "after_script", "cache"}
+    names = found.keys() - {"variables", "compile"}
+    assert all(name.startswith(("dodo-", ".dodo")) for name in names)
+    assert all(name.startswith("DODO_") for name in found["variables"])
+
+
 @pytest.mark.parametrize("template", TEMPLATES, ids=lambda p: p.name)
 def test_no_template_names_a_host_or_shows_the_token(template: Path) -> None:
     text = template.read_text()

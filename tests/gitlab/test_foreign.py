@@ -1,0 +1,87 @@
+"""DoDo's templates in pipelines of others, as gitlab-ci-local reads them: which jobs there are, and in which order."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl import package_data
+from tests.gitlab.test_local import PROGRAMS, commit, pipeline, run
+
+pytestmark = pytest.mark.slow
+
+DEPLOYMENT = "  - local: .gitlab/dodo/deployment.gitlab-ci.yml\n"
+APPLICATION = "  - local: .gitlab/dodo/application.gitlab-ci.yml\n"
+Jobs = dict[str, str]
+COMMON = {"dodo-check": "", "compile": "dodo-images", "dodo-pipeline": "compile", "dodo-tests": "dodo-pipeline"}
+"""Each job with what it needs."""
+IMAGES = {"dodo-images": ""}
+STAGES = """\
+stages: [build, test, release]
+make: {stage: build, script: [make]}
+upload: {stage: release, script: [make upload]}
+"""
+NO_TEST = """\
+stages: [build, verify]
+make: {stage: build, script: [make]}
+.dodo: {stage: verify}
+"""
+MONOREPO = """\
+stages: [test, tools]
+tools: {stage: tools, script: [make], rules: [{changes: [tools/**/*]}]}
+variables: {DODO_COMPOSE_FILE: robots/kiwi/docker-compose.yml}
+"""
+LINT = "lint: {script: [make lint]}\n"
+AROUND = {"make": "build", "upload": "release"}
+CASES: dict[str, tuple[str, str, Jobs, Jobs, str]] = {
+    "own stages, an application": (APPLICATION, STAGES, AROUND, {**COMMON, **IMAGES}, "test"),
+    "both": (DEPLOYMENT + APPLICATION, STAGES, AROUND, {**COMMON, **IMAGES}, "test"),
+    "both the other way round, no stages": (
+        APPLICATION + DEPLOYMENT,
+        LINT,
+        {"lint": "test"},
+        {**COMMON, **IMAGES},
+        "test",
+    ),
+    "a stage of its own": (DEPLOYMENT + APPLICATION, NO_TEST, {"make": "build"}, {**COMMON, **IMAGES}, "verify"),
+    "a monorepo": (APPLICATION, MONOREPO, {}, {**COMMON, **IMAGES}, "test"),
+}
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    if not (PROGRAMS / "gitlab-ci-local").exists() or not shutil.which("rsync"):
+        pytest.skip("gitlab-ci-local or rsync is not installed; scripts/install-gitlab-ci-local installs them")
+    shutil.copytree(package_data.templates() / "gitlab", tmp_path / ".gitlab/dodo")
+    for words in (["init", "-q", "-b", "main"], ["remote", "add", "origin", "git@gitlab.example.org:team/car.git"]):
+        run(tmp_path, "git", *words)
+    return tmp_path
+
+
+def jobs(folder: Path) -> dict[str, dict[str, Any]]:
+    """The jobs of a merge request's pipeline that would run, by name."""
+    commit(folder)
+    run(folder, "git", "update-ref", "refs/remotes/origin/main", "HEAD")
+    result = pipeline(folder, "--list-json", "--variable", "CI_PIPELINE_SOURCE=merge_request_event")
+    assert result.returncode == 0, result.stdout + result.stderr
+    listed = json.loads(result.stdout[result.stdout.index("[\n") :])
+    return {job["name"]: job for job in listed if job["when"] != "never"}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_jobs_are_there_and_foreign_ones_stay(case: str, repository: Path) -> None:
+    includes, text, foreign, expected, stage = CASES[case]
+    (repository / ".gitlab-ci.yml").write_text(f"include:\n{includes}{text}")
+    found = jobs(repository)
+    assert {name: job["stage"] for name, job in found.items()} == {**foreign, **dict.fromkeys(expected, stage)}
+    needs = {name: ",".join(need["job"] for need in found[name]["needs"]) for name in expected}
+    assert needs == expected
+
+
+def test_gitlab_accepts_them(tmp_path: Path, accepted: Callable[..., None]) -> None:
+    for name, (includes, text, *_) in CASES.items():
+        (tmp_path / f"{name}.yml").write_text(f"include:\n{includes}{text}")
+    accepted(*tmp_path.iterdir())
