@@ -1,4 +1,4 @@
-"""``index.html``: the run at a glance, in one file without scripts."""
+"""``index.html``: the run at a glance, in one file without scripts, with a link to the drive of each test."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,6 +27,7 @@ class ReportFiles:
     logs: Mapping[str, Sequence[str]]
     recordings: Mapping[str, str]
     specs: Mapping[str, str]
+    drives: Mapping[str, str]
     times: str = ""
 
 

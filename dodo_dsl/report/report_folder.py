@@ -4,7 +4,7 @@ import contextlib
 import os
 import platform
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from dodo_dsl.report import html, junit, metrics, results
 from dodo_dsl.report.duration_plot import Times
 from dodo_dsl.report.duration_plot import draw as draw_times
 from dodo_dsl.report.trajectory import read_drive
+from dodo_dsl.report.viewer import names as viewer
 from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.registry import SUFFIX
 
@@ -56,7 +57,7 @@ def _forget_test(place: Path) -> None:
     for name in (LOGS, ATTEMPTS):
         with contextlib.suppress(OSError):
             (place / name).unlink() if (place / name).is_symlink() else shutil.rmtree(place / name)
-    for name in (RECORDING, TRAJECTORY, SNAPSHOT, SANDBOX_LOG):
+    for name in (RECORDING, TRAJECTORY, SNAPSHOT, SANDBOX_LOG, *viewer.FILES):
         (place / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # there is none, or it holds what others put there
         place.rmdir()
@@ -82,6 +83,7 @@ def write_report(
                 _draw(folder / outcome.slug, outcome, tests[outcome.slug])
             except Exception as error:  # noqa: BLE001  (the data comes from services, and no plot may cost a verdict)
                 problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
+    problems += _write_pages(folder, outcomes, tests)
     (folder / TIMES).unlink(missing_ok=True)
     if times:
         try:
@@ -91,6 +93,26 @@ def write_report(
             problems.append(f"the times of these tests cannot be drawn: {error}")
     write_summaries(folder, outcomes)
     return problems
+
+
+def _write_pages(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Drawable]) -> Iterator[str]:
+    """A page for each test, with sentences on what went wrong."""
+    from dodo_dsl.report.viewer import page
+
+    if not tests:
+        return
+    try:
+        page.write_shared(folder)
+    except OSError as error:
+        yield f"the pages of the tests cannot be written: {error}"
+        return
+    for outcome in outcomes:
+        if outcome.slug in tests:
+            test = tests[outcome.slug]
+            try:
+                page.write(folder / outcome.slug, outcome, test.plan, test.folder)
+            except Exception as error:  # noqa: BLE001  (as for pictures)
+                yield f"the page of {outcome.name} cannot be written: {error}"
 
 
 def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
@@ -103,7 +125,12 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
         junit.write(part, outcomes, attachments)
     atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
     files = html.ReportFiles(
-        pictures, _logs(folder, outcomes), _recordings(folder, outcomes), _specs(folder, outcomes), times
+        pictures,
+        _logs(folder, outcomes),
+        _named(folder, outcomes, RECORDING),
+        _specs(folder, outcomes),
+        _named(folder, outcomes, viewer.PAGE),
+        times,
     )
     atomic.write_text(folder / "index.html", html.render(outcomes, files))
 
@@ -131,8 +158,9 @@ def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
     }
 
 
-def _recordings(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
-    names = {o.slug: f"{o.slug}/{RECORDING}" for o in outcomes}
+def _named(folder: Path, outcomes: Sequence[Outcome], file: str) -> dict[str, str]:
+    """The file of this name of each test that has it."""
+    names = {o.slug: f"{o.slug}/{file}" for o in outcomes}
     return {slug: name for slug, name in names.items() if (folder / name).is_file()}
 
 

@@ -58,6 +58,19 @@ def test_a_snapshot_is_shown_beside_the_drive(tmp_path: Path) -> None:
     ]
 
 
+def test_each_test_has_a_page(tmp_path: Path) -> None:
+    recording(tmp_path / "report" / "drive" / "test.rec", frame(0), frame(1))
+    outcomes = [replace(OUTCOME, name=slug, slug=slug) for slug in ("drive", "error")]
+    plan = Bench(tmp_path).plan()
+    assert (
+        write_report(tmp_path / "report", outcomes, dict.fromkeys(("drive", "error"), Drawable(plan, tmp_path))) == []
+    )
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert re.findall(r'href="(.*?drive.html)"', page) == ["drive/drive.html", "error/drive.html"]
+    assert forget(tmp_path / "report", ["drive", "error"]) == 0
+    assert not list((tmp_path / "report").glob("*/drive.*"))
+
+
 def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     report = tmp_path / "out" / "report"

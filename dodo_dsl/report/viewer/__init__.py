@@ -1,0 +1,1 @@
+"""The drive viewer: a page a test that replays it offline, from the recording, the logs and the outcome."""

@@ -1,0 +1,92 @@
+"""Each check's limit with the lines of the spec that set it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import package_data
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Place, Plan, PlannedService
+from dodo_dsl.report.viewer.encoded import shown
+from dodo_dsl.report.viewer.scene import flags_of
+
+_OTHER_NAMES = {
+    "time-to-goal": ("max-time", "goal"),
+    "wall-margin": ("min-margin", "walls"),
+    "answered": ("min-frames",),
+    "response": ("max-response",),
+}
+"""Parameters that set the limit of a check whose name does not name them."""
+_ENDINGS = ("-over-time",)
+_MOST_SPEC = 1 << 20
+
+
+class SpecLines:
+    """Lines of specs by their places, as far as the files can be read from here."""
+
+    def __init__(self, roots: tuple[Path, ...] = ()) -> None:
+        self._roots = roots or (Path.cwd(), package_data.root(), package_data.registry())
+        self._files: dict[str, list[str]] = {}
+
+    def line(self, place: Place) -> str:
+        """The line without its indent; empty where there is no such file any more."""
+        if place.file not in self._files:
+            self._files[place.file] = self._read(place.file)
+        lines = self._files[place.file]
+        return shown(lines[place.line - 1].strip(), 400) if 0 < place.line <= len(lines) else ""
+
+    def _read(self, name: str) -> list[str]:
+        for root in self._roots:
+            path = root / name
+            try:
+                if path.resolve().is_relative_to(root.resolve()):
+                    return regular_file.text(path, _MOST_SPEC).splitlines()
+            except (OSError, ValueError):
+                continue
+        return []
+
+
+def checks(plan: Plan, outcome: Outcome, lines: SpecLines) -> Iterator[dict[str, Any]]:
+    """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
+    for check in outcome.checks:
+        places = list(_places(plan, check["name"])) if check.get("limit") else []
+        yield {
+            "name": shown(check["name"], 100),
+            "value": check["value"],
+            "limit": {key: value for key, value in (check.get("limit") or {}).items() if key in ("min", "max")},
+            "unit": shown(check.get("unit") or "", 40),
+            "ok": bool(check["ok"]),
+            "margin": check.get("margin"),
+            "places": [
+                {"file": shown(place.file, 400), "line": place.line, "text": lines.line(place), "flag": flag}
+                for flag, place in places
+            ],
+        }
+
+
+def _places(plan: Plan, check: str) -> Iterator[tuple[str, Place]]:
+    for service in plan.services:
+        if not service.judge:
+            continue
+        key, flags = f"{service.layer}.{service.name}", flags_of(service)
+        found = [
+            (name, plan.source_map[f"{key}.{name}"])
+            for name in _parameters(service, check)
+            if f"{key}.{name}" in plan.source_map
+        ]
+        if found:
+            yield from found
+        elif any(name in flags for name in _parameters(service, check)) and key in plan.source_map:
+            yield "", plan.source_map[key]
+
+
+def _parameters(service: PlannedService, check: str) -> tuple[str, ...]:
+    """The parameters of a judge that may set the limit of a check."""
+    bare = next((check.removesuffix(ending) for ending in _ENDINGS if check.endswith(ending)), check)
+    own = flags_of(service)
+    named = _OTHER_NAMES.get(bare, (f"max-{bare}", f"min-{bare}", bare))
+    if not any(name in own for name in named) and "-" in bare:  # of one class, as recall-yellow
+        bare = bare.partition("-")[0]
+        named = (f"max-{bare}", f"min-{bare}")
+    return tuple(name for name in named if name in own)

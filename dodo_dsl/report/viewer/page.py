@@ -1,0 +1,82 @@
+"""A test's page: the data of its drive beside it, and what all pages of a report share."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import atomic, package_data
+from dodo_dsl.emit.output_folder import FILES
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.odvd.tokens import OdvdError
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.recorder_service import RECORDING
+from dodo_dsl.report.viewer import judged, limits, moment, recorded, scene
+from dodo_dsl.report.viewer.encoded import packed, script, shown
+from dodo_dsl.report.viewer.names import DATA, PAGE, SHARED
+from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
+
+VERSION = 1
+
+
+def write_shared(report: Path) -> None:
+    """What all pages of a report use; raises OSError."""
+    for source in sorted(_sources().iterdir()):
+        if source.name != PAGE:
+            atomic.write_bytes(report / SHARED / source.name, source.read_bytes())
+
+
+def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
+    """The page of a test in its folder of the report; ``compiled`` is the compiled test's. Raises OSError."""
+    atomic.write_text(folder / DATA, script(document(folder, outcome, plan, compiled)))
+    atomic.write_bytes(folder / PAGE, (_sources() / PAGE).read_bytes())
+
+
+def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict[str, Any]:
+    """All that the page shows, as a JSON value whose keys are fixed."""
+    messages = _messages(plan, compiled)
+    recording = folder / RECORDING
+    test = recorded.read(recording, messages, judged.channels(plan)) if recording.is_file() else RecordedTest()
+    return {
+        "version": VERSION,
+        "test": _facts(outcome),
+        "duration": test.duration,
+        "isRecorded": bool(test.channels),
+        "moment": dataclasses.asdict(moment.decisive(outcome, test.duration)),
+        "checks": list(limits.checks(plan, outcome, limits.SpecLines())),
+        "scene": scene.scene(plan, compiled),
+        "channels": [_channel(channel) for channel in test.channels],
+        "judged": list(judged.judged(plan, compiled, test, messages)),
+    }
+
+
+def _sources() -> Path:
+    return package_data.templates() / "viewer"
+
+
+def _messages(plan: Plan, compiled: Path) -> MessageSet:
+    try:
+        return MessageSet.load(*(compiled / FILES / path for path in plan.messages))
+    except OdvdError:
+        return MessageSet.standard()
+
+
+def _facts(outcome: Outcome) -> dict[str, Any]:
+    texts = ("name", "slug", "level", "kind", "outcome", "reason", "description", "clock", "backend", "spec")
+    return {
+        **{name: shown(getattr(outcome, name)) for name in texts},
+        "notes": [shown(note) for note in outcome.notes],
+        "lastLines": [shown(line) for line in outcome.last_lines],
+        "seed": outcome.seed,
+    }
+
+
+def _channel(channel: Channel) -> dict[str, Any]:
+    numbers = {name: values for name, values in channel.fields.items() if not isinstance(values, list)}
+    return {
+        "message": channel.message,
+        "sender": channel.sender,
+        "every": channel.every,
+        "times": packed(channel.times),
+        "fields": [{"name": name, "values": packed(values)} for name, values in numbers.items()],
+    }

@@ -1,0 +1,45 @@
+// What was measured against which limit, and which lines of the spec set it; what failed comes first.
+"use strict";
+
+dodo.checks = (function () {
+  const { make, withUnit } = dodo.dom;
+  const WORDS = { min: "at least", max: "at most" };
+
+  function limit(check) {
+    return Object.entries(check.limit).map(([side, value]) => `${WORDS[side]} ${withUnit(value, check.unit)}`).join(", ");
+  }
+
+  // The line with the parameters that set the limit marked in it.
+  function source(line, flags) {
+    const parts = flags.length ? line.split(new RegExp(`(?<![\\w-])(${flags.join("|")})(?![\\w-])`)) : [line];
+    return make("code", {}, ...parts.map((part) => (flags.includes(part) ? make("mark", {}, part) : part)));
+  }
+
+  function places(check) {
+    const lines = new Map();
+    for (const place of check.places) {
+      const key = `${place.file}:${place.line}`;
+      lines.set(key, { ...place, flags: [...(lines.get(key)?.flags || []), ...(place.flag ? [place.flag] : [])] });
+    }
+    return [...lines.values()].map((place) =>
+      make("p", { class: "place", title: place.file }, `${place.file.split("/").pop()}:${place.line} `, source(place.text, place.flags), place.flag ? "" : " by default"),
+    );
+  }
+
+  function row(check) {
+    const state = check.ok ? "passed" : "failed";
+    const measured = [withUnit(check.value, check.unit), limit(check)].filter(Boolean).join(", expected ");
+    return make("li", { class: state }, make("b", {}, `${check.ok ? "✓" : "✗"} ${check.name}`), ` ${measured}`, ...(check.ok ? [] : places(check)));
+  }
+
+  function show(parent) {
+    const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok);
+    parent.append(make("h2", {}, "Checks"));
+    if (!all.length) parent.append(make("p", { class: "nothing" }, "No evaluator measured anything."));
+    const judged = all.filter((check) => Object.keys(check.limit).length || !check.ok);
+    const others = all.filter((check) => !judged.includes(check));
+    parent.append(make("ul", { tabindex: "0" }, ...judged.map(row), ...others.map(row)));
+  }
+
+  return { show };
+})();

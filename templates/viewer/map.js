@@ -1,0 +1,157 @@
+// The way on the map: lines by their purpose, the vehicle at the cursor, and where it failed.
+"use strict";
+
+dodo.map = (function () {
+  const { test } = dodo.data;
+  const way = dodo.way;
+  const PAD = 14;
+  let view = null;
+
+  // Equal axes around way and lines; far cones may fall outside.
+  function fit(width, height) {
+    const points = way.poses.map((pose) => [pose.x, pose.y]);
+    for (const each of test.scene.lines) for (const [a, b, c, d] of each.lines) points.push([a, b], [c, d]);
+    const [xs, ys] = [0, 1].map((n) => points.map((point) => point[n]));
+    const [left, right, low, high] = [Math.min, Math.max].flatMap((f) => [xs, ys].map((all) => all.reduce((a, b) => f(a, b))))
+      .reduce((box, value, n) => ((box[[0, 2, 1, 3][n]] = value), box), []);
+    const reach = Math.max(way.length, 0.2);
+    const scale = Math.min((width - 2 * PAD) / (right - left + reach), (height - 2 * PAD) / (high - low + reach));
+    const [x, y] = [(left + right) / 2, (low + high) / 2];
+    return {
+      scale,
+      to: (px, py) => [width / 2 + (px - x) * scale, height / 2 - (py - y) * scale],
+      from: (sx, sy) => [x + (sx - width / 2) / scale, y - (sy - height / 2) / scale],
+    };
+  }
+
+  function trace(context, points) {
+    context.beginPath();
+    points.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+  }
+
+  function ground(context) {
+    for (const model of test.scene.models) {
+      context.fillStyle = `rgb(${model.colour.map((part) => Math.round(255 * part)).join(" ")})`;
+      context.strokeStyle = dodo.canvas.colour("soft");
+      for (const [x, y] of model.points) {
+        context.beginPath();
+        context.arc(...view.to(x, y), 2.6, 0, 7);
+        context.fill();
+        context.stroke();
+      }
+    }
+    const styles = { wall: ["wall", 2, []], gate: ["gate", 2, [6, 4]], goal: ["goal", 3, []], other: ["soft", 1, [2, 3]] };
+    for (const each of test.scene.lines) {
+      const [colour, thick, dash] = styles[each.role];
+      context.strokeStyle = dodo.canvas.colour(colour);
+      context.lineWidth = thick;
+      context.setLineDash(dash);
+      for (const [a, b, c, d] of each.lines) {
+        trace(context, [view.to(a, b), view.to(c, d)]);
+        context.stroke();
+      }
+      context.setLineDash([]);
+      if (each.role !== "other" && each.role !== "wall" && each.lines.length) name(context, each);
+    }
+  }
+
+  function name(context, each) {
+    const [a, b, c, d] = each.lines[0];
+    const [x, y] = view.to((a + c) / 2, (b + d) / 2);
+    context.fillStyle = dodo.canvas.colour(each.role);
+    context.font = "11px system-ui, sans-serif";
+    context.textAlign = "center";
+    context.fillText(each.name, x, y - 6);
+  }
+
+  function driven(context, poses, colour, thick) {
+    context.strokeStyle = dodo.canvas.colour(colour);
+    context.lineWidth = thick;
+    trace(context, poses.map((pose) => view.to(pose.x, pose.y)));
+    context.stroke();
+  }
+
+  function vehicle(context, pose) {
+    const ring = dodo.geometry.corners(pose, way.length || 0.36, way.width || 0.16);
+    trace(context, ring.map(([x, y]) => view.to(x, y)));
+    context.closePath();
+    context.fillStyle = dodo.canvas.colour("vehicle");
+    context.globalAlpha = 0.35;
+    context.fill();
+    context.globalAlpha = 1;
+    context.strokeStyle = context.fillStyle;
+    context.lineWidth = 1.6;
+    context.stroke();
+    const ahead = 0.75 * (way.length || 0.36);
+    const tip = view.to(pose.x + ahead * Math.cos(pose.heading), pose.y + ahead * Math.sin(pose.heading));
+    trace(context, [view.to(pose.x, pose.y), tip]);
+    context.stroke();
+    context.beginPath();
+    context.arc(...tip, 3, 0, 7);
+    context.fill();
+  }
+
+  // Where the test failed: a ring and a cross that print well, too.
+  function failure(context) {
+    const { time, x, y } = test.moment;
+    const place = x === null ? way.pose(time) : { x, y };
+    const [sx, sy] = view.to(place.x, place.y);
+    context.strokeStyle = dodo.canvas.colour("failed");
+    context.lineWidth = 2;
+    context.beginPath();
+    context.arc(sx, sy, 10, 0, 7);
+    context.stroke();
+    trace(context, [[sx - 5, sy - 5], [sx + 5, sy + 5]]);
+    context.stroke();
+    trace(context, [[sx + 5, sy - 5], [sx - 5, sy + 5]]);
+    context.stroke();
+  }
+
+  function scaleBar(context, height) {
+    const size = dodo.canvas.steps(0, 90 / view.scale, 1).pop() || 1;
+    context.strokeStyle = context.fillStyle = dodo.canvas.colour("soft");
+    context.lineWidth = 2;
+    trace(context, [[10, height - 8], [10 + size * view.scale, height - 8]]);
+    context.stroke();
+    context.font = "11px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.fillText(`${dodo.dom.number(size)} m`, 10, height - 13);
+  }
+
+  function draw(context, width, height) {
+    const time = dodo.cursor.time();
+    view = fit(width, height);
+    ground(context);
+    driven(context, way.poses, "faint", 2);
+    driven(context, way.poses.slice(0, dodo.data.at(way.times, time) + 1), "way", 2.5);
+    if (test.test.outcome !== "passed") failure(context);
+    vehicle(context, way.pose(time));
+    scaleBar(context, height);
+  }
+
+  function label(time) {
+    const pose = way.pose(time);
+    return `x ${pose.x.toFixed(2)} m, y ${pose.y.toFixed(2)} m, heading ${((pose.heading * 180) / Math.PI).toFixed(0)}°`;
+  }
+
+  function show(parent) {
+    if (!way.poses.length) {
+      parent.append(dodo.dom.make("p", { class: "nothing" }, "No position was on the bus, so there is no way to draw."));
+      return;
+    }
+    const caption = dodo.dom.make("p", { class: "caption" });
+    const canvas = dodo.canvas.make(parent, "The way from above", draw);
+    parent.append(caption);
+    canvas.element.addEventListener("click", (event) => {
+      const time = way.nearest(...view.from(event.offsetX, event.offsetY));
+      if (time !== null) dodo.cursor.move(time);
+    });
+    dodo.cursor.follow((time) => {
+      canvas.redraw();
+      caption.textContent = label(time);
+      canvas.label(`The way from above: at ${time.toFixed(2)} s ${caption.textContent}`);
+    });
+  }
+
+  return { show };
+})();

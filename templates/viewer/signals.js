@@ -1,0 +1,108 @@
+// Which signals are plotted: those that are judged, and others of the bus to choose from.
+"use strict";
+
+dodo.signals = (function () {
+  const { data, way } = dodo;
+  const { make } = dodo.dom;
+
+  function outside(values, min, max) {
+    const [low, high] = [min ?? -Infinity, max ?? Infinity];
+    return (n) => (values[n] < low || values[n] > high ? "failed" : "");
+  }
+
+  // The target at a time by straight lines; NaN outside.
+  function interpolated(target, time) {
+    const n = data.at(target.times, time);
+    const next = Math.min(n + 1, target.times.length - 1);
+    if (n < 0 || (n === next && time > target.times[n] + 1e-3)) return NaN;
+    const span = target.times[next] - target.times[n];
+    const share = span ? (time - target.times[n]) / span : 0;
+    return target.values[n] + share * (target.values[next] - target.values[n]);
+  }
+
+  function judgedSignal(raw) {
+    const channel = data.channel(raw.message, raw.sender);
+    const field = data.field(channel, raw.field);
+    const target = { times: data.unpack(raw.target.times), values: data.unpack(raw.target.values) };
+    const times = field ? channel.times : new Float32Array(0);
+    const values = field ? field.values : times;
+    const [from, until] = [raw.from ?? -Infinity, raw.until ?? Infinity];
+    const marked = (n) => {
+      if (times[n] < from || times[n] > until) return "";
+      if (!Number.isFinite(values[n])) return "failed";
+      const away = Math.abs(values[n] - interpolated(target, times[n])) - 1e-7;
+      if (raw.distance !== null && away > raw.distance) return "failed";
+      return raw.band !== null && away > raw.band ? "warned" : "";
+    };
+    const text = (time) => {
+      const n = data.at(times, time + 1e-4);
+      const wanted = dodo.dom.number(interpolated(target, time));
+      return `${n < 0 ? "–" : dodo.dom.number(values[n])} · target ${wanted}`;
+    };
+    const parts = [raw.band !== null && `band ±${dodo.dom.number(raw.band)}`, raw.distance !== null && `at most ±${dodo.dom.number(raw.distance)}`];
+    const title = `${raw.field} of ${data.short(raw.message)}/${raw.sender}`;
+    return { title, unit: "", times, values, target, band: raw.band, reach: raw.distance, marked, text, note: parts.filter(Boolean).join(", ") };
+  }
+
+  function margin(raw) {
+    const values = way.margins();
+    const note = raw.min ? `at least ${dodo.dom.number(raw.min)} m` : "more than 0 m";
+    const marked = (n) => (values[n] <= 0 || values[n] < (raw.min ?? 0) ? "failed" : "");
+    return { title: "Distance to the walls", unit: "m", times: way.times, values, min: raw.min ?? 0, marked, note };
+  }
+
+  function speed(raw) {
+    const values = way.speeds();
+    const note = raw.max === null ? "" : `at most ${dodo.dom.number(raw.max)} m/s`;
+    return { title: "Speed", unit: "m/s", times: way.times, values, max: raw.max, marked: outside(values, null, raw.max), note };
+  }
+
+  const plain = (channel, field) => ({
+    title: `${field.name} of ${data.short(channel.message)}/${channel.sender}`,
+    unit: "",
+    times: channel.times,
+    values: field.values,
+    note: channel.every > 1 ? `one of ${channel.every} samples` : "",
+  });
+
+  function judged() {
+    return data.test.judged.flatMap((raw) => {
+      if (raw.kind === "signal") return [judgedSignal(raw)];
+      if (raw.kind === "margin") return way.poses.length ? [margin(raw)] : [];
+      if (raw.kind === "speed") return way.poses.length ? [speed(raw)] : [];
+      const channel = data.channel(raw.message, raw.sender);
+      return channel && raw.kind === "request" ? channel.fields.map((field) => plain(channel, field)) : [];
+    });
+  }
+
+  function chooser(parent) {
+    const select = make("select", { "aria-label": "Add a signal" }, make("option", { value: "" }, "Add a signal…"));
+    const choices = [];
+    for (const channel of data.channels) {
+      if (!channel.fields.length || channel.message.startsWith("dodo.")) continue;
+      const group = make("optgroup", { label: `${channel.message}/${channel.sender}` });
+      for (const field of channel.fields) {
+        group.append(make("option", { value: choices.length }, field.name));
+        choices.push(() => plain(channel, field));
+      }
+      select.append(group);
+    }
+    select.addEventListener("change", () => {
+      if (select.value === "") return;
+      const figure = dodo.plot.show(parent, choices[Number(select.value)](), () => figure.remove());
+      figure.scrollIntoView({ block: "nearest" });
+      select.value = "";
+    });
+    return choices.length ? select : "";
+  }
+
+  function show(parent) {
+    const list = judged();
+    const plots = make("div", { class: "plots", tabindex: "0" });
+    parent.append(make("h2", {}, "Signals", chooser(plots)), plots);
+    if (!list.length) plots.append(make("p", { class: "nothing" }, "No signal that is judged was recorded."));
+    for (const signal of list) dodo.plot.show(plots, signal, null);
+  }
+
+  return { show, judged };
+})();

@@ -1,0 +1,55 @@
+// Where the vehicle was: its poses over time, and what follows from them.
+"use strict";
+
+dodo.way = (function () {
+  const { test, channel, field, at } = dodo.data;
+  const { frame, length, width } = test.scene;
+  const found = channel(frame.message, frame.sender) || dodo.data.channels.find((c) => c.message === frame.message);
+  const poses = found ? read(found) : [];
+
+  function read(source) {
+    const [x, y, qx, qy, qz, qw] = ["x", "y", "qx", "qy", "qz", "qw"].map((name) => field(source, name).values);
+    const list = [];
+    for (let n = 0; n < source.times.length; n++) {
+      const heading = Math.atan2(2 * (qw[n] * qz[n] + qx[n] * qy[n]), qw[n] ** 2 + qx[n] ** 2 - qy[n] ** 2 - qz[n] ** 2);
+      if (Number.isFinite(x[n] + y[n] + heading)) list.push({ time: source.times[n], x: x[n], y: y[n], heading });
+    }
+    return list;
+  }
+
+  const times = Float32Array.from(poses, (pose) => pose.time);
+
+  // The pose at a time, between those that were sent.
+  function pose(time) {
+    const n = Math.max(at(times, time), 0);
+    const [a, b] = [poses[n], poses[Math.min(n + 1, poses.length - 1)]];
+    if (a === b || time <= a.time) return a;
+    const share = Math.min(1, (time - a.time) / (b.time - a.time));
+    const turn = Math.atan2(Math.sin(b.heading - a.heading), Math.cos(b.heading - a.heading));
+    return { time, x: a.x + share * (b.x - a.x), y: a.y + share * (b.y - a.y), heading: a.heading + share * turn };
+  }
+
+  function speeds() {
+    return Float32Array.from(poses, (b, n) => {
+      const a = poses[n - 1];
+      return n ? Math.hypot(b.x - a.x, b.y - a.y) / (b.time - a.time) : NaN;
+    });
+  }
+
+  function margins() {
+    const walls = test.scene.lines.filter((each) => each.role === "wall").flatMap((each) => each.lines);
+    if (!walls.length) return new Float32Array(0);
+    return Float32Array.from(poses, (each) => dodo.geometry.margin(each, length, width, walls));
+  }
+
+  function nearest(x, y) {
+    let best = null;
+    for (const each of poses) {
+      const away = Math.hypot(each.x - x, each.y - y);
+      if (each.time >= 0 && (best === null || away < best.away)) best = { away, time: each.time };
+    }
+    return best && best.time;
+  }
+
+  return { poses, times, pose, speeds, margins, nearest, length, width };
+})();

@@ -1,0 +1,98 @@
+"""Drives of tests that failed, made without running them: a recording, logs, an outcome, and the test's real Plan."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.plan_json import from_json
+from dodo_dsl.report.report_folder import Drawable, write_report
+
+ROOT = Path(__file__).parents[3]
+GOLDEN = ROOT / "tests" / "emit" / "golden"
+EPOCH = 1_700_000_000_000_000
+WALL = 1_795_000_000_000_000
+"""us since the epoch: of a test in lockstep, and of the machine that it ran on."""
+SPEED = 20.0
+"""Seconds of test time in one of wall time."""
+MESSAGES = MessageSet.standard()
+
+Sample = tuple[float, str, int, dict[str, Any]]
+"""Time in s, message, sender stamp and fields."""
+Pose = tuple[float, float, float]
+"""x and y in m, heading in rad."""
+
+
+@dataclass(frozen=True)
+class MadeDrive:
+    """A test of the registry by its slug, what was on its bus for ``duration`` s, and what became of it."""
+
+    slug: str
+    duration: float
+    samples: Sequence[Sample]
+    outcome: dict[str, Any]
+    logs: dict[str, Sequence[tuple[float, str]]] = field(default_factory=dict)
+    """Lines by the log's name, each with its time in s of the test."""
+
+
+def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
+    """A report of these drives, as ``dodo run`` writes one."""
+    compiled = report.parent / "compiled"
+    compiled.mkdir()
+    (compiled / "files").symlink_to(ROOT / "tests_registry")
+    outcomes, tests = [], {}
+    for number, drive in enumerate(drives):
+        plan = from_json((GOLDEN / drive.slug / "test.json").read_text())
+        slug = f"test-{number}"
+        outcomes.append(outcome_of(drive, slug))
+        tests[slug] = Drawable(replace(plan, slug=slug), compiled)
+        record(report / slug / "test.rec", drive)
+    assert write_report(report, outcomes, tests) == []
+    return outcomes
+
+
+def outcome_of(drive: MadeDrive, slug: str) -> Outcome:
+    plain = Outcome(drive.slug, slug, "t.dodo.yml", "sil", "closed-loop", "failed", "", 130, 0, "lockstep", "process")
+    return replace(plain, **drive.outcome)
+
+
+def record(path: Path, drive: MadeDrive) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingWriter(path) as writer:
+        begin = [(0.0, "dodo.TestBegin", 0, {})]
+        end = [(drive.duration, "dodo.RecordingEnd", 0, {})]
+        for time, name, sender, fields in (*begin, *sorted(drive.samples, key=lambda s: s[0]), *end):
+            sampled, wall = EPOCH + round(time * 1e6), WALL + round(time * 1e6 / SPEED)
+            payload = MESSAGES.encode(MESSAGES.type(name)(**fields))
+            writer.write(Envelope(MESSAGES.id(name), payload, wall, wall, sampled, sender))
+
+
+def poses(way: Callable[[float], Pose], duration: float) -> Iterator[Sample]:
+    """A Frame each 10 ms."""
+    for number in range(round(duration * 100) + 1):
+        time = number / 100
+        x, y, heading = way(time)
+        fields = {"x": x, "y": y, "qz": math.sin(heading / 2), "qw": math.cos(heading / 2)}
+        yield time, "opendlv.sim.Frame", 0, fields
+
+
+def requests(steering: Callable[[float], float], duration: float) -> Iterator[Sample]:
+    """The application's requests each 100 ms."""
+    for number in range(round(duration * 10) + 1):
+        time = number / 10
+        yield time, "opendlv.proxy.GroundSteeringRequest", 0, {"groundSteering": steering(time)}
+        yield time, "opendlv.proxy.PedalPositionRequest", 0, {"position": 0.1}
+
+
+def check(name: str, value: float | None, ok: bool, unit: str = "", **limit: float) -> dict[str, Any]:
+    return {"name": name, "value": value, "limit": limit, "unit": unit, "ok": ok}
+
+
+def verdict(evaluator: str, reason: str, **evidence: Any) -> dict[str, Any]:
+    named = {key.replace("_", "-"): value for key, value in evidence.items()}
+    return {"evaluator": evaluator, "outcome": "failed", "reason": reason, "evidence": named}

@@ -1,0 +1,61 @@
+"""One drive for each way to fail, with the moment at which its page has to open."""
+
+import math
+
+from tests.report.viewer.drives import MadeDrive, Pose, check, poses, requests, verdict
+
+
+def into_the_wall(time: float) -> Pose:
+    return -0.01165 * time**2.2, 0.5 * time, math.pi / 2 + 0.04 * time
+
+
+def wall_hit() -> MadeDrive:
+    time, reason = 3.21, "hit wall left after 3.21 s at x = -0.15 m, y = 1.61 m"
+    x, y, _ = into_the_wall(time)
+    checks = (check("time-to-goal", None, False, "s", max=40), check("wall-margin", 0.0, False, "m", min=0))
+    samples = [*poses(into_the_wall, time), *requests(lambda t: 0.02 * t, time)]
+    said = verdict("track", reason, time=time, x=x, y=y, obstacle="left")
+    return MadeDrive(
+        "sil-closed-straight", time, samples, {"reason": reason, "checks": checks, "verdicts": (said,)},
+        {"application.steering": [(t / 10, f"frame {t}: steering {0.002 * t:.3f} rad") for t in range(33)]},
+    )  # fmt: skip
+
+
+def timed_out() -> MadeDrive:
+    time, reason = 40.0, "did not reach finish within 40.00 s: the vehicle is at x = 0.00 m, y = 0.40 m, 2.42 m from it"
+    samples = [*poses(lambda t: (0.0, min(0.1 * t, 0.4), math.pi / 2), time), *requests(lambda t: 0.0, time)]
+    said = verdict("track", reason, time=time, x=0.0, y=0.4)
+    checks = (check("time-to-goal", None, False, "s", max=40), check("wall-margin", 0.17, True, "m", min=0))
+    return MadeDrive("sil-closed-straight", time, samples, {"reason": reason, "checks": checks, "verdicts": (said,)})
+
+
+def wrong_signal() -> MadeDrive:
+    time = 2.4
+    reason = "groundSteering of opendlv.proxy.GroundSteeringRequest/0 was 0.2 with a target of 0.02 at 2.40 s"
+
+    def steering(t: float) -> float:
+        return 0.2 if abs(t - time) < 0.05 else -0.045 + 0.0245 * t
+
+    said = verdict("signal", reason, time=time, value=0.2, target=0.02, gap_begin=0.0, gap_end=0.1)
+    samples = [*poses(lambda t: (-0.1 + 0.04 * t, 0.5 * t, 1.5), 5.5), *requests(steering, 5.5)]
+    checks = (check("mean", 0.009, True, max=0.014), check("distance", 0.18, False, max=0.06))
+    outcome = {"reason": reason, "kind": "open-loop", "checks": checks, "verdicts": (said,)}
+    return MadeDrive("sil-open-straight", 5.5, samples, outcome)
+
+
+def crash() -> MadeDrive:
+    reason = "application service 'steering' ended with exit code 1 after 2.3 s, before the test was decided"
+    samples = [*poses(lambda t: (0.0, 0.5 * t, math.pi / 2), 2.3), *requests(lambda t: 0.0, 2.25)]
+    lines = [(t / 10, f"frame {t}: steering 0.000 rad") for t in range(23)]
+    trace = ["Traceback (most recent call last):", '  File "steering.py", line 12, in <module>', "KeyError: 'blue'"]
+    outcome = {"reason": reason, "last_lines": tuple(trace)}
+    return MadeDrive(
+        "sil-closed-straight", 2.3, samples, outcome, {"application.steering": [*lines, *((2.3, t) for t in trace)]}
+    )
+
+
+def no_answer() -> MadeDrive:
+    reason = "the application did not answer frame 17 within 2 s (no opendlv.proxy.GroundSteeringRequest)"
+    samples = [*poses(lambda t: (0.0, 0.5 * t, math.pi / 2), 1.7), *requests(lambda t: 0.0, 1.6)]
+    lines = [(t / 10, f"frame {t}: steering 0.000 rad") for t in range(17)]
+    return MadeDrive("sil-closed-straight", 1.7, samples, {"reason": reason}, {"application.steering": lines})

@@ -1,0 +1,38 @@
+"""Which lines of a spec set a check's limit."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Place
+from dodo_dsl.plan.plan_json import from_json
+from dodo_dsl.report.viewer.limits import SpecLines, checks
+from tests.report.viewer.drives import GOLDEN, ROOT, check
+
+OUTCOME = Outcome("t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad", 130, 0, "lockstep", "process")
+
+
+@pytest.mark.parametrize(
+    ("slug", "name", "expected"),
+    [
+        ("sil-open-straight", "distance", [("max-distance", 21, "max-distance: 0.06")]),
+        ("sil-open-straight", "mean-over-time", [("max-mean", 19, "max-mean: 0.014")]),
+        ("sil-open-straight", "gap", [("", 13, "signal:")]),
+        ("sil-open-straight", "unheard-of", []),
+    ],
+)
+def test_places_of_limits(slug: str, name: str, expected: list[tuple[str, int, str]]) -> None:
+    plan = from_json((GOLDEN / slug / "test.json").read_text())
+    outcome = replace(OUTCOME, checks=(check(name, 1.0, False, max=0.5),))
+    (found,) = checks(plan, outcome, SpecLines((ROOT,)))
+    assert [(p["flag"], p["line"], p["text"]) for p in found["places"]] == expected
+
+
+def test_only_files_below_the_repository_are_read(tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("key\n")
+    (tmp_path / "repository").mkdir()
+    (tmp_path / "repository" / "link").symlink_to(tmp_path / "secret")
+    lines = SpecLines((tmp_path / "repository",))
+    assert [lines.line(Place(name, 1, 1)) for name in ("../secret", "link", "gone")] == ["", "", ""]
