@@ -22,7 +22,7 @@ from dodo_dsl.spec.registry import SUFFIX
 
 TRAJECTORY = "trajectory.png"
 TIMES = "times.png"
-LOGS, ATTEMPTS = "logs", "attempts"
+ATTEMPTS = "attempts"
 SANDBOX_LOG = "sandbox.log"
 _LONGEST_PATH = 1000
 
@@ -54,7 +54,7 @@ def _forget_test(place: Path) -> None:
     if place.is_symlink():
         place.unlink()  # what it points to is no report
         return
-    for name in (LOGS, ATTEMPTS):
+    for name in (viewer.LOGS, ATTEMPTS):
         with contextlib.suppress(OSError):
             (place / name).unlink() if (place / name).is_symlink() else shutil.rmtree(place / name)
     for name in (RECORDING, TRAJECTORY, SNAPSHOT, SANDBOX_LOG, *viewer.FILES):
@@ -153,7 +153,7 @@ def _shown(folder: Path) -> str:
 
 def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
     return {
-        o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / LOGS).glob("*.log"))]
+        o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / viewer.LOGS).glob("*.log"))]
         for o in outcomes
     }
 

@@ -1,12 +1,14 @@
-"""A service's output: raw into its log, the last lines in memory, lines of the protocol to a callback."""
+"""A service's output: raw into its log with times, the last lines in memory, lines of the protocol to a callback."""
 
 import asyncio
+import contextlib
 import os
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
 from dodo_dsl import atomic
+from dodo_dsl.log_times import LogTimes
 
 _MAX_LINE = 1 << 16
 _MAX_LOG = 64 << 20
@@ -23,6 +25,7 @@ class ServiceOutput:
 
     def __init__(self, log: Path, on_line: Callable[[bytes], bool]) -> None:
         self._log = atomic.appended(log)
+        self._times, self._begin = LogTimes(log), os.fstat(self._log.fileno()).st_size
         self._on_line = on_line
         self._written = self._lines = 0
         self._rest = b""
@@ -43,6 +46,7 @@ class ServiceOutput:
     def hand_over(self) -> tuple[int, int]:
         """Stops reading; returns the descriptors of pipe and log for the process that goes on."""
         asyncio.get_running_loop().remove_reader(self._reader)
+        self._write_times()
         return self._reader, self._log.fileno()
 
     def close(self) -> None:
@@ -80,6 +84,7 @@ class ServiceOutput:
             limit = f"{_MAX_LOG_LINES} lines" if self._lines > _MAX_LOG_LINES else f"{_MAX_LOG >> 20} MiB"
             data = f"\n... dodo: the log ends here, at {limit}\n".encode()
             self._written = _MAX_LOG
+        self._times.note(self._begin + self._written)
         self._written += len(data)
         try:
             self._log.write(data)
@@ -100,4 +105,9 @@ class ServiceOutput:
         if self._rest:
             self._take(self._rest)
         self._log.close()
+        self._write_times()
         self.done.set()
+
+    def _write_times(self) -> None:
+        with contextlib.suppress(OSError):  # the log counts without them, too
+            self._times.write()

@@ -13,6 +13,7 @@
   dodo.transport.show(part("transport"));
   dodo.map.show(part("scene"));
   dodo.signals.show(part("signals"));
+  dodo.log.show(part("log"));
   dodo.checks.show(part("checks"));
   dodo.cursor.move(dodo.cursor.linked() ?? moment.time);
 })();

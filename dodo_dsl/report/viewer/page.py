@@ -11,9 +11,9 @@ from dodo_dsl.opendlv.odvd.tokens import OdvdError
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.recorder_service import RECORDING
-from dodo_dsl.report.viewer import judged, limits, moment, recorded, scene
+from dodo_dsl.report.viewer import judged, limits, log_lines, moment, recorded, scene
 from dodo_dsl.report.viewer.encoded import packed, script, shown
-from dodo_dsl.report.viewer.names import DATA, PAGE, SHARED
+from dodo_dsl.report.viewer.names import DATA, LOGS, PAGE, SHARED
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
 
 VERSION = 1
@@ -45,6 +45,7 @@ def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict
         "moment": dataclasses.asdict(moment.decisive(outcome, test.duration)),
         "checks": list(limits.checks(plan, outcome, limits.SpecLines())),
         "scene": scene.scene(plan, compiled),
+        "log": log_lines.merged(folder / LOGS, test),
         "channels": [_channel(channel) for channel in test.channels],
         "judged": list(judged.judged(plan, compiled, test, messages)),
     }

@@ -52,6 +52,7 @@ def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
         outcomes.append(outcome_of(drive, slug))
         tests[slug] = Drawable(replace(plan, slug=slug), compiled)
         record(report / slug / "test.rec", drive)
+        log(report / slug / "logs", drive)
     assert write_report(report, outcomes, tests) == []
     return outcomes
 
@@ -70,6 +71,17 @@ def record(path: Path, drive: MadeDrive) -> None:
             sampled, wall = EPOCH + round(time * 1e6), WALL + round(time * 1e6 / SPEED)
             payload = MESSAGES.encode(MESSAGES.type(name)(**fields))
             writer.write(Envelope(MESSAGES.id(name), payload, wall, wall, sampled, sender))
+
+
+def log(folder: Path, drive: MadeDrive) -> None:
+    folder.mkdir()
+    for name, lines in drive.logs.items():
+        offset, times = 0, []
+        for time, line in lines:
+            times.append(f"{offset} {WALL + round(time * 1e6 / SPEED)}\n")
+            offset += len(line.encode()) + 1
+        (folder / f"{name}.log").write_text("".join(f"{line}\n" for _, line in lines))
+        (folder / f"{name}.times").write_text("".join(times))
 
 
 def poses(way: Callable[[float], Pose], duration: float) -> Iterator[Sample]:

@@ -47,7 +47,7 @@ def test_a_failed_test_opens_where_it_was_decided(page: Page, request: pytest.Fi
     drive, moment = DRIVES[request.node.callspec.params["page"]]
     assert page.value("dodo.cursor.time()") == pytest.approx(moment)
     assert page.value("document.getElementById('reason').textContent") == drive.outcome["reason"]
-    for part in ("#reason", "#scene canvas", ".plots canvas", "#transport input"):
+    for part in ("#reason", "#scene canvas", ".plots canvas", "#transport input", *[".lines .now"] * bool(drive.logs)):
         assert visible(page, part), part
     assert page.value("document.documentElement.scrollHeight <= innerHeight")
 
@@ -75,6 +75,22 @@ def test_keys_clicks_and_addresses_move_the_cursor(page: Page) -> None:
     page.wait("Math.abs(dodo.cursor.time() - 0.7) < 1e-6")
     page.press(" ")
     page.wait("dodo.cursor.time() > 0.8")
+
+
+@pytest.mark.parametrize("page", ["crash"], indirect=True)
+def test_the_log_follows_the_cursor(page: Page) -> None:
+    now = "document.querySelector('.lines .now').innerText.split(/\\s+/).join(' ')"
+    assert page.value(now) == "2.30 steering KeyError: 'blue'"
+    assert page.value("Array.from(document.querySelectorAll('.lines .error span'), e => e.textContent)") == [
+        "Traceback (most recent call last):",
+        '  File "steering.py", line 12, in <module>',
+        "KeyError: 'blue'",
+    ]
+    assert visible(page, ".lines .error")
+    page.value("dodo.cursor.move(1.23)")
+    assert page.value(now) == "1.20 steering frame 12: steering 0.000 rad"
+    page.value("document.querySelector('.lines .error').click()")
+    assert page.value("dodo.cursor.time()") == pytest.approx(2.3)
 
 
 @pytest.mark.parametrize("page", ["wall hit"], indirect=True)

@@ -1,0 +1,119 @@
+"""The log lines of all services of a test by its time, with errors and warnings marked."""
+
+import json
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dodo_dsl import log_times
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.report.viewer.encoded import shown
+from dodo_dsl.report.viewer.recorded import MICROSECONDS, RecordedTest
+
+MOST_LINES = 4000
+"""Of all logs together; of more, those of the middle are left out."""
+_MOST_BYTES = 1 << 20
+"""Of each end of a log."""
+_MOST_TEXT = 600
+_ESCAPES = re.compile(r"\x1b(\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(\x07|\x1b\\)|[@-Z\\-_])")
+_ERROR = re.compile(
+    r"^\W*([Ee]rror|[Ff]atal|[Cc]ritical|[Pp]anic|[Aa]borted)\b|\b(ERROR|FATAL|CRITICAL|PANIC)\b|[Ee]rror:|^Traceback"
+    r"|\b\w+(Error|Exception)\b|terminate called|[Ss]egmentation fault|assert\w* .*failed",
+)
+_WARNING = re.compile(r"\bwarn(ing)?\b", re.I)
+_APPLICATION = "application"
+
+
+class LogLine(NamedTuple):
+    """A line at a time in s of the test, before it below zero, None where that is unknown."""
+
+    time: float | None
+    service: str
+    level: str
+    text: str
+
+
+def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
+    """All lines below ``folder``, the logs of a test: ``services`` by name, and how many lines were ``left``out."""
+    lines = [line for log in sorted(folder.glob("*.log")) for line in _lines(log, test)]
+    lines.sort(key=lambda line: float("inf") if line.time is None else line.time)
+    left = max(len(lines) - MOST_LINES, 0)
+    if left:
+        lines = [*lines[: MOST_LINES // 2], *lines[-MOST_LINES // 2 :]]
+    names = sorted({line.service for line in lines})
+    rows = [
+        [None if time is None else round(time, 4), names.index(name), level, text] for time, name, level, text in lines
+    ]
+    return {"services": [shown(name, 80) for name in names], "lines": rows, "left": left}
+
+
+def _lines(log: Path, test: RecordedTest) -> Iterator[LogLine]:
+    layer, _, name = log.stem.partition(".")
+    offsets, walls = log_times.read(log)
+    times = _test_times(walls, test)
+    level = ""
+    for offset, raw in _raw_lines(log):
+        line = _ESCAPES.sub("", raw[: 4 * _MOST_TEXT].decode("utf-8", "replace")).rstrip("\r\n ")
+        text = line if layer == _APPLICATION else _said(line)
+        if not text:
+            continue
+        level = _level(line, level)
+        part = bisect_right(offsets, offset) - 1
+        length = f" … ({len(raw)} bytes)" if len(text) > _MOST_TEXT else ""
+        yield LogLine(times[part] if part >= 0 else None, name or layer, level, shown(text[:_MOST_TEXT]) + length)
+
+
+def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:
+    """Begin and end of a log, line by line with their offsets."""
+    try:
+        with regular_file.opened(log) as file:
+            size = file.seek(0, 2)
+            parts = [(0, size)] if size <= 2 * _MOST_BYTES else [(0, _MOST_BYTES), (size - _MOST_BYTES, size)]
+            for begin, end in parts:
+                file.seek(begin)
+                offset = begin
+                for line in file.read(end - begin).split(b"\n"):
+                    yield offset, line
+                    offset += len(line) + 1
+    except OSError:
+        return
+
+
+def _test_times(walls: Sequence[int], test: RecordedTest) -> list[float]:
+    """Times of the machine in the test's: within a test as messages tell it, else by the machine's clock."""
+    if not len(test.walls):
+        return [(wall - test.begin) / MICROSECONDS if test.begin else 0.0 for wall in walls]
+    inside = np.interp(walls, test.walls, test.moments)
+    before = (np.array(walls, np.float64) - test.walls[0]) / MICROSECONDS
+    after = test.moments[-1] + (np.array(walls, np.float64) - test.walls[-1]) / MICROSECONDS
+    times: list[float] = np.where(
+        before < 0, before, np.where(after > test.moments[-1], test.duration, inside)
+    ).tolist()
+    return times
+
+
+def _said(line: str) -> str:
+    """A line of DoDo's services; of their protocol what a reader wants to know."""
+    if not line.startswith('{"dodo"'):
+        return line
+    try:
+        message = json.loads(line)
+        kind = message["dodo"]
+    except (ValueError, KeyError, RecursionError):
+        return line
+    if kind == "verdict":
+        return f"verdict: {message.get('outcome')}: {message.get('reason')}"
+    return "" if kind in ("time", "response") else str(message.get("reason") or message.get("text") or kind)
+
+
+def _level(line: str, before: str) -> str:
+    """``error``, ``warning`` or nothing; lines that go on where an error began are errors, too."""
+    if _ERROR.search(line[:_MOST_TEXT]):
+        return "error"
+    if before == "error" and line.startswith((" ", "\t")):
+        return "error"
+    return "warning" if _WARNING.search(line[:_MOST_TEXT]) else ""

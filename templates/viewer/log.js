@@ -1,0 +1,65 @@
+// The log lines of all services by time: errors marked, in step with the cursor, to be searched.
+"use strict";
+
+dodo.log = (function () {
+  const { make } = dodo.dom;
+  const { services, lines, left } = dodo.data.test.log;
+  const shown = { text: "", service: "", errors: false };
+  const times = lines.map(([time]) => time);
+  const timed = times.filter((time) => time !== null);
+  let rows = [];
+  let current = null;
+
+  function row([time, service, level, text]) {
+    const when = make("time", {}, time === null ? "–" : time.toFixed(2));
+    const move = () => time !== null && dodo.cursor.move(time);
+    return make("p", { class: level, onclick: move }, when, make("b", { title: services[service] }, services[service]), make("span", {}, text));
+  }
+
+  function isShown([, service, level, text]) {
+    const isFound = !shown.text || text.toLowerCase().includes(shown.text);
+    return isFound && (!shown.service || services[service] === shown.service) && (!shown.errors || level === "error");
+  }
+
+  function filter(list) {
+    lines.forEach((line, n) => rows[n].classList.toggle("hidden", !isShown(line)));
+    follow(list, dodo.cursor.time());
+  }
+
+  // The last line that is shown until a time; one without a time is never current.
+  function follow(list, time) {
+    let n = dodo.data.at(timed, time + 0.005);
+    while (n >= 0 && rows[n].classList.contains("hidden")) n--;
+    const next = n >= 0 ? rows[n] : null;
+    if (next !== current) {
+      if (current) current.classList.remove("now");
+      if (next) next.classList.add("now");
+      current = next;
+    }
+    if (current) list.scrollTop = current.offsetTop - list.offsetTop - list.clientHeight * 0.7;
+    else list.scrollTop = 0;
+  }
+
+  function controls(list) {
+    const search = make("input", { type: "search", placeholder: "Search", "aria-label": "Search the log" });
+    search.addEventListener("input", () => ((shown.text = search.value.toLowerCase()), filter(list)));
+    const choice = make("select", { "aria-label": "Service" }, make("option", { value: "" }, "All services"), ...services.map((name) => make("option", {}, name)));
+    choice.addEventListener("change", () => ((shown.service = choice.value), filter(list)));
+    const errors = make("input", { type: "checkbox" });
+    errors.addEventListener("change", () => ((shown.errors = errors.checked), filter(list)));
+    const count = lines.filter(([, , level]) => level === "error").length;
+    return [search, choice, make("label", {}, errors, ` ${count} errors`)];
+  }
+
+  function show(parent) {
+    const list = make("div", { class: "lines", tabindex: "0" });
+    parent.append(make("h2", {}, "Log", ...(lines.length ? controls(list) : [])), list);
+    if (!lines.length) list.append(make("p", { class: "nothing" }, "No service wrote a line."));
+    rows = lines.map(row);
+    list.append(...rows);
+    if (left) list.append(make("p", {}, `${left} lines of the middle are left out; the files in logs/ have all.`));
+    dodo.cursor.follow((time) => follow(list, time));
+  }
+
+  return { show };
+})();

@@ -1,0 +1,72 @@
+"""Log lines of all services by time."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dodo_dsl.report.viewer import log_lines
+from dodo_dsl.report.viewer.recorded import RecordedTest
+
+LOCKSTEP = RecordedTest((), 3.0, 1_000, np.array([5e9, 5e9 + 1e6]), np.array([0.0, 2.0]))
+"""Two seconds of the test in one of the machine."""
+
+
+def write(folder: Path, name: str, *lines: tuple[int, bytes]) -> None:
+    offset, times = 0, ""
+    for time, line in lines:
+        times += f"{offset} {time}\n"
+        offset += len(line)
+    (folder / f"{name}.log").write_bytes(b"".join(line for _, line in lines))
+    (folder / f"{name}.times").write_text(times)
+
+
+def test_lines_of_services_are_merged_in_the_tests_time(tmp_path: Path) -> None:
+    write(
+        tmp_path, "application.a", (4_999_000_000, b"before\n"), (5_000_500_000, b"in\nit\n"), (5_009_000_000, b"end")
+    )
+    write(tmp_path, "evaluation.b", (5_000_250_000, b'{"dodo": "ready"}\n'))
+    (tmp_path / "action.c.log").write_text("untimed\n")
+    log = log_lines.merged(tmp_path, LOCKSTEP)
+    assert [(time, log["services"][service], text) for time, service, _, text in log["lines"]] == [
+        (-1.0, "a", "before"),
+        (0.5, "b", "ready"),
+        (1.0, "a", "in"),
+        (1.0, "a", "it"),
+        (3.0, "a", "end"),
+        (None, "c", "untimed"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "levels"),
+    [
+        ("Traceback (most recent call last):\n  File x\nKeyError: 1\non", ["error", "error", "error", ""]),
+        ("ERROR no camera", ["error"]),
+        ("clock: WARNING: late", ["warning"]),
+        ("terminate called after throwing", ["error"]),
+        ("no errors, distance error 0.1 m", [""]),
+    ],
+)
+def test_errors_and_warnings_are_marked(tmp_path: Path, text: str, levels: list[str]) -> None:
+    (tmp_path / "application.a.log").write_text(text)
+    assert [line[2] for line in log_lines.merged(tmp_path, RecordedTest())["lines"]] == levels
+
+
+def test_the_protocol_is_shown_in_words_and_the_applications_lines_as_they_are(tmp_path: Path) -> None:
+    lines = '{"dodo": "time", "s": 1}\n{"dodo": "verdict", "outcome": "failed", "reason": "hit"}\n{"dodo"\n'
+    for name in ("environment.clock", "application.a"):
+        (tmp_path / f"{name}.log").write_text(lines)
+    log = log_lines.merged(tmp_path, RecordedTest())["lines"]
+    assert [text for *_, text in log] == [*lines.split("\n")[:3], "verdict: failed: hit", '{"dodo"']
+
+
+def test_long_logs_keep_both_ends(tmp_path: Path) -> None:
+    (tmp_path / "application.a.log").write_text("".join(f"{n}\n" for n in range(9000)))
+    (tmp_path / "application.b.log").write_bytes(b"x" * 3_000_000 + b"\x1b[31mend\x1b[0m\n")
+    log = log_lines.merged(tmp_path, RecordedTest())
+    texts = [text for *_, text in log["lines"]]
+    assert (len(texts), log["left"]) == (log_lines.MOST_LINES, 5002)
+    assert (texts[0], texts[-3]) == ("0", "8999")
+    assert texts[-1].endswith("xxx … (1048575 bytes)")
+    assert max(map(len, texts)) < 700
