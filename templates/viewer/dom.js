@@ -23,7 +23,7 @@ dodo.dom = (function () {
   }
 
   const seconds = (value) => `${value.toFixed(2)} s`;
-  const withUnit = (value, unit) => (unit ? `${number(value)} ${unit}` : number(value));
+  const withUnit = (value, unit) => (unit && value !== null ? `${number(value)} ${unit}` : number(value));
 
   return { make, number, seconds, withUnit };
 })();

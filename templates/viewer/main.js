@@ -11,6 +11,7 @@
   part("outcome").className = test.outcome;
   part("reason").textContent = test.reason;
   dodo.transport.show(part("transport"));
+  dodo.camera.show(part("scene"));
   dodo.map.show(part("scene"));
   dodo.signals.show(part("signals"));
   dodo.log.show(part("log"));

@@ -5,7 +5,16 @@ dodo.map = (function () {
   const { test } = dodo.data;
   const way = dodo.way;
   const PAD = 14;
+  const CLOSE = 1.4;
   let view = null;
+
+  function around(x, y, scale, width, height) {
+    return {
+      scale,
+      to: (px, py) => [width / 2 + (px - x) * scale, height / 2 - (py - y) * scale],
+      from: (sx, sy) => [x + (sx - width / 2) / scale, y - (sy - height / 2) / scale],
+    };
+  }
 
   // Equal axes around way and lines; far cones may fall outside.
   function fit(width, height) {
@@ -16,12 +25,13 @@ dodo.map = (function () {
       .reduce((box, value, n) => ((box[[0, 2, 1, 3][n]] = value), box), []);
     const reach = Math.max(way.length, 0.2);
     const scale = Math.min((width - 2 * PAD) / (right - left + reach), (height - 2 * PAD) / (high - low + reach));
-    const [x, y] = [(left + right) / 2, (low + high) / 2];
-    return {
-      scale,
-      to: (px, py) => [width / 2 + (px - x) * scale, height / 2 - (py - y) * scale],
-      from: (sx, sy) => [x + (sx - width / 2) / scale, y - (sy - height / 2) / scale],
-    };
+    return around((left + right) / 2, (low + high) / 2, scale, width, height);
+  }
+
+  // Some lengths of the vehicle around it.
+  function close(width, height) {
+    const pose = way.pose(dodo.cursor.time());
+    return around(pose.x, pose.y, Math.min(width, height) / (CLOSE * Math.max(3 * way.length, 1)), width, height);
   }
 
   function trace(context, points) {
@@ -118,9 +128,9 @@ dodo.map = (function () {
     context.fillText(`${dodo.dom.number(size)} m`, 10, height - 13);
   }
 
-  function draw(context, width, height) {
+  function draw(context, width, height, look) {
     const time = dodo.cursor.time();
-    view = fit(width, height);
+    view = look(width, height);
     ground(context);
     driven(context, way.poses, "faint", 2);
     driven(context, way.poses.slice(0, dodo.data.at(way.times, time) + 1), "way", 2.5);
@@ -134,22 +144,35 @@ dodo.map = (function () {
     return `x ${pose.x.toFixed(2)} m, y ${pose.y.toFixed(2)} m, heading ${((pose.heading * 180) / Math.PI).toFixed(0)}°`;
   }
 
-  function show(parent) {
-    if (!way.poses.length) {
-      parent.append(dodo.dom.make("p", { class: "nothing" }, "No position was on the bus, so there is no way to draw."));
-      return;
-    }
-    const caption = dodo.dom.make("p", { class: "caption" });
-    const canvas = dodo.canvas.make(parent, "The way from above", draw);
-    parent.append(caption);
+  function add(parent, name, look) {
+    const canvas = dodo.canvas.make(parent, name, (context, width, height) => draw(context, width, height, look));
     canvas.element.addEventListener("click", (event) => {
-      const time = way.nearest(...view.from(event.offsetX, event.offsetY));
+      const { clientWidth: width, clientHeight: height } = canvas.element;
+      const time = way.nearest(...look(width, height).from(event.offsetX, event.offsetY));
       if (time !== null) dodo.cursor.move(time);
     });
+    return canvas;
+  }
+
+  function show(parent) {
+    if (!way.poses.length) {
+      if (!dodo.camera.isNeeded()) parent.append(dodo.dom.make("p", { class: "nothing" }, "No position was on the bus, so there is no way to draw."));
+      return;
+    }
+    const whole = dodo.dom.make("div", { class: "view" });
+    parent.append(whole);
+    const canvases = [add(whole, "The way from above", fit)];
+    if (!dodo.camera.isNeeded()) {
+      const near = dodo.dom.make("div", { class: "view" });
+      parent.append(near);
+      canvases.push(add(near, "The vehicle from above", close));
+    }
+    const caption = dodo.dom.make("p", { class: "caption" });
+    parent.lastChild.append(caption);
     dodo.cursor.follow((time) => {
-      canvas.redraw();
+      for (const canvas of canvases) canvas.redraw();
       caption.textContent = label(time);
-      canvas.label(`The way from above: at ${time.toFixed(2)} s ${caption.textContent}`);
+      canvases[0].label(`The way from above: at ${time.toFixed(2)} s ${caption.textContent}`);
     });
   }
 

@@ -72,7 +72,7 @@ dodo.plot = (function () {
   function limits(context, signal, width, low, high, y) {
     const bars = [[signal.max, high], [signal.min, low]];
     for (const [limit, end] of bars) {
-      if (limit === null || limit === undefined) continue;
+      if (limit === null || limit === undefined || signal.isPlain) continue;
       context.fillStyle = dodo.canvas.colour("refused");
       context.fillRect(LEFT, Math.min(y(limit), y(end)), width - LEFT - RIGHT, Math.abs(y(limit) - y(end)));
       context.strokeStyle = dodo.canvas.colour("failed");
@@ -121,7 +121,7 @@ dodo.plot = (function () {
     axes(context, width, height, low, high, y);
     context.save();
     context.beginPath();
-    context.rect(LEFT, TOP, width - LEFT - RIGHT, height - TOP - BOTTOM);
+    context.rect(LEFT - 2, TOP, width - LEFT - RIGHT + 4, height - TOP - BOTTOM);
     context.clip();
     limits(context, signal, width, low, high, y);
     if (signal.paint) signal.paint(context, x, y);

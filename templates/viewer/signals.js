@@ -57,6 +57,28 @@ dodo.signals = (function () {
     return { title: "Speed", unit: "m/s", times: way.times, values, max: raw.max, marked: outside(values, null, raw.max), note };
   }
 
+  // Right, missed and false boxes of each frame, one on top of the other.
+  function detected() {
+    const { frames, times } = dodo.detection;
+    const sums = frames.map((frame) => frame.hit.length + frame.missed.length + frame.false.length);
+    const paint = (context, x, y) => {
+      const wide = Math.max(1.5, (x(dodo.cursor.last) - x(0)) / Math.max(frames.length, 1) - 1);
+      frames.forEach((frame) => {
+        let base = 0;
+        for (const [kind, colour] of [["hit", "passed"], ["missed", "failed"], ["false", "warned"]]) {
+          context.fillStyle = dodo.canvas.colour(colour);
+          context.fillRect(x(frame.time) - wide / 2, y(base + frame[kind].length), wide, y(base) - y(base + frame[kind].length));
+          base += frame[kind].length;
+        }
+      });
+    };
+    const text = (time) => {
+      const frame = dodo.detection.at(time);
+      return frame ? `${frame.hit.length} right, ${frame.missed.length} missed, ${frame.false.length} false` : "–";
+    };
+    return { title: "Boxes of each frame", unit: "", times, values: Float32Array.from(sums), min: 0, paint, text, note: "green right, red missed, yellow false", isPlain: true };
+  }
+
   const plain = (channel, field) => ({
     title: `${field.name} of ${data.short(channel.message)}/${channel.sender}`,
     unit: "",
@@ -70,6 +92,7 @@ dodo.signals = (function () {
       if (raw.kind === "signal") return [judgedSignal(raw)];
       if (raw.kind === "margin") return way.poses.length ? [margin(raw)] : [];
       if (raw.kind === "speed") return way.poses.length ? [speed(raw)] : [];
+      if (raw.kind === "detection") return dodo.detection.frames.length ? [detected()] : [];
       const channel = data.channel(raw.message, raw.sender);
       return channel && raw.kind === "request" ? channel.fields.map((field) => plain(channel, field)) : [];
     });

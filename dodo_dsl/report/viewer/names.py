@@ -1,9 +1,11 @@
 """The files of the drive viewer in a report."""
 
 PAGE, DATA = "drive.html", "drive.js"
-FILES = (PAGE, DATA)
-"""In the folder of each test."""
 SHARED = "_viewer"
 """The folder of scripts and style for all of them; no test's folder begins with an underscore."""
 LOGS = "logs"
 """The folder of the services' logs in that of a test."""
+VIDEOS = tuple(f"camera-{number}.mp4" for number in range(4))
+"""Of the cameras of a test."""
+FILES = (PAGE, DATA, *VIDEOS)
+"""In the folder of each test."""

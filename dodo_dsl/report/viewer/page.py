@@ -11,7 +11,7 @@ from dodo_dsl.opendlv.odvd.tokens import OdvdError
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.recorder_service import RECORDING
-from dodo_dsl.report.viewer import judged, limits, log_lines, moment, recorded, scene
+from dodo_dsl.report.viewer import boxes, judged, limits, log_lines, moment, pictures, recorded, scene
 from dodo_dsl.report.viewer.encoded import packed, script, shown
 from dodo_dsl.report.viewer.names import DATA, LOGS, PAGE, SHARED
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
@@ -47,6 +47,8 @@ def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict
         "scene": scene.scene(plan, compiled),
         "log": log_lines.merged(folder / LOGS, test),
         "channels": [_channel(channel) for channel in test.channels],
+        "frames": boxes.frames(plan, compiled, test),
+        "videos": _videos(folder, test, messages),
         "judged": list(judged.judged(plan, compiled, test, messages)),
     }
 
@@ -70,6 +72,11 @@ def _facts(outcome: Outcome) -> dict[str, Any]:
         "lastLines": [shown(line) for line in outcome.last_lines],
         "seed": outcome.seed,
     }
+
+
+def _videos(folder: Path, test: RecordedTest, messages: MessageSet) -> list[dict[str, Any]]:
+    found = pictures.write(folder, folder / RECORDING, test, messages)
+    return [{"problem": each} if isinstance(each, str) else dataclasses.asdict(each) for each in found]
 
 
 def _channel(channel: Channel) -> dict[str, Any]:

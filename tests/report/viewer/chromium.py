@@ -14,6 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
 PROGRAM = shutil.which("chromium")
 _PATIENCE = 30.0
 KEYS = {"ArrowLeft": 37, "ArrowRight": 39, "Home": 36, "End": 35, " ": 32, "d": 68}
@@ -133,8 +137,13 @@ class Page:
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1, buttons=1)
 
-    def picture(self, path: Path) -> None:
-        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+    def picture(self) -> bytes:
+        """What is on the screen, as a PNG."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """The same as an array (height, width, 3)."""
+        return np.asarray(cv2.imdecode(np.frombuffer(self.picture(), np.uint8), cv2.IMREAD_COLOR), np.uint8)
 
     @property
     def faults(self) -> list[Any]:

@@ -1,8 +1,15 @@
 """One drive for each way to fail, with the moment at which its page has to open."""
 
 import math
+from collections.abc import Iterator
 
-from tests.report.viewer.drives import MadeDrive, Pose, check, poses, requests, verdict
+import numpy as np
+
+from dodo_dsl.opendlv.video.encoder import VideoEncoder
+from tests.report.viewer.drives import MadeDrive, Pose, Sample, check, poses, requests, verdict
+
+Box = tuple[str, float, float]
+"""Class, left and top of a box of a tenth by a fifth of the picture."""
 
 
 def into_the_wall(time: float) -> Pose:
@@ -59,3 +66,35 @@ def no_answer() -> MadeDrive:
     samples = [*poses(lambda t: (0.0, 0.5 * t, math.pi / 2), 1.7), *requests(lambda t: 0.0, 1.6)]
     lines = [(t / 10, f"frame {t}: steering 0.000 rad") for t in range(17)]
     return MadeDrive("sil-closed-straight", 1.7, samples, {"reason": reason}, {"application.steering": lines})
+
+
+def boxes(time: float, sender: int, found: list[Box]) -> Iterator[Sample]:
+    for number, (label, x, y) in enumerate(found):
+        known = {"sampleId": round(time * 10), "detectionId": number}
+        logic = "opendlv.logic.perception.Detection"
+        yield time, f"{logic}Property", sender, {**known, "property": f"color: {label}"}
+        yield time, f"{logic}BoundingBox", sender, {**known, "x": x, "y": y, "width": 0.1, "height": 0.2}
+
+
+def pictures(duration: float) -> Iterator[Sample]:
+    """A frame each 100 ms whose brightness is its number."""
+    encoder = VideoEncoder("bgr", 160, 120)
+    for number in range(round(duration * 10) + 1):
+        data = encoder.encode(np.full((120, 160, 3), 10 * number, np.uint8))
+        fields = {"format": "h264", "width": 160, "height": 120, "data": data}
+        yield number / 10, "opendlv.proxy.ImageReading", 0, fields
+
+
+def missed_cones() -> MadeDrive:
+    """At 0.7 s of two a half is found and one missed, and there is a false one of a class."""
+    time, reason = 0.7, "found 23 of 32 objects in 16 frames, with 1 false detection: recall 0.71 (at least 0.9)"
+    samples = [*pictures(1.5)]
+    for number in range(16):
+        at = number / 10
+        samples += boxes(at, 9, [("yellow", 0.2, 0.5), ("blue", 0.7, 0.5)])
+        wrong = [("blue", 0.45, 0.2)] if at == time else []
+        samples += boxes(at, 0, [("yellow", 0.21, 0.5), *wrong, *([("blue", 0.7, 0.5)] if number < 7 else [])])
+    said = verdict("cones", reason, time=time, found=1, false=1, missed=1, gap_begin=0.0, gap_end=0.1)
+    checks = (check("recall", 0.71, False, min=0.9), check("precision", 0.96, True, min=0.7))
+    outcome = {"reason": reason, "kind": "perception", "checks": checks, "verdicts": (said,)}
+    return MadeDrive("sil-perception--light-0-45--clutter-0", 1.5, samples, outcome)

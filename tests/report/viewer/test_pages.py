@@ -1,13 +1,18 @@
 """The pages of failed tests in a real browser."""
 
+import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 
 from services.collision.geometry import VehicleBox, VehiclePose, outline
 from services.collision.obstacles import load
+from services.object_detection.boxes import Box, overlaps
+from services.object_detection.pairing import best_pairs
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
 
@@ -17,6 +22,7 @@ DRIVES = {
     "wall hit": (failures.wall_hit(), 3.21),
     "timeout": (failures.timed_out(), 40.0),
     "wrong signal": (failures.wrong_signal(), 2.4),
+    "missed cones": (failures.missed_cones(), 0.7),
     "crash": (failures.crash(), 2.3),
     "no answer": (failures.no_answer(), 1.7),
 }
@@ -47,7 +53,14 @@ def test_a_failed_test_opens_where_it_was_decided(page: Page, request: pytest.Fi
     drive, moment = DRIVES[request.node.callspec.params["page"]]
     assert page.value("dodo.cursor.time()") == pytest.approx(moment)
     assert page.value("document.getElementById('reason').textContent") == drive.outcome["reason"]
-    for part in ("#reason", "#scene canvas", ".plots canvas", "#transport input", *[".lines .now"] * bool(drive.logs)):
+    for part in (
+        "#reason",
+        "#scene canvas",
+        ".plots canvas",
+        "#transport input",
+        "#checks",
+        *[".lines .now"] * bool(drive.logs),
+    ):
         assert visible(page, part), part
     assert page.value("document.documentElement.scrollHeight <= innerHeight")
 
@@ -56,6 +69,13 @@ def visible(page: Page, selector: str) -> bool:
     """Whether all of an element is on the screen."""
     box = f"document.querySelector({selector!r}).getBoundingClientRect()"
     return bool(page.value(f"(b => b.width > 0 && b.height > 0 && b.top >= 0 && b.bottom <= innerHeight)({box})"))
+
+
+def middle(page: Page, selector: str) -> float:
+    """The brightness on the screen in the middle of an element, 0 to 255."""
+    box = f"document.querySelector({selector!r}).getBoundingClientRect()"
+    x, y = page.value(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({box})")
+    return float(page.pixels()[int(y), int(x)].mean())
 
 
 @pytest.mark.parametrize("page", ["wall hit"], indirect=True)
@@ -75,6 +95,34 @@ def test_keys_clicks_and_addresses_move_the_cursor(page: Page) -> None:
     page.wait("Math.abs(dodo.cursor.time() - 0.7) < 1e-6")
     page.press(" ")
     page.wait("dodo.cursor.time() > 0.8")
+
+
+@pytest.mark.parametrize("page", ["missed cones"], indirect=True)
+def test_a_frame_is_shown_with_its_boxes(page: Page) -> None:
+    frame = page.value("dodo.detection.at(dodo.cursor.time())")
+    kinds = {kind: [each["label"] for each in frame[kind]] for kind in ("hit", "false", "missed")}
+    assert kinds == {"hit": ["yellow"], "false": ["blue"], "missed": ["blue"]}
+    assert frame["hit"][0]["score"] == pytest.approx(0.09 / 0.11, abs=1e-3)
+    for time in (0.7, 1.25, 0.35):
+        page.value(f"dodo.cursor.move({time})")
+        shown = math.floor(time * 10 + 0.01)
+        page.wait(f"Math.round(dodo.camera.screen().currentTime * 10) === {shown} && !dodo.camera.screen().seeking")
+        page.wait("true")
+        assert middle(page, ".view canvas") == pytest.approx(10 * shown, abs=6), time
+
+
+@pytest.mark.parametrize("page", ["missed cones"], indirect=True)
+def test_boxes_are_paired_as_the_evaluator_does(page: Page) -> None:
+    rng = np.random.default_rng(7)
+    cases = [[(rng.random((rng.integers(0, 8), 4)) * 0.5 + 0.05).tolist() for _ in range(2)] for _ in range(300)]
+    box = "([x, y, width, height]) => ({x, y, width, height})"
+    pairs = page.value(f"{json.dumps(cases)}.map(lists => dodo.detection.pairs(...lists.map(l => l.map({box})), 0.2))")
+    for (mine, true), found in zip(cases, pairs, strict=True):
+        scores = overlaps([Box(*each) for each in mine], [Box(*each) for each in true])
+        expected = best_pairs(scores, 0.2)
+        assert len(found) == len(expected)
+        assert sum(score for *_, score in found) == pytest.approx(sum(scores[pair] for pair in expected))
+        assert [score for *_, score in found] == pytest.approx([scores[a, b] for a, b, _ in found])
 
 
 @pytest.mark.parametrize("page", ["crash"], indirect=True)

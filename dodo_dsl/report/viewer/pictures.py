@@ -1,0 +1,117 @@
+"""The camera's frames of a recording as a video that browsers play, without encoding them again."""
+
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl import atomic
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.video.picture_size import too_large
+from dodo_dsl.report.viewer.names import VIDEOS
+from dodo_dsl.report.viewer.recorded import MICROSECONDS, PICTURES, RecordedTest
+
+MOST_BYTES = 16 << 20
+"""Of one video; the oldest frames are left out."""
+_FORMATS = ("h264", "H264")
+_START, _IDR, _SET = b"\x00\x00\x01", 5, 7
+
+
+class NoVideo(ValueError):
+    """Why there is no video of a camera, in a sentence."""
+
+
+@dataclass(frozen=True)
+class Video:
+    """A camera's video: the file beside the page, the size in pixels, and the time of each frame in s of the test."""
+
+    file: str
+    width: int
+    height: int
+    times: list[float]
+    left: int = 0
+    """Frames before them that are left out."""
+
+
+def write(folder: Path, recording: Path, test: RecordedTest, messages: MessageSet) -> Iterator[Video | str]:
+    """A video in ``folder`` of each camera of a test, a few at most, or a sentence on why there is none."""
+    senders = [channel.sender for channel in test.channels if channel.message == PICTURES]
+    for sender, name in zip(senders, VIDEOS, strict=False):
+        try:
+            yield _write(folder / name, recording, sender, test.begin, messages)
+        except NoVideo as problem:
+            yield str(problem)
+
+
+def _write(target: Path, recording: Path, sender: int, begin: int, messages: MessageSet) -> Video:
+    images = _images(recording, sender, messages)
+    kept = _kept(images)
+    if not kept:
+        raise NoVideo("none of the recorded pictures stands alone, so none can be shown")
+    first = kept[0][1]
+    if first.format not in _FORMATS:
+        raise NoVideo(f"recorded pictures of format '{first.format[:40]}' are not shown, expected h264")
+    if problem := too_large(first.width, first.height):
+        raise NoVideo(f"the recorded pictures are not shown: {problem}")
+    with atomic.replacing(target) as part:
+        _mux(part, [(time, image.data) for time, image in kept])
+    times = [round((time - begin) / MICROSECONDS, 4) for time, _ in kept]
+    return Video(target.name, first.width, first.height, times, len(images) - len(kept))
+
+
+def _images(recording: Path, sender: int, messages: MessageSet) -> list[tuple[int, Any]]:
+    """Sample times in us and messages of one camera, each later than the one before."""
+    images = list[tuple[int, Any]]()
+    id_ = messages.id(PICTURES)
+    with Recording(recording) as opened:
+        for envelope in opened.envelopes(opened.rows({id_}, sender_stamps={sender})):
+            if not images or envelope.sample_time > images[-1][0]:
+                images.append((envelope.sample_time, messages.decode(id_, envelope.payload)))
+    return images
+
+
+def _kept(images: Sequence[tuple[int, Any]]) -> Sequence[tuple[int, Any]]:
+    """The newest of them that fit, from one that stands alone on."""
+    size, first = 0, len(images)
+    for number in range(len(images) - 1, -1, -1):
+        size += len(images[number][1].data)
+        if size > MOST_BYTES:
+            break
+        if _stands_alone(images[number][1].data):
+            first = number
+    return images[first:]
+
+
+def _stands_alone(packet: bytes) -> bool:
+    at = packet.find(_START)
+    while at >= 0 and at + 3 < len(packet):
+        if packet[at + 3] & 0x1F in (_IDR, _SET):
+            return True
+        at = packet.find(_START, at + 3)
+    return False
+
+
+def _mux(path: Path, packets: Sequence[tuple[int, bytes]]) -> None:
+    """An MP4 of H.264 packets, its first frame at 0 s; raises NoVideo where there is no PyAV."""
+    try:
+        import av
+    except ImportError:
+        raise NoVideo("recorded pictures are not shown, as the package 'av' is not installed") from None
+    begin = packets[0][0]
+    try:
+        with (
+            av.open(io.BytesIO(packets[0][1]), format="h264") as source,
+            av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container,
+        ):
+            stream = container.add_stream_from_template(source.streams.video[0])
+            for time, data in packets:
+                packet = av.Packet(data)
+                packet.stream, packet.time_base = stream, Fraction(1, 10_000)
+                packet.pts = packet.dts = (time - begin) // 100
+                packet.is_keyframe = _stands_alone(data)
+                container.mux(packet)
+    except av.FFmpegError as error:
+        raise NoVideo(f"the recorded pictures are not shown: {error}") from None

@@ -1,0 +1,51 @@
+"""The frames of a recording as videos."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from dodo_dsl.report.viewer import pictures, recorded
+from dodo_dsl.report.viewer.pictures import Video
+from tests.report.viewer import failures
+from tests.report.viewer.drives import MESSAGES, MadeDrive, Sample, record
+
+
+def written(folder: Path, samples: Sequence[Sample]) -> list[Any]:
+    record(folder / "test.rec", MadeDrive("x", 1.5, samples, {}))
+    test = recorded.read(folder / "test.rec", MESSAGES)
+    return list(pictures.write(folder, folder / "test.rec", test, MESSAGES))
+
+
+def test_frames_keep_their_times_and_content(tmp_path: Path) -> None:
+    (video,) = written(tmp_path, list(failures.pictures(1.5)))
+    assert video == Video("camera-0.mp4", 160, 120, [round(n / 10, 4) for n in range(16)])
+    with av.open(str(tmp_path / video.file)) as container:
+        frames = list(container.decode(video=0))
+    assert [frame.time for frame in frames] == pytest.approx(video.times, abs=1e-3)
+    assert [frame.to_ndarray(format="gray").mean() for frame in frames] == pytest.approx(np.arange(16) * 10, abs=8)
+
+
+def test_the_oldest_frames_go_where_there_are_too_many(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    samples = list(failures.pictures(1.5))
+    monkeypatch.setattr(pictures, "MOST_BYTES", sum(len(fields["data"]) for *_, fields in samples[8:]))
+    (video,) = written(tmp_path, samples)
+    assert (video.times[0], video.left) == (1.0, 10)
+
+
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"format": "VP80", "data": b"\x00\x00\x01\x65"}, "recorded pictures of format 'VP80' are not shown"),
+        ({"format": "h264", "data": b"garbage"}, "none of the recorded pictures stands alone"),
+        ({"format": "h264", "width": 60_000, "height": 60_000, "data": b"\x00\x00\x01\x65"}, "are not shown"),
+        ({"format": "h264", "width": 16, "height": 16, "data": b"\x00\x00\x01\x65garbage"}, "are not shown"),
+    ],
+)
+def test_what_is_no_video_is_said(tmp_path: Path, fields: dict[str, Any], problem: str) -> None:
+    (said,) = written(tmp_path, [(0.1, "opendlv.proxy.ImageReading", 0, fields)])
+    assert problem in said
+    assert [path.name for path in tmp_path.iterdir()] == ["test.rec"]
