@@ -43,10 +43,11 @@ dodo.camera = (function () {
     const y = place.y + each.y * place.height - 4;
     if (written.some((other) => x < other.x + other.width && other.x < x + width && Math.abs(y - other.y) < 11)) return;
     written.push({ x, y, width });
+    context.fillStyle = dodo.canvas.colour("paper");
+    context.globalAlpha = 0.8;
+    context.fillRect(x - 2, y - 10, width + 4, 13);
+    context.globalAlpha = 1;
     context.fillStyle = dodo.canvas.colour(LOOKS[kind][0]);
-    context.strokeStyle = dodo.canvas.colour("paper");
-    context.lineWidth = 3;
-    context.strokeText(text, x, y);
     context.fillText(text, x, y);
   }
 
@@ -103,6 +104,7 @@ dodo.camera = (function () {
     const text = make("p", { class: "caption" });
     const box = make("div", { class: "view" });
     parent.append(box);
+    parent.classList.add("pictured");
     const canvas = dodo.canvas.make(box, "What the camera saw", draw);
     box.append(make("p", { class: "caption" }, why()), text);
     if (videos.length) film(canvas);

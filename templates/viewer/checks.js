@@ -38,7 +38,8 @@ dodo.checks = (function () {
     if (!all.length) parent.append(make("p", { class: "nothing" }, "No evaluator measured anything."));
     const judged = all.filter((check) => Object.keys(check.limit).length || !check.ok);
     const others = all.filter((check) => !judged.includes(check));
-    parent.append(make("ul", { tabindex: "0" }, ...judged.map(row), ...others.map(row)));
+    const notes = dodo.data.test.test.notes.map((note) => make("li", {}, `Note: ${note}`));
+    parent.append(make("ul", { tabindex: "0" }, ...judged.map(row), ...notes, ...others.map(row)));
   }
 
   return { show };

@@ -48,7 +48,7 @@ dodo.log = (function () {
     const errors = make("input", { type: "checkbox" });
     errors.addEventListener("change", () => ((shown.errors = errors.checked), filter(list)));
     const count = lines.filter(([, , level]) => level === "error").length;
-    return [search, choice, make("label", {}, errors, ` ${count} errors`)];
+    return [search, choice, make("label", {}, errors, ` Errors (${count})`)];
   }
 
   function show(parent) {

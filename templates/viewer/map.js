@@ -118,7 +118,8 @@ dodo.map = (function () {
   }
 
   function scaleBar(context, height) {
-    const size = dodo.canvas.steps(0, 90 / view.scale, 1).pop() || 1;
+    const power = 10 ** Math.floor(Math.log10(90 / view.scale));
+    const size = [5, 2, 1].map((each) => each * power).find((each) => each * view.scale <= 90);
     context.strokeStyle = context.fillStyle = dodo.canvas.colour("soft");
     context.lineWidth = 2;
     trace(context, [[10, height - 8], [10 + size * view.scale, height - 8]]);
@@ -156,7 +157,8 @@ dodo.map = (function () {
 
   function show(parent) {
     if (!way.poses.length) {
-      if (!dodo.camera.isNeeded()) parent.append(dodo.dom.make("p", { class: "nothing" }, "No position was on the bus, so there is no way to draw."));
+      const why = dodo.dom.make("p", { class: "nothing" }, "No position was on the bus, so there is no way to draw.");
+      if (!dodo.camera.isNeeded()) parent.append(dodo.dom.make("div", { class: "view" }, why));
       return;
     }
     const whole = dodo.dom.make("div", { class: "view" });

@@ -87,6 +87,21 @@ dodo.signals = (function () {
     note: channel.every > 1 ? `one of ${channel.every} samples` : "",
   });
 
+  // How many messages of a channel came in each part of the test, as messages a second.
+  function rate(channel) {
+    const wide = Math.max(0.5, dodo.cursor.last / 100);
+    const parts = Math.max(1, Math.ceil(dodo.cursor.last / wide));
+    const counts = new Float32Array(parts);
+    for (const time of channel.times) if (time >= 0) counts[Math.min(parts - 1, Math.floor(time / wide))] += channel.every;
+    const spans = counts.map((_, n) => Math.min(wide, dodo.cursor.last - n * wide) || wide);
+    const [times, values] = [new Float32Array(2 * parts), new Float32Array(2 * parts)];
+    counts.forEach((count, n) => {
+      times.set([n * wide, n * wide + spans[n]], 2 * n);
+      values.fill(count / spans[n], 2 * n, 2 * n + 2);
+    });
+    return { title: `${data.short(channel.message)}/${channel.sender} a second`, unit: "1/s", times, values, min: 0, isPlain: true, note: "" };
+  }
+
   function judged() {
     return data.test.judged.flatMap((raw) => {
       if (raw.kind === "signal") return [judgedSignal(raw)];
@@ -98,17 +113,18 @@ dodo.signals = (function () {
     });
   }
 
+  const others = () => data.channels.filter((channel) => !channel.message.startsWith("dodo."));
+
   function chooser(parent) {
     const select = make("select", { "aria-label": "Add a signal" }, make("option", { value: "" }, "Add a signal…"));
     const choices = [];
-    for (const channel of data.channels) {
-      if (!channel.fields.length || channel.message.startsWith("dodo.")) continue;
-      const group = make("optgroup", { label: `${channel.message}/${channel.sender}` });
-      for (const field of channel.fields) {
-        group.append(make("option", { value: choices.length }, field.name));
-        choices.push(() => plain(channel, field));
-      }
-      select.append(group);
+    const group = (label, entries) => {
+      const options = entries.map(([name, choice]) => make("option", { value: choices.push(choice) - 1 }, name));
+      if (options.length) select.append(make("optgroup", { label }, ...options));
+    };
+    group("Messages a second", others().map((channel) => [`${channel.message}/${channel.sender}`, () => rate(channel)]));
+    for (const channel of others()) {
+      group(`${channel.message}/${channel.sender}`, channel.fields.map((field) => [field.name, () => plain(channel, field)]));
     }
     select.addEventListener("change", () => {
       if (select.value === "") return;
@@ -121,11 +137,12 @@ dodo.signals = (function () {
 
   function show(parent) {
     const list = judged();
+    if (!data.test.checks.length) list.push(...others().filter((channel) => channel.message.startsWith("opendlv.proxy.") && channel.message.endsWith("Request")).map(rate));
     const plots = make("div", { class: "plots", tabindex: "0" });
     parent.append(make("h2", {}, "Signals", chooser(plots)), plots);
     if (!list.length) plots.append(make("p", { class: "nothing" }, "No signal that is judged was recorded."));
     for (const signal of list) dodo.plot.show(plots, signal, null);
   }
 
-  return { show, judged };
+  return { show, judged, rate };
 })();

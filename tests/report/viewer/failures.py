@@ -98,3 +98,10 @@ def missed_cones() -> MadeDrive:
     checks = (check("recall", 0.71, False, min=0.9), check("precision", 0.96, True, min=0.7))
     outcome = {"reason": reason, "kind": "perception", "checks": checks, "verdicts": (said,)}
     return MadeDrive("sil-perception--light-0-45--clutter-0", 1.5, samples, outcome)
+
+
+def set_up_failed() -> MadeDrive:
+    reason = "service 'camera' of layer environment ended with exit code 2 during set-up"
+    lines = [(0.0, "virtual-camera: CRITICAL: the map has no model 'cone_green'")]
+    outcome = {"reason": reason, "outcome": "error", "last_lines": (lines[0][1],)}
+    return MadeDrive("sil-closed-straight", 0.0, [], outcome, {"environment.camera": lines})

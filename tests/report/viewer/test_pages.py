@@ -2,7 +2,9 @@
 
 import json
 import math
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from services.object_detection.boxes import Box, overlaps
 from services.object_detection.pairing import best_pairs
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
+from tests.report.viewer.hostile import HOSTILE
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("chromium")]
 
@@ -25,8 +28,10 @@ DRIVES = {
     "missed cones": (failures.missed_cones(), 0.7),
     "crash": (failures.crash(), 2.3),
     "no answer": (failures.no_answer(), 1.7),
+    "set-up": (failures.set_up_failed(), 0.0),
 }
 NAMES = list(DRIVES)
+SCRIPTS = (drives.ROOT / "templates" / "viewer" / "drive.html").read_text().count("<script")
 
 
 @pytest.fixture(scope="module")
@@ -53,14 +58,13 @@ def test_a_failed_test_opens_where_it_was_decided(page: Page, request: pytest.Fi
     drive, moment = DRIVES[request.node.callspec.params["page"]]
     assert page.value("dodo.cursor.time()") == pytest.approx(moment)
     assert page.value("document.getElementById('reason').textContent") == drive.outcome["reason"]
-    for part in (
-        "#reason",
-        "#scene canvas",
-        ".plots canvas",
-        "#transport input",
-        "#checks",
-        *[".lines .now"] * bool(drive.logs),
-    ):
+    drawn = (
+        ["#scene canvas", ".plots canvas", "#transport input"]
+        if drive.samples
+        else ["#scene .nothing", ".plots .nothing"]
+    )
+    line = [".lines .now"] if drive.logs else []
+    for part in ("#reason", "#checks h2", *drawn, *line):
         assert visible(page, part), part
     assert page.value("document.documentElement.scrollHeight <= innerHeight")
 
@@ -159,3 +163,70 @@ def test_samples_outside_are_marked(page: Page) -> None:
     signal = "dodo.signals.judged()[0]"
     marks = page.value(f"(s => Array.from(s.times, (t, n) => [t.toFixed(1), s.marked(n)]).filter(m => m[1]))({signal})")
     assert marks == [["2.4", "failed"]]
+
+
+@pytest.fixture(scope="module")
+def hostile_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report in which every string of others is hostile, each as a reason of a test, and all of them elsewhere."""
+    folder = tmp_path_factory.mktemp("hostile") / "report"
+    texts = [text.encode(errors="replace").decode() for text in HOSTILE]
+    drive = failures.missed_cones()
+    labels = [sample for n, text in enumerate(texts) for sample in failures.boxes(0.7, 0, [(text[:500], n / 30, 0.1)])]
+    checks = tuple(drives.check(text[:500], 1.0, False, text[:500], max=0.5) for text in texts)
+    logs = {"application.<img src=x onerror=window.hacked=1>": [(0.1, t.replace("\0", " ")) for t in texts]}
+    outcomes = [
+        {
+            **drive.outcome,
+            "reason": text,
+            "name": text[:500],
+            "checks": checks,
+            "notes": tuple(texts),
+            "last_lines": tuple(texts),
+        }
+        for text in HOSTILE[:3]
+    ]
+    drives.write(folder, [replace(drive, samples=[*drive.samples, *labels], outcome=o, logs=logs) for o in outcomes])
+    return folder
+
+
+def test_strings_of_others_are_text(chromium: Chromium, hostile_report: Path) -> None:
+    for number, reason in enumerate(HOSTILE[:3]):
+        with chromium.page((hostile_report / f"test-{number}" / "drive.html").as_uri()) as page:
+            page.value("dodo.cursor.move(0.7)")
+            page.wait("true")
+            assert page.value("document.getElementById('reason').textContent") == reason
+            tags = page.value(
+                "Array.from(document.querySelectorAll('img, svg, iframe, style, base'), e => e.outerHTML)"
+            )
+            assert tags == []
+            assert page.value("document.querySelectorAll('script').length") == SCRIPTS
+            assert page.value("[window.hacked, {}.polluted, Object.keys(Object.prototype).length]") == [None, None, 0]
+            shown = page.value("document.body.innerText")
+            assert [text for text in HOSTILE[:18] if text not in shown] == []
+            assert not re.search("[\x00-\x08\x0b-\x1f\u202a-\u202e\u2066-\u2069\u2028\u2029]", shown)
+            assert len(shown) < 200_000
+            assert page.faults == []
+            assert [url for url in page.requests if not url.startswith((hostile_report.as_uri(), "data:,"))] == []
+
+
+@pytest.mark.parametrize("page", ["crash"], indirect=True)
+def test_other_signals_and_rates_can_be_added(page: Page) -> None:
+    """Without a verdict the rates of the application's requests are there from the start."""
+    titles = "Array.from(document.querySelectorAll('.plots figcaption b'), e => e.textContent)"
+    assert page.value(titles)[-2:] == ["PedalPositionRequest/0 a second", "GroundSteeringRequest/0 a second"]
+    rates = page.value("Array.from(dodo.signals.rate(dodo.data.channel('opendlv.sim.Frame', 0)).values)")
+    assert rates[:4] == [100] * 4
+    select = "document.querySelector('#signals select')"
+    page.value(f"{select}.value = Array.from({select}.options).find(option => option.text === 'qw').value")
+    page.value(f"{select}.dispatchEvent(new Event('change'))")
+    assert page.value(titles)[-1] == "qw of Frame/0"
+    page.value("document.querySelector('figure:last-child button').click()")
+    assert page.value(titles)[-1] == "GroundSteeringRequest/0 a second"
+
+
+@pytest.mark.parametrize("page", ["wall hit", "wrong signal", "missed cones"], indirect=True)
+def test_a_phone_shows_everything_below_one_another(page: Page) -> None:
+    page.resize(390, 844)
+    page.wait("document.documentElement.scrollWidth <= innerWidth")
+    tops = page.value("Array.from(document.querySelectorAll('main > section'), e => e.getBoundingClientRect().top)")
+    assert tops == sorted(tops)

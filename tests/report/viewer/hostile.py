@@ -1,0 +1,30 @@
+"""Strings that services, specs, maps and recordings may hold, none of which may do anything."""
+
+SET = "window.hacked=1"
+HOSTILE = [
+    f"<script>{SET}</script>",
+    f"</script><script>{SET}</script>",
+    f"<img src=x onerror={SET}>",
+    f"<svg onload={SET}>",
+    f'"><b onmouseover={SET}>',
+    f"'-({SET})-'",
+    f"javascript:{SET}",
+    "<iframe srcdoc='<script>parent.hacked=1</script>'></iframe>",
+    f"<a href='javascript:{SET}'>click</a>",
+    "<style>@import 'http://example.org/x.css'</style>",
+    "<link rel=stylesheet href=http://example.org/x.css>",
+    "<meta http-equiv=refresh content='0;url=http://example.org/'>",
+    "<base href=http://example.org/>",
+    "<!-- --><![CDATA[ ]]>",
+    "&lt;script&gt;&amp;&#60;&#x3c;",
+    "${window.hacked=1} {{7*7}} {%raw%}",
+    "`);window.hacked=1;(`",
+    '\\";window.hacked=1;//',
+    "line\u2028separator\u2029paragraph",
+    "\x1b[31mred\x1b[0m \x1b]8;;http://example.org\x07link\x1b]8;;\x07",
+    "\u202egnp.exe\u202c \u2066isolated\u2069",
+    "nul\x00bell\x07backspace\x08",
+    "__proto__ constructor toString hasOwnProperty",
+    "lone \ud800 surrogate \udfff",
+    "wide " + "w" * 1_000_000,
+]
