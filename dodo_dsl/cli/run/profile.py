@@ -22,7 +22,7 @@ _STAT = Path("/proc/stat")
 
 
 @dataclass(frozen=True)
-class Spent:
+class Moment:
     """The time at an instant, in s: since the command's start, on its processor, on all processors of the machine."""
 
     wall: float
@@ -36,8 +36,8 @@ class Phase:
 
     lane: str
     name: str
-    begin: Spent
-    end: Spent
+    begin: Moment
+    end: Moment
 
 
 class Profile:
@@ -46,7 +46,7 @@ class Profile:
     def __init__(self) -> None:
         self._started = _process_started()
         self.phases: list[Phase] = []
-        self._open = {COMMAND: ("start and load", Spent(0.0, 0.0, math.nan))}
+        self._open = {COMMAND: ("start and load", Moment(0.0, 0.0, math.nan))}
 
     def enter(self, lane: str, name: str) -> None:
         """A phase begins, which ends the one before it in the same lane."""
@@ -59,8 +59,8 @@ class Profile:
             name, begin = self._open.pop(lane)
             self.phases.append(Phase(lane, name, begin, self._now()))
 
-    def _now(self) -> Spent:
-        return Spent(time.clock_gettime(time.CLOCK_BOOTTIME) - self._started, time.process_time(), _machine_s())
+    def _now(self) -> Moment:
+        return Moment(time.clock_gettime(time.CLOCK_BOOTTIME) - self._started, time.process_time(), _machine_s())
 
     def table(self) -> Iterator[str]:
         """Lines: the command's own phases, then those of the tests, the median where there are several."""
