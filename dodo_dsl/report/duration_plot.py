@@ -1,35 +1,84 @@
-"""Set-up and execution of tests as a PNG, as in Figure 5.3 of the thesis."""
+"""Set-up and execution of tests as an SVG, as in Figure 5.3 of the thesis.
 
+Every run ends with it, so that it must cost little: a plotting library takes a second to load.
+"""
+
+import math
 import statistics
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from typing import NamedTuple
+
+import jinja2
+
+from dodo_dsl import package_data
 
 Times = tuple[float, float]
 """Seconds of set-up and of execution."""
 
-_PIXELS_PER_INCH = 110
 _MOST = 60
+_WIDTH, _LEFT, _RIGHT, _TOP, _ROW = 880, 260, 20, 48, 26
+"""Pixels: of the picture, left and right of the bars, above them, and of one test."""
+_LONGEST = 38
+"""Letters of a name that find room."""
+_INTERVALS = 8
 
 
-def draw(tests: Mapping[str, Sequence[Times]], machine: str, target: Path) -> None:
+class Tick(NamedTuple):
+    """A label of the axis at ``x`` pixels."""
+
+    x: float
+    text: str
+
+
+class Row(NamedTuple):
+    """A test: its place, the lengths of its bars and the places of its runs in pixels, and its times in words."""
+
+    name: str
+    y: int
+    setup: float
+    execution: float
+    runs: list[float]
+    text: str
+
+
+def draw(tests: Mapping[str, Sequence[Times]], machine: str) -> str:
     """One bar for each test with the median of its runs on this machine, each run as a point; the longest on top."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    names = sorted(tests, key=lambda name: sum(_median(tests[name])), reverse=True)[:_MOST]
+    longest = max(sum(run) for name in names for run in tests[name])
+    step = _step(longest)
+    scale = (_WIDTH - _LEFT - _RIGHT) / max(longest, step)
+    bottom = _TOP + _ROW * len(names)
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(package_data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
+    )
+    return environment.get_template("times.svg.j2").render(
+        width=_WIDTH,
+        height=bottom + 28,
+        left=_LEFT,
+        top=_TOP - 4,
+        bottom=bottom,
+        machine=machine,
+        runs=sum(len(tests[name]) for name in names),
+        ticks=[
+            Tick(round(_LEFT + n * step * scale, 1), f"{n * step:g} s") for n in range(math.floor(longest / step) + 1)
+        ],
+        rows=[_row(number, name, tests[name], scale) for number, name in enumerate(names)],
+    )
 
-    names = sorted(tests, key=lambda name: sum(_median(tests[name])))[-_MOST:]
-    figure = Figure(figsize=(8, 1.3 + 0.32 * len(names)), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    setups, executions = ([_median(tests[name])[part] for name in names] for part in (0, 1))
-    axes.barh(names, setups, height=0.6, color="#8c959f", label="set-up")
-    axes.barh(names, executions, left=setups, height=0.6, color="#1f6feb", label="execution")
-    points = [(sum(run), row) for row, name in enumerate(names) for run in tests[name]]
-    axes.scatter([x for x, _ in points], [y for _, y in points], s=7, color="0.15", zorder=3, label="a run")
-    axes.set_xlabel("s")
-    axes.set_title(f"Set-up and execution on {machine}, {len(points)} runs".replace("$", r"\$"), fontsize=10)
-    axes.legend(fontsize=8, loc="lower right")
-    axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(target, dpi=_PIXELS_PER_INCH, format="png")
+
+def _row(number: int, name: str, runs: Sequence[Times], scale: float) -> Row:
+    setup, execution = _median(runs)
+    shown = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
+    places = [round(_LEFT + sum(run) * scale, 1) for run in runs]
+    text = f"{name}: set-up {setup:.2f} s, execution {execution:.2f} s"
+    return Row(shown, _TOP + _ROW * number, round(setup * scale, 1), round(execution * scale, 1), places, text)
+
+
+def _step(longest: float) -> float:
+    """Seconds between labels: 1, 2 or 5 times a power of ten."""
+    least = max(longest, 0.001) / _INTERVALS
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= least)
 
 
 def _median(runs: Sequence[Times]) -> Times:

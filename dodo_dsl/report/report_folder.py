@@ -21,7 +21,7 @@ from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.registry import SUFFIX
 
 TRAJECTORY = "trajectory.png"
-TIMES = "times.png"
+TIMES = "times.svg"
 ATTEMPTS = "attempts"
 SANDBOX_LOG = "sandbox.log"
 _LONGEST_PATH = 1000
@@ -87,8 +87,7 @@ def write_report(
     (folder / TIMES).unlink(missing_ok=True)
     if times:
         try:
-            with atomic.replacing(folder / TIMES) as part:
-                draw_times(times, platform.node() or "this machine", part)
+            atomic.write_text(folder / TIMES, draw_times(times, platform.node() or "this machine"))
         except Exception as error:  # noqa: BLE001  (as above)
             problems.append(f"the times of these tests cannot be drawn: {error}")
     write_summaries(folder, outcomes)
