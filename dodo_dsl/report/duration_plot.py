@@ -3,6 +3,7 @@
 Every run ends with it, so that it must cost little: a plotting library takes a second to load.
 """
 
+import functools
 import math
 import statistics
 from collections.abc import Mapping, Sequence
@@ -48,10 +49,7 @@ def draw(tests: Mapping[str, Sequence[Times]], machine: str) -> str:
     step = _step(longest)
     scale = (_WIDTH - _LEFT - _RIGHT) / max(longest, step)
     bottom = _TOP + _ROW * len(names)
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(package_data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
-    )
-    return environment.get_template("times.svg.j2").render(
+    return _template().render(
         width=_WIDTH,
         height=bottom + 28,
         left=_LEFT,
@@ -64,6 +62,14 @@ def draw(tests: Mapping[str, Sequence[Times]], machine: str) -> str:
         ],
         rows=[_row(number, name, tests[name], scale) for number, name in enumerate(names)],
     )
+
+
+@functools.cache
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(package_data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
+    )
+    return environment.get_template("times.svg.j2")
 
 
 def _row(number: int, name: str, runs: Sequence[Times], scale: float) -> Row:
