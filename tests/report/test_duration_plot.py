@@ -10,6 +10,8 @@ from dodo_dsl.report.duration_plot import Times, draw
 
 SVG = "{http://www.w3.org/2000/svg}"
 SECONDS = st.floats(0, 1e6)
+RUNS = st.lists(st.tuples(SECONDS, SECONDS), min_size=1, max_size=3)
+NAMED = st.dictionaries(st.text(max_size=50), RUNS, min_size=1, max_size=4)
 
 
 def bars(picture: str) -> list[tuple[str, float, float]]:
@@ -31,7 +33,7 @@ def test_bars_are_as_long_as_their_times_and_the_longest_test_is_on_top() -> Non
     assert last == "short: set-up 0.50 s, execution 1.00 s"
 
 
-@given(st.dictionaries(st.text(max_size=50), st.lists(st.tuples(SECONDS, SECONDS), min_size=1), min_size=1))
+@given(NAMED)
 def test_every_picture_is_xml_with_two_bars_a_test(tests: dict[str, list[Times]]) -> None:
     named = {name.encode("utf-8", "replace").decode(): runs for name, runs in tests.items() if name.isprintable()}
     if named:
