@@ -186,6 +186,8 @@ def _run(
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
     tests = {job.plan.slug: job.test for job in jobs}
+    summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
+    stdout.flush()
     profile.enter(COMMAND, "report")
     with undisturbed():
         history = History()
@@ -195,12 +197,11 @@ def _run(
         problems, unwritten = [], ""
         try:
             problems = write_report(report, outcomes, drawables, times)
-        except Exception as error:  # noqa: BLE001  (the outcomes are printed in any case)
+        except Exception as error:  # noqa: BLE001  (the outcomes are printed)
             why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
             unwritten = f"'{report}' cannot take the whole report: {why}"
         history.save()
     stdout.writelines(f"{printable(problem)}\n" for problem in problems)
-    summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
     instead = f"; it replaces an earlier one with {progress.count(gone, 'other test')}" if gone else ""
     stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}{instead}\n")
     return outcomes, not unwritten
