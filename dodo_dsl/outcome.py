@@ -49,7 +49,8 @@ class Response:
 
     The time is the wall time less what the application waited for a processor. ``processor_*`` is the processor time,
     None where the application's processes cannot be seen from the test's services. ``slow`` counts answers that took
-    longer than the period of the frames, ``over`` those beyond the limit of the test, None without one.
+    longer than the period of the frames, ``over`` those beyond the limit of the test, None without one, ``uncopied``
+    those that did not carry the sample time of their frame.
     """
 
     answers: int
@@ -64,6 +65,7 @@ class Response:
     over: int | None
     processor: str
     """The processor by its name, with its clock."""
+    uncopied: int = 0
 
     def in_words(self) -> str:
         """The times in a sentence, with the processor that they were measured on."""

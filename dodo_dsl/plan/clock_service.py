@@ -26,7 +26,7 @@ def lockstep(
         return None
     readers = sum(own.readers for own in declared.values() if own)
     wall = (spec.timeout_s or 0.0) * _WALL_FACTOR + _WALL_SPARE_S if wall_timeout_s is None else wall_timeout_s
-    return Lockstep(readers or 1, wall, spec.max_response_s, spec.response_over)
+    return Lockstep(readers or 1, wall, spec.max_response_s, spec.response_over, spec.copies_times)
 
 
 def clock(test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[str], cid: int) -> PlannedService:

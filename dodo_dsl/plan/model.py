@@ -92,13 +92,14 @@ class Lockstep:
     """A test in lockstep: the number of processes that read each frame, and the limit of wall time in seconds.
 
     ``max_response_s`` is the longest that an answer may take, None for no limit; ``response_over`` the share of answers
-    that may take longer.
+    that may take longer; ``is_copied`` tells that each has to carry the sample time of its frame.
     """
 
     readers: int
     wall_timeout_s: float
     max_response_s: float | None = None
     response_over: float = 0.0
+    is_copied: bool = False
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ def _is_lockstep(lockstep: Lockstep) -> bool:
     numbers = isinstance(lockstep.readers, int) and isinstance(lockstep.wall_timeout_s, int | float)
     limit, over = lockstep.max_response_s, lockstep.response_over
     limited = limit is None or (isinstance(limit, int | float) and 0 < limit <= 3600)
-    shared = isinstance(over, int | float) and 0 <= over <= 1
+    shared = isinstance(over, int | float) and 0 <= over <= 1 and isinstance(lockstep.is_copied, bool)
     in_range = numbers and 1 <= lockstep.readers <= 1000 and 0 < lockstep.wall_timeout_s <= 10 * 86_400 + 60
     return in_range and limited and shared
 

@@ -107,8 +107,9 @@ def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
 
 def _response(message: dict[str, Any]) -> Responded | None:
     """How long the application took, where all of the numbers can be."""
-    facts: dict[str, Any] = {name: message.get(name) for name in (field.name for field in dataclasses.fields(Response))}
-    counts = [facts["answers"], facts["slow"], facts["over"] or 0]
+    facts: dict[str, Any] = {field.name: message.get(field.name) for field in dataclasses.fields(Response)}
+    facts["uncopied"] = message.get("uncopied", 0)
+    counts = [facts["answers"], facts["slow"], facts["over"] or 0, facts["uncopied"]]
     times = [value for name, value in facts.items() if name.endswith("_s")]
     if not all(type(count) is int and 0 <= count <= counts[0] for count in counts) or counts[0] == 0:
         return None

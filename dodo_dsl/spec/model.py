@@ -59,6 +59,7 @@ class Spec:
     record_limit_mb: float | None = None
     max_response_s: float | None = None
     response_over: float = 0.0
+    copies_times: bool = False
     uses: tuple[Use, ...] = ()
     variables: dict[str, Entry] = field(default_factory=dict)
     choice: Choice = field(default_factory=Choice)
@@ -190,6 +191,7 @@ def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> 
         record_limit_mb=largest,
         max_response_s=longest,
         response_over=over or 0.0,
+        copies_times=_part(response, "sample-times") is not None,
         uses=uses,
         variables=_variables(node.get("application")),
         choice=choice,

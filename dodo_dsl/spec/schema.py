@@ -134,6 +134,13 @@ def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
     yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
 
 
+def _companion(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    for name, needed in error.validator_value.items():
+        missing = [other for other in needed if name in error.instance and other not in error.instance]
+        if missing and f"'{missing[0]}'" in error.message:
+            yield Diagnostic(place.span, "missing-key", f"{place.name} has '{name}' without '{missing[0]}'")
+
+
 def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     if _UNIT in error.schema:
         yield from _quantity(error, place)
@@ -218,6 +225,7 @@ def _fallback(error: Any, place: _Place) -> Iterator[Diagnostic]:
 _TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
     "additionalProperties": _additional,
     "required": _required,
+    "dependentRequired": _companion,
     "type": _type,
     _UNIT: _quantity,
     "enum": _choices,

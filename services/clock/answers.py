@@ -45,6 +45,8 @@ class Answers:
     _surplus_now: Counter[str] = field(default_factory=Counter)
     is_silent: bool = True
     """Whether nothing that matters has come yet."""
+    is_copied: bool = True
+    """Whether all that matters and came since the frame was expected carries the sample time of a frame."""
     _is_seen: bool = False
     _is_done: bool = False
     _is_collected: bool = False
@@ -55,6 +57,7 @@ class Answers:
         self._all_times |= self._times
         self._chosen, self._is_seen, self._is_done, self._is_collected = {}, False, False, False
         self._surplus_now.clear()
+        self.is_copied = True
 
     def seen(self) -> None:
         """The frame was seen: all that is taken from now on came after it."""
@@ -73,8 +76,9 @@ class Answers:
         known = envelope if copies else envelope._replace(sample_time=max(self._times))
         if self.done is not None and self.done.matches(envelope) and not stale:
             self._is_done = True
-        if self.is_silent:
-            self.is_silent = not any(each.matches(envelope) for each in self.filters)
+        if any(each.matches(envelope) for each in self.filters):
+            self.is_silent = False
+            self.is_copied &= copies
         for each in self.required:
             if each.matches(envelope):
                 if stale or each in self._chosen or self._is_collected:

@@ -89,7 +89,8 @@ class SteppedApplication:
             self.waited_first += spent
         else:
             self.waited += spent
-            self.response.add(spent, self.processes.snapshot().since(self._before) if self.processes else None)
+            ran = self.processes.snapshot().since(self._before) if self.processes else None
+            self.response.add(spent, ran, self.answers.is_copied)
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services."""

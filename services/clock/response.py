@@ -20,11 +20,14 @@ class ResponseTimes:
 
     period_s: float = 0.1
     limit_s: float | None = None
+    uncopied: int = 0
+    """Answers that did not carry the sample time of their frame."""
     _taken: list[float] = field(default_factory=list)
     _processor: list[float] = field(default_factory=list)
 
-    def add(self, wall_s: float, spent: Spent | None) -> None:
+    def add(self, wall_s: float, spent: Spent | None, is_copied: bool = True) -> None:
         """One more answer; ``spent`` is None where the application's processes cannot be seen."""
+        self.uncopied += not is_copied
         if spent is None:
             self._taken.append(wall_s)
             return
@@ -45,6 +48,7 @@ class ResponseTimes:
             "processor_p95_s": _percentile(self._processor, 0.95) if self._processor else None,
             "processor_worst_s": max(self._processor, default=None),
             "slow": sum(taken > self.period_s for taken in self._taken),
+            "uncopied": self.uncopied,
             "over": None if self.limit_s is None else sum(taken > self.limit_s for taken in self._taken),
             "processor": processor_name(),
         }

@@ -25,6 +25,7 @@ CASES = {
     "dodo: 2": ("wrong-value", "'dodo' is '2', expected 1", "write 'dodo: 1'"),
     "timeout: 60": ("wrong-unit", "'timeout': '60' has no unit, expected a time in s", "write for example '60 s'"),
     "timeout: 60 m": ("wrong-unit", None, "write for example '60 s'"),
+    "response: {over: 5 %}": ("missing-key", "'response' has 'over' without 'max'", ""),
     "name: My Test": ("wrong-value", None, "for example 'my-test'"),
     "seed: -1": ("out-of-range", "'seed' is -1, expected 0 to 4294967295", ""),
     "description: ''": ("missing-key", "'description' is empty, expected a string", ""),

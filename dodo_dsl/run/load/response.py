@@ -1,6 +1,6 @@
-"""What the times of answers in lockstep mean: a check where the test sets a limit, else a note."""
+"""What the answers in lockstep mean, by their times: checks where the test asks for them, else a note."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,14 +10,19 @@ from dodo_dsl.run.outcomes import Finding
 
 CHECK = "slow-answers"
 """The check of a test's limit; its value differs from run to run, unlike all others of lockstep."""
+COPIED = "sample-times"
+"""The check that answers carry the sample times of their frames."""
 UNSEEN = "the limit of the time of an answer is not judged, as what containers wait for a processor cannot be seen"
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
 
+_Judged = tuple[str, dict[str, Any]]
+"""Why the application failed, or an empty text; and the check."""
+
 
 @dataclass(frozen=True)
 class JudgedResponse:
-    """What follows from the times of answers."""
+    """What follows from the answers."""
 
     findings: tuple[Finding, ...] = ()
     checks: tuple[dict[str, Any], ...] = ()
@@ -25,23 +30,40 @@ class JudgedResponse:
 
 
 def judged(response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> JudgedResponse:
-    """Judges the times of answers by the limit of the test; ``services`` are the application's."""
+    """Judges the answers by the limits of the test; ``services`` are the application's."""
     if response is None or lockstep is None:
         return JudgedResponse()
-    notes = (_note(response),) if response.slow > MOST_SLOW * response.answers else ()
+    every = [*_times(response, lockstep), *_copies(response, lockstep)]
+    who = services[0] if services else ""
+    findings = tuple(Finding("failed", reason, who) for reason, _ in every if reason)
+    return JudgedResponse(findings, tuple(check for _, check in every), tuple(_notes(response, lockstep)))
+
+
+def _times(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
     if lockstep.max_response_s is None or response.over is None:
-        return JudgedResponse(notes=notes)
+        return
     share, allowed = response.over / response.answers, lockstep.response_over
     if response.processor_median_s is None:  # what a busy machine kept from the application is among these times
-        return JudgedResponse(notes=(*notes, UNSEEN) if share > allowed else notes)
-    check = {"name": CHECK, "value": share, "limit": {"max": allowed}, "unit": "", "ok": share <= allowed}
-    if share <= allowed:
-        return JudgedResponse(checks=(check,), notes=notes)
+        return
     limit = f"{lockstep.max_response_s * 1000:g} ms (at most {allowed * 100:g} %)"
     reason = f"{response.over} of {response.answers} answers took longer than {limit}: {response.in_words()}"
-    return JudgedResponse((Finding("failed", reason, services[0] if services else ""),), (check,), notes)
+    ok = share <= allowed
+    yield "" if ok else reason, {"name": CHECK, "value": share, "limit": {"max": allowed}, "unit": "", "ok": ok}
 
 
-def _note(response: Response) -> str:
-    slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
-    return f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
+def _copies(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
+    if not lockstep.is_copied:
+        return
+    reason = f"{response.uncopied} of {response.answers} answers did not carry the sample time of their frame"
+    ok = response.uncopied == 0
+    check = {"name": COPIED, "value": response.uncopied, "limit": {"max": 0}, "unit": "", "ok": ok}
+    yield "" if ok else reason, check
+
+
+def _notes(response: Response, lockstep: Lockstep) -> Iterator[str]:
+    if response.slow > MOST_SLOW * response.answers:
+        slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
+        yield f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
+    is_unseen = response.processor_median_s is None and response.over is not None
+    if is_unseen and (response.over or 0) > lockstep.response_over * response.answers:
+        yield UNSEEN

@@ -6,7 +6,7 @@ import pytest
 
 from dodo_dsl.outcome import Response
 from dodo_dsl.plan.model import Lockstep
-from dodo_dsl.run.load.response import CHECK, UNSEEN, judged
+from dodo_dsl.run.load.response import CHECK, COPIED, UNSEEN, judged
 
 FAST = Response(60, 0.1, 0.012, 0.02, 0.03, 0.01, 0.015, 0.02, 0, None, "Some CPU, 2000 MHz")
 PLAIN, LIMITED = Lockstep(1, 60.0), Lockstep(1, 60.0, 0.1, 0.1)
@@ -52,3 +52,13 @@ def test_where_processes_cannot_be_seen_a_busy_machine_blames_nobody() -> None:
     found = judged(unseen, LIMITED, [])
     assert (found.findings, found.checks, found.notes) == ((), (), (UNSEEN,))
     assert judged(replace(unseen, over=6), LIMITED, []).notes == ()
+
+
+@pytest.mark.parametrize("uncopied", [0, 1, 60])
+def test_sample_times_have_to_be_copied_where_the_test_says_so(uncopied: int) -> None:
+    found = judged(replace(FAST, uncopied=uncopied), replace(LIMITED, is_copied=True), ["perception"])
+    (check,) = (check for check in found.checks if check["name"] == COPIED)
+    assert (check["value"], check["limit"], check["ok"]) == (uncopied, {"max": 0}, uncopied == 0)
+    reasons = [f"{uncopied} of 60 answers did not carry the sample time of their frame"] if uncopied else []
+    assert [finding.reason for finding in found.findings] == reasons
+    assert judged(replace(FAST, uncopied=uncopied), PLAIN, []).checks == ()

@@ -143,3 +143,16 @@ def test_an_application_is_silent_until_anything_that_matters_comes() -> None:
     assert answers.is_silent
     answers.take(said(PEDAL, ELSEWHEN))
     assert not answers.is_silent
+
+
+@pytest.mark.parametrize("kind", [STEER, BOX, READY])
+def test_all_that_matters_has_to_carry_the_sample_time_of_a_frame_to_be_copied(kind: int) -> None:
+    about = {"relayed": (MessageFilter("box", BOX),), "done": MessageFilter("ready", READY)}
+    answers = answering(said(STEER, FRAME), said(PEDAL, FRAME), said(1, ELSEWHEN), **about)
+    assert answers.is_copied, "also where others that do not matter have times of their own"
+    answers.take(said(kind, ELSEWHEN))
+    assert not answers.is_copied
+    show(answers, NEXT)
+    assert answers.is_copied
+    answers.take(said(STEER, FRAME))
+    assert answers.is_copied, "it is late, but copied"
