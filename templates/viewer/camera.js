@@ -5,8 +5,9 @@ dodo.camera = (function () {
   const { test, at, channels, field } = dodo.data;
   const { make } = dodo.dom;
   const videos = test.videos.filter((each) => each.file).map((each) => ({ ...each, times: Float32Array.from(each.times) }));
-  const LOOKS = { hit: ["passed", []], false: ["warned", [2, 3]], missed: ["failed", [6, 4]] };
+  const LOOKS = { hit: [], false: [2, 3], missed: [6, 4] };
   const NAMES = { hit: "right", false: "false", missed: "missed" };
+  const SAME = 1e-3;
   let chosen = 0;
   let screen = null;
 
@@ -25,10 +26,9 @@ dodo.camera = (function () {
   };
 
   function outline(context, each, kind, place) {
-    const [colour, dash] = LOOKS[kind];
-    context.strokeStyle = dodo.canvas.colour(colour);
+    context.strokeStyle = dodo.canvas.colour(kind);
     context.lineWidth = kind === "hit" ? 1.5 : 2.2;
-    context.setLineDash(dash);
+    context.setLineDash(LOOKS[kind]);
     context.strokeRect(place.x + each.x * place.width, place.y + each.y * place.height, each.width * place.width, each.height * place.height);
     context.setLineDash([]);
   }
@@ -43,11 +43,9 @@ dodo.camera = (function () {
     const y = place.y + each.y * place.height - 4;
     if (written.some((other) => x < other.x + other.width && other.x < x + width && Math.abs(y - other.y) < 11)) return;
     written.push({ x, y, width });
-    context.fillStyle = dodo.canvas.colour("paper");
-    context.globalAlpha = 0.8;
+    context.fillStyle = dodo.canvas.colour("label");
     context.fillRect(x - 2, y - 10, width + 4, 13);
-    context.globalAlpha = 1;
-    context.fillStyle = dodo.canvas.colour(LOOKS[kind][0]);
+    context.fillStyle = dodo.canvas.colour(kind);
     context.fillText(text, x, y);
   }
 
@@ -55,20 +53,28 @@ dodo.camera = (function () {
     const ratio = shape();
     const wide = Math.min(width, height * ratio);
     const place = { x: (width - wide) / 2, y: (height - wide / ratio) / 2, width: wide, height: wide / ratio };
-    context.fillStyle = dodo.canvas.colour("panel");
+    context.fillStyle = dodo.canvas.colour("screen");
     context.fillRect(place.x, place.y, place.width, place.height);
-    if (screen && screen.readyState > 1) context.drawImage(screen, place.x, place.y, place.width, place.height);
     const frame = dodo.detection.at(dodo.cursor.time());
+    const isThere = screen && screen.readyState > 1 && pictured(dodo.cursor.time(), frame) >= 0;
+    if (isThere) context.drawImage(screen, place.x, place.y, place.width, place.height);
     if (!frame) return;
     const written = [];
     for (const kind of Object.keys(LOOKS)) for (const each of frame[kind]) outline(context, each, kind, place);
     for (const kind of ["missed", "false", "hit"]) for (const each of frame[kind]) write(context, each, kind, place, written);
   }
 
+  // The number of the picture to show: of the frame whose boxes are shown, or else the last one; -1 where there is none.
+  function pictured(time, frame) {
+    const { times } = videos[chosen];
+    const n = at(times, (frame ? frame.time : time) + SAME);
+    return n >= 0 && frame && Math.abs(times[n] - frame.time) > SAME ? -1 : n;
+  }
+
   function seek(time) {
     const { times } = videos[chosen];
-    const n = Math.max(at(times, time + 1e-3), 0);
-    screen.currentTime = times[n] - times[0] + 1e-3;
+    const n = Math.max(pictured(time, dodo.detection.at(time)), 0);
+    screen.currentTime = times[n] - times[0] + SAME;
   }
 
   function film(canvas) {
@@ -79,9 +85,11 @@ dodo.camera = (function () {
 
   function caption(time) {
     const frame = dodo.detection.at(time);
-    if (!frame) return "";
+    const n = videos.length ? pictured(time, frame) : -1;
+    if (!frame) return n < 0 ? "no picture yet" : `picture of ${videos[chosen].times[n].toFixed(2)} s`;
     const counts = Object.keys(LOOKS).map((kind) => `${frame[kind].length} ${NAMES[kind]}`);
-    return `frame at ${frame.time.toFixed(2)} s: ${frame.isKnown ? counts.join(", ") : "no true boxes are known"}`;
+    const boxes = `frame at ${frame.time.toFixed(2)} s: ${frame.isKnown ? counts.join(", ") : "no true boxes are known"}`;
+    return videos.length && n < 0 ? `${boxes}; its picture was not recorded` : boxes;
   }
 
   function chooser(canvas) {

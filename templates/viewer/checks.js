@@ -33,7 +33,7 @@ dodo.checks = (function () {
   }
 
   function show(parent) {
-    const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok);
+    const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok || (a.value === null) - (b.value === null));
     parent.append(make("h2", {}, "Checks"));
     if (!all.length) parent.append(make("p", { class: "nothing" }, "No evaluator measured anything."));
     const judged = all.filter((check) => Object.keys(check.limit).length || !check.ok);

@@ -113,6 +113,9 @@ def test_a_frame_is_shown_with_its_boxes(page: Page) -> None:
         page.wait(f"Math.round(dodo.camera.screen().currentTime * 10) === {shown} && !dodo.camera.screen().seeking")
         page.wait("true")
         assert middle(page, ".view canvas") == pytest.approx(10 * shown, abs=6), time
+    page.value("dodo.cursor.move(1.5)")
+    page.wait("document.querySelector('.view').innerText.includes('its picture was not recorded')")
+    assert middle(page, ".view canvas") == pytest.approx(64, abs=3)
 
 
 @pytest.mark.parametrize("page", ["missed cones"], indirect=True)
