@@ -17,7 +17,8 @@ dodo.geometry = (function () {
     const dy = y2 - y1;
     const size = dx * dx + dy * dy;
     const share = size ? Math.min(1, Math.max(0, ((x - x1) * dx + (y - y1) * dy) / size)) : 0;
-    return Math.hypot(x - x1 - share * dx, y - y1 - share * dy);
+    const [ax, ay] = [x - x1 - share * dx, y - y1 - share * dy];
+    return Math.sqrt(ax * ax + ay * ay);
   }
 
   const side = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -41,16 +42,25 @@ dodo.geometry = (function () {
     return least;
   }
 
-  // The smallest distance of a vehicle to any of the lines.
+  // Lines with the circles around them, by which most are left out.
+  function circled(lines) {
+    return lines.map((line) => {
+      const [x1, y1, x2, y2] = line;
+      return { line, x: (x1 + x2) / 2, y: (y1 + y2) / 2, reach: Math.hypot(x2 - x1, y2 - y1) / 2 };
+    });
+  }
+
+  // The smallest distance of a vehicle to any of the circled lines.
   function margin(pose, length, width, lines) {
     const ring = corners(pose, length, width);
     const reach = Math.hypot(length, width) / 2;
     let least = Infinity;
-    for (const line of lines) {
-      if (toSegment(pose.x, pose.y, line) - reach < least) least = Math.min(least, distance(ring, line));
+    for (const each of lines) {
+      const [dx, dy, far] = [each.x - pose.x, each.y - pose.y, least + reach + each.reach];
+      if (dx * dx + dy * dy < far * far) least = Math.min(least, distance(ring, each.line));
     }
     return least;
   }
 
-  return { corners, margin };
+  return { corners, circled, margin };
 })();

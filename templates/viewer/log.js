@@ -8,12 +8,13 @@ dodo.log = (function () {
   const times = lines.map(([time]) => time);
   const timed = times.filter((time) => time !== null);
   let rows = [];
-  let current = null;
+  let current = -1;
 
   function row([time, service, level, text]) {
     const when = make("time", {}, time === null ? "–" : time.toFixed(2));
     const move = () => time !== null && dodo.cursor.move(time);
-    return make("p", { class: level, onclick: move }, when, make("b", { title: services[service] }, services[service]), make("span", {}, text));
+    const state = time === null ? level : `${level} later`;
+    return make("p", { class: state, onclick: move }, when, make("b", { title: services[service] }, services[service]), make("span", {}, text));
   }
 
   function isShown([, service, level, text]) {
@@ -23,21 +24,20 @@ dodo.log = (function () {
 
   function filter(list) {
     lines.forEach((line, n) => rows[n].classList.toggle("hidden", !isShown(line)));
-    follow(list, dodo.cursor.time());
+    follow(list, dodo.cursor.time(), true);
   }
 
   // The last line that is shown until a time; one without a time is never current.
-  function follow(list, time) {
+  function follow(list, time, isFiltered) {
     let n = dodo.data.at(timed, time + 0.005);
     while (n >= 0 && rows[n].classList.contains("hidden")) n--;
-    const next = n >= 0 ? rows[n] : null;
-    if (next !== current) {
-      if (current) current.classList.remove("now");
-      if (next) next.classList.add("now");
-      current = next;
-    }
-    if (current) list.scrollTop = current.offsetTop - list.offsetTop - list.clientHeight * 0.7;
-    else list.scrollTop = 0;
+    if (n === current && !isFiltered) return;
+    if (current >= 0) rows[current].classList.remove("now");
+    if (n >= 0) rows[n].classList.add("now");
+    for (let each = Math.min(n, current) + 1; each <= Math.max(n, current); each++) rows[each].classList.toggle("later", each > n);
+    current = n;
+    const place = rows[Math.max(n, 0)];
+    list.scrollTop = place ? place.offsetTop - list.offsetTop - list.clientHeight * 0.7 : 0;
   }
 
   function controls(list) {

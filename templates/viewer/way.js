@@ -37,7 +37,7 @@ dodo.way = (function () {
   }
 
   function margins() {
-    const walls = test.scene.lines.filter((each) => each.role === "wall").flatMap((each) => each.lines);
+    const walls = dodo.geometry.circled(test.scene.lines.filter((each) => each.role === "wall").flatMap((each) => each.lines));
     if (!walls.length) return new Float32Array(0);
     return Float32Array.from(poses, (each) => dodo.geometry.margin(each, length, width, walls));
   }

@@ -87,12 +87,10 @@ def _test_times(walls: Sequence[int], test: RecordedTest) -> list[float]:
     """Times of the machine in the test's: within a test as messages tell it, else by the machine's clock."""
     if not len(test.walls):
         return [(wall - test.begin) / MICROSECONDS if test.begin else 0.0 for wall in walls]
-    inside = np.interp(walls, test.walls, test.moments)
-    before = (np.array(walls, np.float64) - test.walls[0]) / MICROSECONDS
-    after = test.moments[-1] + (np.array(walls, np.float64) - test.walls[-1]) / MICROSECONDS
-    times: list[float] = np.where(
-        before < 0, before, np.where(after > test.moments[-1], test.duration, inside)
-    ).tolist()
+    arrived = np.array(walls, np.float64)
+    inside = np.where(arrived > test.walls[-1], test.duration, np.interp(arrived, test.walls, test.moments))
+    before = (arrived - test.walls[0]) / MICROSECONDS
+    times: list[float] = np.where(before < 0, before, np.minimum(inside, test.duration)).tolist()
     return times
 
 
@@ -107,7 +105,8 @@ def _said(line: str) -> str:
         return line
     if kind == "verdict":
         return f"verdict: {message.get('outcome')}: {message.get('reason')}"
-    return "" if kind in ("time", "response") else str(message.get("reason") or message.get("text") or kind)
+    told = message.get("reason") or message.get("text")
+    return str(told or (kind if kind in ("ready", "end-of-input") else ""))
 
 
 def _level(line: str, before: str) -> str:

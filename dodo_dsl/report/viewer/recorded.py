@@ -110,7 +110,7 @@ class _Clock:
         walls, moments = np.concatenate(self._walls), np.concatenate(self._moments)
         known = (walls > 0) & (np.abs(walls - self._begin) > _FAR * MICROSECONDS)
         if not known.any():  # in real time both are one; in lockstep departures may be the test's, too
-            return np.array([self._begin, self._begin + 1.0]), np.array([0.0, 1 / MICROSECONDS])
+            return np.array([self._begin, self._begin + _FAR * MICROSECONDS]), np.array([0.0, _FAR])
         walls, moments = walls[known], moments[known]
         order = np.argsort(walls, kind="stable")
         walls, moments = walls[order], np.maximum.accumulate(moments[order])

@@ -62,13 +62,13 @@ def outcome_of(drive: MadeDrive, slug: str) -> Outcome:
     return replace(plain, **drive.outcome)
 
 
-def record(path: Path, drive: MadeDrive) -> None:
+def record(path: Path, drive: MadeDrive, epoch: int = EPOCH, speed: float = SPEED) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with RecordingWriter(path) as writer:
         begin = [(0.0, "dodo.TestBegin", 0, {})]
         end = [(drive.duration, "dodo.RecordingEnd", 0, {})]
         for time, name, sender, fields in (*begin, *sorted(drive.samples, key=lambda s: s[0]), *end):
-            sampled, wall = EPOCH + round(time * 1e6), WALL + round(time * 1e6 / SPEED)
+            sampled, wall = epoch + round(time * 1e6), WALL + round(time * 1e6 / speed)
             payload = MESSAGES.encode(MESSAGES.type(name)(**fields))
             writer.write(Envelope(MESSAGES.id(name), payload, wall, wall, sampled, sender))
 

@@ -105,3 +105,26 @@ def set_up_failed() -> MadeDrive:
     lines = [(0.0, "virtual-camera: CRITICAL: the map has no model 'cone_green'")]
     outcome = {"reason": reason, "outcome": "error", "last_lines": (lines[0][1],)}
     return MadeDrive("sil-closed-straight", 0.0, [], outcome, {"environment.camera": lines})
+
+
+def false_detections() -> MadeDrive:
+    """Three of the detections at 1.2 s are of nothing; no picture was recorded."""
+    time, reason = 1.2, "precision is 0.91 (at least 0.95), with 3 false detections beside 32 found"
+    samples = [sample for number in range(16) for sample in boxes(number / 10, 9, [("yellow", 0.2, 0.5)])]
+    for number in range(16):
+        wrong = [("yellow", n / 5, 0.1) for n in range(3)] if number / 10 == time else []
+        samples += boxes(number / 10, 0, [("yellow", 0.2, 0.5), *wrong])
+    said = verdict("cones", reason, time=time, found=1, false=3, missed=0)
+    checks = (check("precision", 0.91, False, min=0.95),)
+    outcome = {"reason": reason, "kind": "perception", "checks": checks, "verdicts": (said,)}
+    return MadeDrive("sil-perception--light-0-45--clutter-0", 1.5, samples, outcome)
+
+
+def interrupted() -> MadeDrive:
+    samples = [*poses(lambda t: (0.0, 0.5 * t, math.pi / 2), 0.9), *requests(lambda t: 0.0, 0.9)]
+    return MadeDrive("sil-closed-straight", 0.9, samples, {"reason": "the run was interrupted", "outcome": "error"})
+
+
+def rig_refused() -> MadeDrive:
+    reason = "rig 'emulated' is in quarantine: its pictures do not change; dodo rig clear emulated"
+    return MadeDrive("hil-dynamic", 0.0, [], {"reason": reason, "outcome": "error", "level": "hil"})

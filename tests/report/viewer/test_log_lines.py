@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.report.viewer import log_lines
+from dodo_dsl.report.viewer import log_lines, recorded
 from dodo_dsl.report.viewer.recorded import RecordedTest
+from tests.report.viewer.drives import MESSAGES, WALL, MadeDrive, record
 
 LOCKSTEP = RecordedTest((), 3.0, 1_000, np.array([5e9, 5e9 + 1e6]), np.array([0.0, 2.0]))
 """Two seconds of the test in one of the machine."""
@@ -36,6 +37,15 @@ def test_lines_of_services_are_merged_in_the_tests_time(tmp_path: Path) -> None:
         (3.0, "a", "end"),
         (None, "c", "untimed"),
     ]
+
+
+def test_in_real_time_both_clocks_are_one(tmp_path: Path) -> None:
+    samples = [(n / 10, "opendlv.proxy.PedalPositionRequest", 0, {"position": 0.1}) for n in range(10)]
+    made = MadeDrive("x", 1.0, samples, {})
+    record(tmp_path / "test.rec", made, epoch=WALL, speed=1.0)
+    test = recorded.read(tmp_path / "test.rec", MESSAGES)
+    write(tmp_path, "application.a", *[(WALL + n, b"x\n") for n in (-500_000, 250_000, 750_000, 2_000_000)])
+    assert [time for time, *_ in log_lines.merged(tmp_path, test)["lines"]] == [-0.5, 0.25, 0.75, 1.0]
 
 
 @pytest.mark.parametrize(
