@@ -1,0 +1,31 @@
+"""Writing a page loads no plotting library, and no video library where there are no pictures."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.report.viewer import drives, failures
+from tests.report.viewer.drives import GOLDEN, ROOT
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from dodo_dsl.plan.plan_json import from_json
+from dodo_dsl.report import results
+from dodo_dsl.report.viewer import page
+report, plan = map(Path, sys.argv[1:])
+outcome, = results.load(report / "results.json")
+page.write_shared(report)
+page.write(report / outcome.slug, outcome, from_json(plan.read_text()), report.parent / "compiled")
+print(sorted({"av", "cv2", "matplotlib", "PIL", "shapely"} & set(sys.modules)))
+"""
+
+
+def test_a_page_is_cheap_to_write(tmp_path: Path) -> None:
+    drive = failures.wall_hit()
+    drives.write(tmp_path / "report", [drive])
+    before = (tmp_path / "report" / "test-0" / "drive.js").read_bytes()
+    words = [sys.executable, "-c", SCRIPT, tmp_path / "report", GOLDEN / drive.slug / "test.json"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+    assert (tmp_path / "report" / "test-0" / "drive.js").read_bytes() == before
