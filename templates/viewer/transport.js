@@ -38,11 +38,15 @@ dodo.transport = (function () {
     const speed = make("select", { "aria-label": "Speed" }, ...[0.1, 0.25, 0.5, 1, 2, 5].map((each) => make("option", { value: each, selected: each === 1 }, `${each}×`)));
     speed.addEventListener("change", () => cursor.setSpeed(Number(speed.value)));
     const time = make("output", {});
+    const line = make("div", { class: "line" }, slider, mark);
+    const timeline = make("div", { class: "slider" });
+    dodo.film.show(timeline);
+    timeline.append(line);
     parent.append(
       play,
       button("‹", "Back 0.1 s (left arrow; with shift 1 s)", () => cursor.move(cursor.time() - STEP)),
       button("›", "On 0.1 s (right arrow; with shift 1 s)", () => cursor.move(cursor.time() + STEP)),
-      make("span", { class: "slider" }, slider, mark),
+      timeline,
       time,
       speed,
       button("What decided", `${seconds(moment.time)}: ${moment.what} (D)`, () => cursor.move(moment.time)),

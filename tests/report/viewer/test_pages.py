@@ -116,6 +116,14 @@ def test_a_frame_is_shown_with_its_boxes(page: Page) -> None:
         page.wait(f"Math.round(dodo.camera.screen().currentTime * 10) === {shown} && !dodo.camera.screen().seeking")
         page.wait("true")
         assert middle(page, ".view canvas") == pytest.approx(10 * shown, abs=6), time
+    page.wait("dodo.film.pictures.length === 16")
+    strip = page.value("(b => [b.x, b.y, b.width])(document.querySelector('.slider canvas').getBoundingClientRect())")
+    page.wait("true")
+    row = page.pixels()[int(strip[1]) + 20].mean(axis=1)
+    parts = [row[int(strip[0] + (n + 0.5) / 16 * strip[2])] for n in range(16)]
+    assert parts == pytest.approx([10 * math.floor((n + 0.5) / 16 * 15) for n in range(16)], abs=8)
+    page.click(strip[0] + strip[2] / 2, strip[1] + 20)
+    assert page.value("dodo.cursor.time()") == pytest.approx(0.75, abs=0.01)
     page.value("dodo.cursor.move(1.5)")
     page.wait("document.querySelector('.view').innerText.includes('its picture was not recorded')")
     assert middle(page, ".view canvas") == pytest.approx(64, abs=3)
