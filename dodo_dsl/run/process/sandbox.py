@@ -37,7 +37,7 @@ from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
 from dodo_dsl.run.process.confined.confined_process import ConfinedProcess, user_of
-from dodo_dsl.run.process.confined.confinement import Confinement
+from dodo_dsl.run.process.confined.confinement import INTERPRETER, Confinement
 from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
 from dodo_dsl.run.process.confined.places import Places
 from dodo_dsl.run.process.confined.seccomp_filter import NoSeccomp
@@ -152,7 +152,7 @@ class Sandbox:
                 places = Places(user_of(0))
                 environment = {"PATH": os.defpath}
                 true = ConfinedProcess(
-                    ["true"], environment, output.fileno(), Confinement("/usr", "network", 0), places
+                    ["true"], environment, output.fileno(), Confinement("/usr", "network", 0, INTERPRETER), places
                 )
                 code = true.wait()
             except (OSError, subprocess.SubprocessError, NoSeccomp) as error:

@@ -76,7 +76,7 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
     for path in read:
         seen += ["--ro-bind-try", path, path]
     seen += ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
-    seen += ["--bind", str(mounts.home), HOME, "--setenv", "HOME", HOME]
+    seen += ["--bind", str(mounts.home), HOME]
     for path in confined.hidden:
         if Path(path).is_dir():
             seen += ["--tmpfs", path, "--remount-ro", path]

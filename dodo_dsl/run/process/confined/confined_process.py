@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl.run.process import namespaces
-from dodo_dsl.run.process.confined import bubblewrap, seccomp_filter
+from dodo_dsl.run.process.confined import bubblewrap, launcher, seccomp_filter
 from dodo_dsl.run.process.confined.confinement import FIRST_USER, Confinement
 from dodo_dsl.run.process.confined.places import Places
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -40,26 +40,29 @@ class ConfinedProcess:
         program = _found(words[0], environment, confined.folder)
         user = user_of(confined.cid) if places else None
         mounts = bubblewrap.Mounts(*places.folder(confined.folder), places.home, places.tmp) if places else None
+        given = {**environment, "PWD": confined.folder, **({"HOME": bubblewrap.HOME} if mounts else {})}
         self._status, status = os.pipe()
         filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)
+        source = launcher.variables(given)
+        sandbox = bubblewrap.words(confined, mounts, program, user, filter_fd, status)
         try:
             self._process = subprocess.Popen(
-                [*bubblewrap.words(confined, mounts, program, user, filter_fd, status), *words],
-                env=dict(environment),
+                [*sandbox, *launcher.words(source, program), *words],
+                env={"PATH": os.environ.get("PATH", os.defpath)},
                 cwd=confined.folder,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
                 start_new_session=True,
-                pass_fds=(filter_fd, status),
+                pass_fds=(filter_fd, status, source),
                 preexec_fn=functools.partial(_limit, confined.limits, os.getpid()),  # noqa: PLW1509  (it has one thread)
             )
         except BaseException:
             os.close(self._status)
             raise
         finally:
-            os.close(status)
-            os.close(filter_fd)
+            for descriptor in (status, filter_fd, source):
+                os.close(descriptor)
         self.pid = self._process.pid
         self.memory = confined.limits.memory
         self.failed = False

@@ -9,6 +9,8 @@ from typing import Any
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _PACKAGE = Path(__file__).resolve().parents[3]
+INTERPRETER = tuple(dict.fromkeys((sys.prefix, sys.base_prefix)))
+"""The folders of this Python, which starts the application's programs."""
 FIRST_USER = 64_000
 """Where DoDo runs as root, a test's application has this user plus its CID."""
 
@@ -43,5 +45,5 @@ def confinement(folder: Path, isolation: str, cid: int, limits: SandboxLimits, h
     """The confinement of an application; of the ``hidden`` folders those matter that lie below its own."""
     reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
     inside = [str(path) for path in hidden if path != folder and path.is_relative_to(folder)]
-    python = [sys.prefix, sys.base_prefix, str(_PACKAGE)]
-    return Confinement(str(folder), isolation, cid, (*dict.fromkeys([*python, *reads]),), (*inside,), limits)
+    every = dict.fromkeys([*INTERPRETER, str(_PACKAGE), *reads])
+    return Confinement(str(folder), isolation, cid, tuple(every), (*inside,), limits)
