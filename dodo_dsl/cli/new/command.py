@@ -14,7 +14,7 @@ from dodo_dsl.cli.new import scaffold, starts
 from dodo_dsl.cli.new.destination import Destination, destination
 from dodo_dsl.cli.new.new_file import New
 from dodo_dsl.cli.new.questions import Questions, Wanted
-from dodo_dsl.cli.new.repository_files import COMPOSE_FILES, deployment_files
+from dodo_dsl.cli.new.repository_files import COMPOSE_FILES, REGISTRY, application_files, deployment_files
 from dodo_dsl.cli.new.shipped_copy import copied_files
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import shown_path
@@ -26,8 +26,11 @@ EXAMPLES = """examples:
   dodo new hil-my-curve --level hil                    the same on a rig, at first the emulated one
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
+  dodo new --application                               an application that drives, with a test that it passes
   dodo new --deployment                                dodo.yml, application and pipeline in this folder
 """
+
+_FIRST = "sil-first"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -36,13 +39,22 @@ def add(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--deployment", action="store_true", help="write what a repository with tests needs into this folder"
     )
+    what.add_argument(
+        "--application",
+        action="store_true",
+        help="write a small application, its pipeline and a first test that it passes",
+    )
     parser.add_argument("--level", choices=LEVELS, help="level of the new test (default: sil)")
     parser.add_argument("--kind", choices=KINDS, help="kind of the new test (default: closed-loop)")
     parser.add_argument("--extends", metavar="TEST", help="test that the new one changes; a shipped one is copied")
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    return _deployment(options, stdout) if options.deployment else _test(options, stdout)
+    if options.deployment or options.application:
+        if options.level or options.kind or options.extends:
+            raise UsageError("--level, --kind and --extends apply to a test, not to --deployment and --application")
+        return _deployment(stdout) if options.deployment else _application(stdout)
+    return _test(options, stdout)
 
 
 @dataclass(frozen=True)
@@ -113,9 +125,24 @@ def _from_another(name: str, base_name: str, tests: _Tests, place: Destination, 
     return copied_files(name, instances, tests.shipped.manifests, place.registry, place.root), note
 
 
-def _deployment(options: argparse.Namespace, stdout: TextIO) -> int:
-    if options.level or options.kind or options.extends:
-        raise UsageError("--level, --kind and --extends apply to a test, not to --deployment")
+def _application(stdout: TextIO) -> int:
+    root = Path.cwd()
+    own = application_files(root)
+    first = scaffold.test_files(_FIRST, starts.start(starts.LEVEL, starts.KIND).template, root / REGISTRY, root)
+    there = [
+        path for path in (*(file.path for file in (*own, *first)), *(root / n for n in COMPOSE_FILES)) if path.exists()
+    ]
+    if there:
+        advice = "dodo new --deployment keeps what there is"
+        raise UsageError(f"'{shown_path(str(there[0]))}' exists already; nothing was written; {advice}")
+    made = {file.path for file in own}
+    files = [*own, *(f for f in deployment_files(root) if f.path not in made and not f.path.exists()), *first]
+    _write(files, stdout)
+    _next([f"dodo run {_FIRST}", "make steering.py and the test yours", "commit and push; GitLab runs it"], stdout)
+    return Exit.OK
+
+
+def _deployment(stdout: TextIO) -> int:
     files = deployment_files(Path.cwd())
     there = [file for file in files if file.path.exists()]
     _write([file for file in files if file not in there], stdout)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dodo_dsl import package_data
+from dodo_dsl import __version__, package_data
 from dodo_dsl.cli.new.new_file import New, filled
 from dodo_dsl.spec.deployment.deployment import FILE_NAME
 
@@ -36,6 +36,16 @@ def _schemas(root: Path) -> list[New]:
 def dodo_yml(root: Path, application: str) -> New:
     """A dodo.yml; ``application`` is the name of its compose file, empty when there is none yet."""
     return New(root / FILE_NAME, filled("deployment/dodo.yml", application=application, registry=REGISTRY))
+
+
+def application_files(root: Path) -> list[New]:
+    """A small application that drives, and how it starts."""
+    image = f"dodo/vision:{__version__}"
+    return [
+        New(root / "steering.py", filled("application/steering.py")),
+        New(root / COMPOSE_FILES[0], filled("application/docker-compose.yml")),
+        New(root / "Dockerfile", filled("application/Dockerfile", base=image)),
+    ]
 
 
 def deployment_files(root: Path) -> list[New]:

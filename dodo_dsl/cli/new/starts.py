@@ -62,7 +62,8 @@ def listing(shipped: Sequence[Spec]) -> str:
         + _table(rows)
         + "\nor as a copy of a test that ships with DoDo\n"
         + _table(copies)
-        + "\ndodo new --deployment writes what a repository needs beside its tests; dodo new --help says more\n"
+        + "\ndodo new --application writes an application and a test that it passes, dodo new --deployment what a\n"
+        + "repository needs beside its application and its tests; dodo new --help says more\n"
     )
 
 

@@ -1,7 +1,9 @@
 """``dodo new``: what it writes compiles at once, and nothing that is there changes."""
 
+import os
 import re
 import shutil
+import subprocess
 import sys
 from io import StringIO
 from pathlib import Path
@@ -16,6 +18,7 @@ from dodo_dsl.cli.new.starts import kinds
 from dodo_dsl.compiler import load
 from dodo_dsl.spec.model import LEVELS
 from tests.cli.terminal import Terminal
+from tests.test_documentation import PROGRAM
 
 
 def dodo(*words: str) -> tuple[int, str, str]:
@@ -286,6 +289,37 @@ def test_an_installed_dodo_is_no_folder_of_the_repository(repository: Path, monk
     code, out, err = dodo("new", "first")
     assert (code, out) == (2, "")
     assert err.startswith("dodo new: dodo.yml names no folder for own tests; ")
+
+
+def test_an_application_is_written_with_its_test(empty: Path) -> None:
+    (empty / ".gitignore").write_text("mine\n")
+    code, out, err = dodo("new", "--application")
+    assert (code, err) == (0, "")
+    assert {line.removeprefix("wrote ") for line in out.splitlines() if line.startswith("wrote ")} == {
+        *contents(empty).keys() - {".gitignore"}
+    }
+    assert (empty / "steering.py").read_text() == PROGRAM
+    assert (empty / ".gitignore").read_text() == "mine\n"
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+
+
+@pytest.mark.slow
+def test_the_application_passes_its_test(empty: Path) -> None:
+    assert dodo("new", "--application")[0] == 0
+    command = [sys.executable, "-m", "dodo_dsl", "run", "sil-first"]
+    environment = {**os.environ, "PYTHONPATH": str(package_data.root()), "DODO_LEASES": str(empty / "leases")}
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "PASSED  sil-first  reached finish after " in result.stdout
+
+
+@pytest.mark.parametrize("there", ["compose.yaml", "steering.py", "Dockerfile", "tests/sil-first/README.md"])
+def test_an_application_that_is_there_stays(empty: Path, there: str) -> None:
+    (empty / there).parent.mkdir(parents=True, exist_ok=True)
+    (empty / there).write_text("mine")
+    code, out, err = dodo("new", "--application")
+    assert (code, out, contents(empty)) == (2, "", {there: b"mine"})
+    assert err.startswith(f"dodo new: '{there}' exists already; nothing was written")
 
 
 def test_a_deployment_is_written_once(repository: Path) -> None:
