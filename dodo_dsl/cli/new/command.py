@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -13,9 +12,10 @@ from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.new import scaffold, starts
 from dodo_dsl.cli.new.destination import Destination, destination
 from dodo_dsl.cli.new.new_file import New
+from dodo_dsl.cli.new.new_repository import new_application, new_deployment
 from dodo_dsl.cli.new.questions import Questions, Wanted
-from dodo_dsl.cli.new.repository_files import COMPOSE_FILES, REGISTRY, application_files, deployment_files
 from dodo_dsl.cli.new.shipped_copy import copied_files
+from dodo_dsl.cli.new.writing import say_next, write
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.spec.model import KINDS, LEVELS, Spec
@@ -25,12 +25,11 @@ EXAMPLES = """examples:
   dodo new sil-my-curve                                a closed-loop simulation that compiles
   dodo new hil-my-curve --level hil                    the same on a rig, at first the emulated one
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
+  dodo new dil-mine --level dil --rec drive.rec        a recording of one's own, and its signal as the target
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --deployment                                dodo.yml, application and pipeline in this folder
 """
-
-_FIRST = "sil-first"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -47,13 +46,17 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--level", choices=LEVELS, help="level of the new test (default: sil)")
     parser.add_argument("--kind", choices=KINDS, help="kind of the new test (default: closed-loop)")
     parser.add_argument("--extends", metavar="TEST", help="test that the new one changes; a shipped one is copied")
+    parser.add_argument(
+        "--rec", metavar="FILE.rec", type=Path, help="recording that a new dil test plays, and takes its target from"
+    )
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.deployment or options.application:
-        if options.level or options.kind or options.extends:
-            raise UsageError("--level, --kind and --extends apply to a test, not to --deployment and --application")
-        return _deployment(stdout) if options.deployment else _application(stdout)
+        if options.level or options.kind or options.extends or options.rec:
+            words = "--level, --kind, --extends and --rec"
+            raise UsageError(f"{words} apply to a test, not to --deployment and --application")
+        return new_deployment(stdout) if options.deployment else new_application(stdout)
     return _test(options, stdout)
 
 
@@ -75,9 +78,20 @@ class _Tests:
         return [spec for spec in self.checked.specs if not package_data.is_shipped(spec.location.root, self.root)]
 
 
+def _refuse_contradictions(options: argparse.Namespace) -> None:
+    if options.extends and (options.level or options.kind or options.rec):
+        raise UsageError("--level, --kind and --rec do not apply with --extends: they are those of the extended test")
+    if options.rec and options.level not in (None, "dil"):
+        raise UsageError(f"a recording is played at level dil, not {options.level}")
+    if options.rec and options.kind not in (None, "open-loop"):
+        hint = "; a perception test needs true boxes as well, see --extends dil-static-rig" * (
+            options.kind != "closed-loop"
+        )
+        raise UsageError(f"--rec begins an open-loop test, not a {options.kind} one{hint}")
+
+
 def _test(options: argparse.Namespace, stdout: TextIO) -> int:
-    if options.extends and (options.level or options.kind):
-        raise UsageError("--level and --kind do not apply with --extends: they are those of the extended test")
+    _refuse_contradictions(options)
     checked = load([])
     tests = _Tests(checked, load([package_data.registry()]), checked.deployment.root.resolve())
     taken = [spec.location.stem for spec in checked.specs]
@@ -85,7 +99,7 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
         stdout.write(starts.listing(tests.shipped.specs))
         return Exit.USAGE
     place = destination(checked)
-    wanted = Wanted(options.name or "", options.level or "", options.kind or "", options.extends or "")
+    wanted = Wanted(options.name or "", options.level or "", options.kind or "", options.extends or "", options.rec)
     if options.name is None:
         questions = Questions(sys.stdin, stdout, lambda name: scaffold.check_name(name, taken))
         wanted = questions.ask(tests.shipped.specs, wanted)
@@ -94,16 +108,23 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
     there = [file.path for file in made if file.path.exists()]
     if there:
         raise UsageError(f"'{shown_path(str(there[0]))}' exists already; nothing was written")
-    _write([*place.files, *made], stdout)
+    write([*place.files, *made], stdout)
     stdout.write(note)
     todo = [place.todo] if place.todo else []
     spec = shown_path(str(made[0].path))
-    _next([f"make {spec} yours", "dodo compile --check", *todo, f"dodo run {wanted.name}"], stdout)
+    say_next([f"make {spec} yours", "dodo compile --check", *todo, f"dodo run {wanted.name}"], stdout)
     return Exit.OK
 
 
 def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New], str]:
     """The test's own files, its spec first; with a note for the user."""
+    if wanted.rec:
+        from dodo_dsl.cli.new import recorded_drive  # slow to load, and rarely needed
+
+        declared = tests.checked.application.declared.values() if tests.checked.application else ()
+        sent = {name.partition("/")[0] for own in declared if own for name, _ in own.outputs}
+        drive = recorded_drive.look(wanted.rec, sent)
+        return recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root)
     if wanted.extends:
         note = f"copied, because '{wanted.extends}' ships with DoDo and a test extends only tests of its own registry\n"
         return _from_another(wanted.name, wanted.extends, tests, place, note)
@@ -123,49 +144,3 @@ def _from_another(name: str, base_name: str, tests: _Tests, place: Destination, 
         return scaffold.extending_files(name, base, place.root), ""
     instances = [spec for spec in tests.copied if spec.path == base.path]
     return copied_files(name, instances, tests.shipped.manifests, place.registry, place.root), note
-
-
-def _application(stdout: TextIO) -> int:
-    root = Path.cwd()
-    own = application_files(root)
-    first = scaffold.test_files(_FIRST, starts.start(starts.LEVEL, starts.KIND).template, root / REGISTRY, root)
-    there = [
-        path for path in (*(file.path for file in (*own, *first)), *(root / n for n in COMPOSE_FILES)) if path.exists()
-    ]
-    if there:
-        advice = "dodo new --deployment keeps what there is"
-        raise UsageError(f"'{shown_path(str(there[0]))}' exists already; nothing was written; {advice}")
-    made = {file.path for file in own}
-    files = [*own, *(f for f in deployment_files(root) if f.path not in made and not f.path.exists()), *first]
-    _write(files, stdout)
-    _next([f"dodo run {_FIRST}", "make steering.py and the test yours", "commit and push; GitLab runs it"], stdout)
-    return Exit.OK
-
-
-def _deployment(stdout: TextIO) -> int:
-    files = deployment_files(Path.cwd())
-    there = [file for file in files if file.path.exists()]
-    _write([file for file in files if file not in there], stdout)
-    for file in there:
-        stdout.write(f"kept: {shown_path(str(file.path))}\n")
-    if len(there) == len(files):
-        stdout.write("\nnothing to write\n")
-        return Exit.OK
-    steps = [f"name your services in {next(f.path.name for f in files if f.path.name in COMPOSE_FILES)}"]
-    if any(file.path.name == ".gitlab-ci.yml" for file in there):
-        steps.append("include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml")
-    _next([*steps, "dodo new sil-first", "dodo compile --check", "commit and push; GitLab runs it"], stdout)
-    return Exit.OK
-
-
-def _write(files: Sequence[New], stdout: TextIO) -> None:
-    """Writes new files, none of which may be there."""
-    for file in files:
-        file.path.parent.mkdir(parents=True, exist_ok=True)
-        with file.path.open("xb") as stream:
-            stream.write(file.content)
-        stdout.write(f"wrote {shown_path(str(file.path))}\n")
-
-
-def _next(steps: Sequence[str], stdout: TextIO) -> None:
-    stdout.write("\nnext: " + "\n      ".join(steps) + "\n")

@@ -28,5 +28,5 @@ def _templates() -> jinja2.Environment:
     )
 
 
-def filled(template: str, **values: str) -> bytes:
+def filled(template: str, **values: object) -> bytes:
     return _templates().get_template(template).render(**values).encode()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli.errors import UsageError
@@ -29,6 +30,7 @@ class Wanted:
     level: str = ""
     kind: str = ""
     extends: str = ""
+    rec: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,8 @@ class Questions:
 
     def ask(self, shipped: Sequence[Spec], known: Wanted) -> Wanted:
         """The test, with what is not ``known`` of it already."""
-        if known.extends:
-            return replace(known, name=self._name(f"my-{known.extends}"))
+        if known.extends or known.rec:
+            return replace(known, name=self._name(f"my-{known.extends}" if known.extends else "dil-first"))
         level = known.level or self._choice("level", [(name, _LEVELS[name]) for name in LEVELS])
         kind = known.kind or self._choice("kind", [(name, _KINDS[name]) for name in kinds(level)])
         first = start(level, kind)

@@ -60,6 +60,7 @@ def listing(shipped: Sequence[Spec]) -> str:
     return (
         "dodo new NAME writes a test, which begins as\n"
         + _table(rows)
+        + "\nor, with --level dil --rec FILE.rec, as a test of a recording of your own\n"
         + "\nor as a copy of a test that ships with DoDo\n"
         + _table(copies)
         + "\ndodo new --application writes an application and a test that it passes, dodo new --deployment what a\n"

@@ -90,10 +90,10 @@ def test_editors_find_the_schema(repository: Path) -> None:
         (["there"], "there is a test 'there' already; names are unique over all registries"),
         (["half"], "'tests/half/README.md' exists already; nothing was written"),
         (["new", "--extends", "their"], "there is no test 'their' to extend; did you mean 'there'?"),
-        (["new", "--extends", "there", "--level", "hil"], "--level and --kind do not apply with --extends"),
+        (["new", "--extends", "there", "--level", "hil"], "--level, --kind and --rec do not apply with --extends"),
         (["new", "--level", "dil"], "a dil test cannot be closed-loop"),
         (["new", "--level", "dil"], "; try: dodo new new --level dil --kind open-loop"),
-        (["--deployment", "--level", "hil"], "--level, --kind and --extends apply to a test"),
+        (["--deployment", "--level", "hil"], "--level, --kind, --extends and --rec apply to a test"),
     ],
     ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
 )
@@ -313,7 +313,7 @@ def test_the_application_passes_its_test(empty: Path) -> None:
     assert "PASSED  sil-first  reached finish after " in result.stdout
 
 
-@pytest.mark.parametrize("there", ["compose.yaml", "steering.py", "Dockerfile", "tests/sil-first/README.md"])
+@pytest.mark.parametrize("there", ["compose.yaml", "steering.py", "Dockerfile", "dodo.yml"])
 def test_an_application_that_is_there_stays(empty: Path, there: str) -> None:
     (empty / there).parent.mkdir(parents=True, exist_ok=True)
     (empty / there).write_text("mine")

@@ -1,0 +1,122 @@
+"""``dodo new --rec``: a test of a recording of one's own, which compiles at once and judges what was recorded."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dodo_dsl import package_data
+from dodo_dsl.cli.new.recorded_drive import SIGNALS
+from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from tests.cli.new.test_command import contents, dodo
+
+SHIPPED = package_data.registry() / "recordings/kiwi-track.rec"
+STEERING = "opendlv.proxy.GroundSteeringRequest"
+
+
+@pytest.fixture
+def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: compose.yml\n")
+    (tmp_path / "compose.yml").write_text(
+        "services: {car: {image: car, command: --cid=111, x-dodo: {in: [], out: [opendlv.sim.Frame, "
+        + STEERING
+        + "]}}}\n"
+    )
+    return tmp_path
+
+
+def spec(folder: Path, name: str) -> dict[str, object]:
+    found = yaml.safe_load((folder / f"tests/{name}/{name}.dodo.yml").read_text())
+    return {
+        **found["environment"]["drive"]["with"],
+        **found["evaluation"]["signal"]["with"],
+        "clock": found.get("clock"),
+    }
+
+
+def write(path: Path, *streams: tuple[str, int, list[float]]) -> None:
+    """A recording with a message of each value every 0.1 s, by name and sender stamp."""
+    messages = MessageSet.standard()
+    frames = []
+    for name, sender, values in streams:
+        for number, value in enumerate(values):
+            time = 1_700_000_000_000_000 + number * 100_000
+            message = messages.type(name)(**{SIGNALS[name]: value})
+            frames.append(encode_frame(Envelope(messages.id(name), messages.encode(message), time, time, time, sender)))
+    path.write_bytes(b"".join(frames))
+
+
+@pytest.mark.parametrize("file", ["drive.rec", "my drive: 2 #1.rec"])
+def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> None:
+    shutil.copy(SHIPPED, empty / file)
+    code, out, err = dodo("new", "mine", "--level", "dil", "--rec", file)
+    assert (code, err) == (0, "")
+    assert f"{file}: 15.0 s, pictures of the camera with sender stamp 0\n" in out
+    assert f"judged: groundSteering of {STEERING}/9, 151 values from -0.0672978 to 0.113228\n" in out
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+    found = spec(empty, "mine")
+    assert found["rec"] == found["target"] == f"../recordings/{file}"
+    assert (found["video-sender"], found["target-sender"], found["clock"]) == (0, 9, "lockstep")
+    assert found["without"] == [STEERING, "opendlv.proxy.PedalPositionRequest", "opendlv.sim.Frame"]
+    assert (found["max-mean"], found["max-distance"], found["max-time"]) == (0.018, 0.090, "25 s")
+    assert (empty / "tests/recordings" / file).read_bytes() == SHIPPED.read_bytes()
+
+
+def test_a_recording_that_is_there_is_not_copied(empty: Path) -> None:
+    shutil.copy(SHIPPED, empty / "drive.rec")
+    assert dodo("new", "one", "--rec", "drive.rec")[0] == 0
+    assert "wrote tests/recordings" not in dodo("new", "two", "--rec", "drive.rec")[1]
+    assert "wrote tests/recordings" not in dodo("new", "three", "--rec", "tests/recordings/drive.rec")[1]
+    (empty / "other").mkdir()
+    write(empty / "other/drive.rec", (STEERING, 0, [0.1] * 20))
+    before = contents(empty)
+    code, _, err = dodo("new", "four", "--rec", "other/drive.rec")
+    assert (code, err) == (2, "dodo new: 'tests/recordings/drive.rec' exists already; nothing was written\n")
+    assert contents(empty) == before
+
+
+def test_a_recording_without_pictures_is_played_in_real_time(empty: Path) -> None:
+    """The preferred message with enough samples is judged, and others of it are named."""
+    streams = [(STEERING, 3, [0.1] * 5), ("opendlv.proxy.PedalPositionRequest", 4, [0.1, 0.3] * 20)]
+    write(empty / "drive.rec", *streams, ("opendlv.proxy.PedalPositionRequest", 7, [0.1] * 12))
+    code, out, err = dodo("new", "mine", "--rec", "drive.rec")
+    assert (code, err) == (0, "")
+    assert "drive.rec: 3.9 s, no camera\n" in out
+    assert "judged: position of opendlv.proxy.PedalPositionRequest/4, 40 values from 0.1 to 0.3\n" in out
+    assert "other sender stamps of it are 7: change 'target-sender' for them\n" in out
+    found = spec(empty, "mine")
+    assert (found["clock"], found["align"], found["sample-times"]) == (None, "begin", "test")
+    assert (found["max-mean"], found["max-distance"], found["target-sender"]) == (0.020, 0.10, 4)
+    assert dodo("compile", "--check")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--rec", "none.rec"], "none.rec: No such file or directory"),
+        (["--rec", "compose.yml"], "compose.yml is not a recording"),
+        (
+            ["--rec", "few.rec"],
+            "'few.rec' has no signal to judge, expected 10 or more messages of one of opendlv.proxy.",
+        ),
+        (["--rec", "few.rec", "--level", "sil"], "a recording is played at level dil, not sil"),
+        (["--rec", "few.rec", "--kind", "perception"], "--rec begins an open-loop test, not a perception one; a perc"),
+        (["--rec", "few.rec", "--extends", "x"], "--level, --kind and --rec do not apply with --extends"),
+    ],
+)
+def test_what_makes_no_test_is_said(empty: Path, words: list[str], said: str) -> None:
+    write(empty / "few.rec", (STEERING, 0, [0.1] * 9))
+    before = contents(empty)
+    code, out, err = dodo("new", "mine", *words)
+    assert (code, out, contents(empty)) == (2, "", before)
+    assert err.startswith(f"dodo new: {said}")
+
+
+@pytest.mark.parametrize(("values", "limit"), [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30")])
+def test_limits_have_two_digits_and_are_never_zero(empty: Path, values: list[float], limit: str) -> None:
+    write(empty / "drive.rec", (STEERING, 0, values))
+    assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
+    assert f"max-mean: {limit} " in (empty / "tests/mine/mine.dodo.yml").read_text()
