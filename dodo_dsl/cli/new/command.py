@@ -14,6 +14,7 @@ from dodo_dsl.cli.new.destination import Destination, destination
 from dodo_dsl.cli.new.new_file import New
 from dodo_dsl.cli.new.new_repository import new_application, new_deployment
 from dodo_dsl.cli.new.questions import Questions, Wanted
+from dodo_dsl.cli.new.repository_files import LANGUAGES
 from dodo_dsl.cli.new.shipped_copy import copied_files
 from dodo_dsl.cli.new.writing import say_next, write
 from dodo_dsl.compiler import Checked, load
@@ -28,6 +29,7 @@ EXAMPLES = """examples:
   dodo new dil-mine --level dil --rec drive.rec        a recording of one's own, and its signal as the target
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --application                               an application that drives, with a test that it passes
+  dodo new --application --language cpp                the same in C++, on libcluon
   dodo new --deployment                                dodo.yml, application and pipeline in this folder
 """
 
@@ -43,6 +45,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write a small application, its pipeline and a first test that it passes",
     )
+    parser.add_argument(
+        "--language", choices=LANGUAGES, help="language of the application that --application writes (default: python)"
+    )
     parser.add_argument("--level", choices=LEVELS, help="level of the new test (default: sil)")
     parser.add_argument("--kind", choices=KINDS, help="kind of the new test (default: closed-loop)")
     parser.add_argument("--extends", metavar="TEST", help="test that the new one changes; a shipped one is copied")
@@ -52,11 +57,15 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if options.language and not options.application:
+        raise UsageError("--language applies to --application")
     if options.deployment or options.application:
         if options.level or options.kind or options.extends or options.rec:
             words = "--level, --kind, --extends and --rec"
             raise UsageError(f"{words} apply to a test, not to --deployment and --application")
-        return new_deployment(stdout) if options.deployment else new_application(stdout)
+        return (
+            new_deployment(stdout) if options.deployment else new_application(options.language or LANGUAGES[0], stdout)
+        )
     return _test(options, stdout)
 
 

@@ -12,20 +12,24 @@ from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.spec.deployment.deployment import FILE_NAME
 
 _FIRST = "sil-first"
+_BUILDS = {"cpp": ("cmake -B build", "cmake --build build --parallel --target steering")}
+"""How programs are built that have to be."""
 
 
-def new_application(stdout: TextIO) -> int:
+def new_application(language: str, stdout: TextIO) -> int:
     root = Path.cwd()
-    own = application_files(root)
+    own = application_files(root, language)
     first = scaffold.test_files(_FIRST, starts.start(starts.LEVEL, starts.KIND).template, root / REGISTRY, root)
     taken = [*(file.path for file in (*own, *first)), *(root / name for name in (*COMPOSE_FILES, FILE_NAME))]
     if there := [path for path in taken if path.exists()]:
         advice = "dodo new --deployment keeps what there is"
         raise UsageError(f"'{shown_path(str(there[0]))}' exists already; nothing was written; {advice}")
     made = {file.path for file in own}
-    files = [*own, *(f for f in deployment_files(root) if f.path not in made and not f.path.exists()), *first]
-    write(files, stdout)
-    say_next([f"dodo run {_FIRST}", "make steering.py and the test yours", "commit and push; GitLab runs it"], stdout)
+    around = deployment_files(root, images=language in _BUILDS)
+    write([*own, *(f for f in around if f.path not in made and not f.path.exists()), *first], stdout)
+    program = next(file.path.name for file in own if file.path.stem == "steering")
+    steps = [*_BUILDS.get(language, ()), f"dodo run {_FIRST}", f"make {program} and the test yours"]
+    say_next([*steps, "commit and push; GitLab runs it"], stdout)
     return Exit.OK
 
 

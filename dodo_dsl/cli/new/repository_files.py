@@ -9,6 +9,9 @@ from dodo_dsl.spec.deployment.deployment import FILE_NAME
 COMPOSE_FILES = ("docker-compose.yml", "docker-compose.yaml", "compose.yml", "compose.yaml")
 REGISTRY = "tests"
 _SCHEMAS = ".dodo"
+_PROCESSES = {"python": "python, steering.py", "cpp": "build/steering"}
+LANGUAGES = tuple(_PROCESSES)
+"""Of the application that ``dodo new --application`` writes."""
 _SPEC_SCHEMA = "dodo.schema.json"
 
 
@@ -38,26 +41,29 @@ def dodo_yml(root: Path, application: str) -> New:
     return New(root / FILE_NAME, filled("deployment/dodo.yml", application=application, registry=REGISTRY))
 
 
-def application_files(root: Path) -> list[New]:
+def application_files(root: Path, language: str) -> list[New]:
     """A small application that drives, and how it starts."""
-    image = f"dodo/vision:{__version__}"
-    return [
-        New(root / "steering.py", filled("application/steering.py")),
-        New(root / COMPOSE_FILES[0], filled("application/docker-compose.yml")),
-        New(root / "Dockerfile", filled("application/Dockerfile", base=image)),
-    ]
+    folder = f"application/{language}"
+    values = {"base": f"dodo/vision:{__version__}"}
+    sources = sorted(path.name for path in (package_data.templates() / "new" / folder).iterdir())
+    compose = filled("application/docker-compose.yml", process=_PROCESSES[language])
+    files = [New(root / name, filled(f"{folder}/{name}", **values)) for name in sources]
+    return [*files, New(root / COMPOSE_FILES[0], compose)]
 
 
-def deployment_files(root: Path) -> list[New]:
-    """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas."""
+def deployment_files(root: Path, *, images: bool = False) -> list[New]:
+    """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas.
+
+    With ``images`` the pipeline builds them, as the application has to be built.
+    """
     application = compose_file(root) or COMPOSE_FILES[0]
     pipelines = sorted((package_data.templates() / "gitlab").iterdir())
     return [
         dodo_yml(root, application),
         New(root / application, filled("deployment/docker-compose.yml")),
         New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
-        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml")),
+        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", images=images)),
         *(New(root / ".gitlab" / "dodo" / path.name, path.read_bytes()) for path in pipelines),
         *_schemas(root),
-        New(root / ".gitignore", filled("deployment/gitignore")),
+        New(root / ".gitignore", filled("deployment/gitignore", builds=images)),
     ]

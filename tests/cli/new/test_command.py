@@ -16,6 +16,7 @@ from dodo_dsl.cli.errors import NO_APPLICATION
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.new.starts import kinds
 from dodo_dsl.compiler import load
+from dodo_dsl.opendlv.odvd import STANDARD, parser
 from dodo_dsl.spec.model import LEVELS
 from tests.cli.terminal import Terminal
 from tests.test_documentation import PROGRAM
@@ -301,6 +302,30 @@ def test_an_application_is_written_with_its_test(empty: Path) -> None:
     assert (empty / "steering.py").read_text() == PROGRAM
     assert (empty / ".gitignore").read_text() == "mine\n"
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+
+
+def test_an_application_in_c_plus_plus_has_what_builds_it(empty: Path) -> None:
+    code, out, err = dodo("new", "--application", "--language", "cpp")
+    assert (code, err) == (0, "")
+    assert (
+        "next: cmake -B build\n      cmake --build build --parallel --target steering\n      dodo run sil-first\n"
+        in out
+    )
+    assert {"CMakeLists.txt", "Dockerfile", "messages.odvd", "steering.cpp"} < set(contents(empty))
+    (service,) = yaml.safe_load((empty / "docker-compose.yml").read_text())["services"].values()
+    assert service["x-dodo-process"] == ["build/steering"]
+    assert "build/" in (empty / ".gitignore").read_text().splitlines()
+    included = [entry["local"] for entry in yaml.safe_load((empty / ".gitlab-ci.yml").read_text())["include"]]
+    assert [Path(path).name for path in included] == ["deployment.gitlab-ci.yml", "application.gitlab-ci.yml"]
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+    standard = {definition.name: definition for definition in parser.load(STANDARD)}
+    own = {definition.name: definition for definition in parser.load(empty / "messages.odvd")}
+    assert sorted(own) == sorted(service["x-dodo"]["out"])
+    assert all(definition.same_layout(standard[name]) for name, definition in own.items())
+
+
+def test_a_language_is_that_of_an_application(empty: Path) -> None:
+    assert dodo("new", "first", "--language", "cpp") == (2, "", "dodo new: --language applies to --application\n")
 
 
 @pytest.mark.slow
