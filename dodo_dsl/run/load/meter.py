@@ -24,6 +24,7 @@ class LoadMeter:
     def __init__(self, take: Callable[[], Awaitable[Snapshot | None]]) -> None:
         self._take = take
         self._task: asyncio.Task[None] | None = None
+        self._is_over = False
         self.snapshots: list[Snapshot] = []
 
     def begin(self) -> None:
@@ -33,6 +34,7 @@ class LoadMeter:
         """Takes the last snapshot, with little patience."""
         if self._task is None:
             return
+        self._is_over = True  # also for a snapshot that came as it was cancelled
         self._task.cancel()
         await asyncio.gather(self._task, return_exceptions=True)
         self._task = None
@@ -41,7 +43,7 @@ class LoadMeter:
                 await self._add()
 
     async def _run(self) -> None:
-        while True:
+        while not self._is_over:
             await self._add()
             await asyncio.sleep(PERIOD_S)
 

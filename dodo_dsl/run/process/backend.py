@@ -151,10 +151,10 @@ class ProcessBackend:
         if self._asked is None or self._asked.done():
             self._asked = asyncio.get_running_loop().create_future()
             self._sandbox.send({"do": "load"})
-        try:
-            return await asyncio.wait_for(asyncio.shield(self._asked), LOAD_PATIENCE_S)
-        except TimeoutError:
-            return None
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
+                return await asyncio.shield(self._asked)
+        return None
 
     async def close(self, keep: bool) -> list[str]:
         if keep and (pid := self._sandbox.pid):

@@ -1,6 +1,7 @@
 """What snapshots add up to: who waited, and whose fault it was."""
 
 import asyncio
+import contextlib
 
 import pytest
 
@@ -93,3 +94,20 @@ def test_a_backend_that_does_not_answer_holds_up_nothing_for_long() -> None:
         return asyncio.get_running_loop().time()
 
     assert run(scene()) == pytest.approx(1.0 + LAST_PATIENCE_S)
+
+
+def test_a_snapshot_that_comes_as_it_is_cancelled_ends_it_all_the_same() -> None:
+    """As with ``asyncio.wait_for`` of Python 3.11, which then gives the result and forgets the cancellation."""
+
+    async def take() -> Snapshot | None:
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.sleep(600)
+        return None
+
+    async def scene() -> None:
+        meter = LoadMeter(take)
+        meter.begin()
+        await asyncio.sleep(0)
+        await meter.end()
+
+    run(asyncio.wait_for(scene(), 100 * LAST_PATIENCE_S))
