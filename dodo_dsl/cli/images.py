@@ -1,14 +1,15 @@
-"""dodo images: build and push the images of DoDo's services."""
+"""dodo images: build and push the images of DoDo's services, and say what they are made of."""
 
 import argparse
 import tempfile
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl import atomic
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.images import build_context, docker_command, wheels
+from dodo_dsl.images import build_context, docker_command, sbom, wheels
 from dodo_dsl.images.names import Image, choose, known
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
@@ -18,6 +19,7 @@ EXAMPLES = """examples:
   dodo images build collision virtual-camera          two images
   dodo images build --offline-wheels                  if a build cannot reach the package index
   dodo images push --prefix registry.example.org/dodo
+  dodo images sbom --output build/sbom                a bill of materials of each image, and of this Python
 """
 _INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"
 
@@ -31,6 +33,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     build.add_argument("--source", metavar="URL", default="", help="URL of the sources, for the images' labels")
     _action(actions, "push", "push images to their registry; log in with 'docker login' first")
+    sbom = _action(actions, "sbom", "write what built images, and the Python that runs DoDo, are made of (CycloneDX)")
+    sbom.add_argument("--no-images", action="store_true", help="only the Python that runs DoDo; needs no Docker engine")
+    sbom.add_argument("-o", "--output", metavar="DIR", default="build/sbom", help="folder (default: build/sbom)")
 
 
 def _action(
@@ -49,7 +54,12 @@ def _action(
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     images = _chosen(options, selection.checked_deployment())
-    docker_command.require_engine()
+    if options.action == "sbom" and options.no_images:
+        images = []
+    else:
+        docker_command.require_engine()
+    if options.action == "sbom":
+        return _sbom(images, Path(options.output), stdout)
     return _build(options, images, stdout) if options.action == "build" else _push(images, stdout)
 
 
@@ -90,11 +100,25 @@ def _packages(base_image: str, stdout: TextIO) -> Path:
     return wheels.provide(python, wheels.cache_folder())
 
 
-def _push(images: list[Image], stdout: TextIO) -> int:
+def _require_built(images: list[Image]) -> None:
     missing = [image for image in images if not docker_command.is_local(image.reference)]
     if missing:
         names = " ".join(image.name for image in missing)
         raise UsageError(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
+
+
+def _sbom(images: list[Image], folder: Path, stdout: TextIO) -> int:
+    _require_built(images)
+    folder.mkdir(parents=True, exist_ok=True)
+    bills = {"python": sbom.of_environment(), **{i.name: sbom.of_image(i.name, i.reference) for i in images}}
+    for name, text in bills.items():
+        atomic.write_text(folder / f"{name}.cdx.json", text)
+        stdout.write(f"wrote {folder / name}.cdx.json\n")
+    return Exit.OK
+
+
+def _push(images: list[Image], stdout: TextIO) -> int:
+    _require_built(images)
     for number, image in enumerate(images, 1):
         stdout.write(f"[{number}/{len(images)}] {image.reference}\n")
         code, output = docker_command.show(("push", image.reference), stdout)
