@@ -77,7 +77,9 @@ ways = {{
     "other programs' descriptors": descriptors,
 }}
 reached = [way for way, tried in ways.items() if tried()]
-open("{folder}/{name}.json", "w").write(json.dumps(reached))
+with open("{folder}/{name}.part", "w") as file:
+    file.write(json.dumps(reached))
+os.replace("{folder}/{name}.part", "{folder}/{name}.json")  # the judge passes when it sees the application's
 """
 
 
