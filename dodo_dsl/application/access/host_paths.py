@@ -11,7 +11,7 @@ _INSIDE = "keep it in the repository, or write the whole path"
 
 _FOLDERS = ("/opt", "/srv", "/mnt", "/media", "/data", "/tmp")
 _TO_READ = ("/usr/share", "/usr/local", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
-            "/run/udev", "/sys", "/proc")  # fmt: skip
+            "/run/udev", "/sys")  # fmt: skip
 _TMP = "/tmp"
 """Nobody keeps repositories there, and a test has its own."""
 _DEVICES = ("/dev", "/sys")
@@ -42,7 +42,7 @@ class HostPaths:
         """Whether a path, and what its symbolic links lead to, lie in the repository or below an allowed path."""
         places = (*self.roots, *self.allowed)
         path = self.whole(text)
-        return _below(path, places) and _below(os.path.realpath(path), [Path(os.path.realpath(p)) for p in places])
+        return _below(path, places) and _below(_real(path), [Path(_real(p)) for p in places])
 
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
@@ -54,7 +54,7 @@ class HostPaths:
         """Why a path may not be mounted, and what to do; empty when it may."""
         if "$" in text or self.is_own(text):
             return "", ""
-        path = os.path.realpath(self.whole(text))
+        path = _real(self.whole(text))
         if not _below(path, [Path(_TMP)]) and any(_below(str(root), [Path(path)]) for root in self.roots):
             return f"'{text}' holds the whole repository and more", _INSIDE
         if not text.startswith(("/", "~")):
@@ -74,7 +74,7 @@ class HostPaths:
 
     def _where(self, text: str) -> str:
         path = self.whole(text)
-        real = os.path.realpath(path)
+        real = _real(path)
         if _below(path, (*self.roots, *self.allowed)):
             return f"is a symbolic link to '{real}', outside the repository"
         return "is outside the repository"
@@ -91,3 +91,11 @@ def _below(path: str, places: "Sequence[Path] | map[Path]") -> bool:
 
 def _expanded(text: str) -> str:
     return os.path.expanduser(text) if text.startswith("~") else text  # noqa: PTH111  (it never raises)
+
+
+def _real(path: str | Path) -> str:
+    """Where symbolic links lead to; the path itself where that may not be known, as in ``/proc``."""
+    try:
+        return os.path.realpath(path)
+    except OSError:
+        return str(path)
