@@ -9,7 +9,7 @@ from services.base.stamps import others
 from services.clock.answers import MOST_SURPLUS, Answers
 from services.clock.exchange import StepCommand, StepResult
 from services.clock.participants import SLICE_S, ApplicationFloods, ApplicationSilent, IsStopped, Patience, ServiceLink
-from services.clock.processor_time import NOTHING, ApplicationProcesses
+from services.clock.processor_time import NOTHING, ApplicationProcesses, own_wait_s
 from services.clock.response import ResponseTimes
 
 _AGAIN_S = 0.5
@@ -37,6 +37,8 @@ class SteppedApplication:
         """To be set when they are known."""
         self._patience, self._link, self._stopped = patience, link, stopped
         self._began, self._before = 0.0, NOTHING
+        self._shown, self._own_wait = 0.0, 0.0
+        """When all pictures were there, and how long the clock itself had waited for a processor until then."""
         self._cid = cid
         self._first: list[EncodedEnvelope] = []
         self._reading: set[str] = set()
@@ -75,6 +77,7 @@ class SteppedApplication:
         if not self.answers.is_expected:
             self._reading = {camera.service for camera in shown}
             self._link.send([StepCommand(camera.service, now, (), show=True) for camera in shown])
+        self._shown, self._own_wait = time.monotonic(), own_wait_s()
 
     def await_answer(self) -> None:
         """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods."""
@@ -89,8 +92,9 @@ class SteppedApplication:
             self.waited_first += spent
         else:
             self.waited += spent
+            taken = time.monotonic() - self._shown - (own_wait_s() - self._own_wait)
             ran = self.processes.snapshot().since(self._before) if self.processes else None
-            self.response.add(spent, ran, self.answers.is_copied)
+            self.response.add(max(taken, 0.0), ran, self.answers.is_copied)
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services."""

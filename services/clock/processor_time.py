@@ -67,6 +67,14 @@ class ApplicationProcesses:
         return ProcessorTimes(ran, {pid: dict(_threads(self._proc / str(pid) / "task")) for pid in self._pids})
 
 
+def own_wait_s(schedstat: Path = Path("/proc/thread-self/schedstat")) -> float:
+    """How long this thread has been ready to run without a processor, in s; 0 where the kernel does not say."""
+    with contextlib.suppress(OSError, ValueError):
+        _, waited, *_ = schedstat.read_bytes().split()
+        return int(waited) / 1e9
+    return 0.0
+
+
 def descendants(roots: frozenset[int], proc: Path) -> list[int]:
     """The roots and all processes that descend from them."""
     parents = {int(entry.name): _parent(entry / "stat") for entry in proc.iterdir() if entry.name.isdigit()}

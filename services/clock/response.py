@@ -13,9 +13,9 @@ from services.clock.processor_time import Spent
 class ResponseTimes:
     """The answers of a test, without the first, for which programs load their libraries; times in s.
 
-    An answer's time is the wall time from the frame to the answer less what the application waited for a processor, and
-    at least the processor time that it took, up to the wall time. ``limit_s`` is the longest that an answer may take,
-    ``period_s`` the period of the frames.
+    An answer's time is the wall time from the frame to the answer less what the application, or the clock itself,
+    waited for a processor, and at least the processor time that it took, up to the wall time. ``limit_s`` is the
+    longest that an answer may take, ``period_s`` the period of the frames.
     """
 
     period_s: float = 0.1

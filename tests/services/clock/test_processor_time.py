@@ -8,7 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from services.clock.processor_time import ApplicationProcesses, ProcessorTimes, Spent, ThreadSpent, descendants
+from services.clock.processor_time import (
+    ApplicationProcesses,
+    ProcessorTimes,
+    Spent,
+    ThreadSpent,
+    descendants,
+    own_wait_s,
+)
 
 BURN = """
 import subprocess, sys, threading, time
@@ -85,3 +92,9 @@ def test_what_ended_in_between_takes_nothing_back() -> None:
     before = ProcessorTimes({7: 1.0, 8: 1.0}, {7: {"7": ThreadSpent(1.0, 0.5)}})
     after = ProcessorTimes({7: 1.25}, {7: {}})
     assert after.since(before) == Spent(0.25, 0.0)
+
+
+def test_the_own_wait_is_the_second_number_of_the_kernels_in_seconds(tmp_path: Path) -> None:
+    (tmp_path / "schedstat").write_text("7000000000 2500000000 12\n")
+    assert own_wait_s(tmp_path / "schedstat") == 2.5
+    assert own_wait_s(tmp_path / "none") == 0.0
