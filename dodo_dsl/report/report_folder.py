@@ -83,14 +83,16 @@ def write_report(
                 _draw(folder / outcome.slug, outcome, tests[outcome.slug])
             except Exception as error:  # noqa: BLE001  (the data comes from services, and no plot may cost a verdict)
                 problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
-    problems += _write_pages(folder, outcomes, tests)
     (folder / TIMES).unlink(missing_ok=True)
     if times:
         try:
             atomic.write_text(folder / TIMES, draw_times(times, platform.node() or "this machine"))
         except Exception as error:  # noqa: BLE001  (as above)
             problems.append(f"the times of these tests cannot be drawn: {error}")
-    write_summaries(folder, outcomes)
+    write_summaries(folder, outcomes)  # first, as the pages take the most room
+    problems += _write_pages(folder, outcomes, tests)
+    if tests:
+        _write_index(folder, outcomes)
     return problems
 
 
@@ -103,6 +105,7 @@ def _write_pages(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, 
     try:
         page.write_shared(folder)
     except OSError as error:
+        shutil.rmtree(folder / viewer.SHARED, ignore_errors=True)
         yield f"the pages of the tests cannot be written: {error}"
         return
     for outcome in outcomes:
@@ -118,13 +121,18 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
     """Writes the four files about the whole run."""
     pictures = {o.slug: _pictures(folder, o) for o in outcomes}
     attachments = {slug: f"{_shown(folder)}/{found[0].path}" for slug, found in pictures.items() if found}
-    times = TIMES if (folder / TIMES).is_file() else ""
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     with atomic.replacing(folder / "junit.xml") as part:
         junit.write(part, outcomes, attachments)
     atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
+    _write_index(folder, outcomes)
+
+
+def _write_index(folder: Path, outcomes: Sequence[Outcome]) -> None:
+    """The page of the run, with links to what there is."""
+    times = TIMES if (folder / TIMES).is_file() else ""
     files = html.ReportFiles(
-        pictures,
+        {o.slug: _pictures(folder, o) for o in outcomes},
         _logs(folder, outcomes),
         _named(folder, outcomes, RECORDING),
         _specs(folder, outcomes),
