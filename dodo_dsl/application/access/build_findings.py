@@ -13,6 +13,8 @@ NETWORKS = ("", "default", "none")
 _SCHEMES = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
 _OURS = "dodo/"
 _REGISTRIES = ("index.docker.io/", "docker.io/")
+_BASES = ("python", "library/python", "debian", "library/debian")
+"""What DoDo's images, and those of many others, are built on."""
 _WITHOUT = "is left out of sil and dil tests, which have no hardware"
 
 
@@ -22,6 +24,9 @@ def build_findings(name: str, service: dict[str, Any], paths: HostPaths) -> Iter
     image = str(service.get("image") or "")
     if short_name(image).startswith(_OURS):
         message = f"the image '{image}' of '{name}' would replace one of DoDo's own"
+        yield AccessFinding((), message, "give the image another name")
+    elif short_name(image) in _BASES:
+        message = f"the image '{image}' of '{name}' would replace one on which others are built"
         yield AccessFinding((), message, "give the image another name")
     if isinstance(build, str):
         build = {"context": build}
