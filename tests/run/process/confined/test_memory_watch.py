@@ -1,5 +1,6 @@
 """Memory of processes as ``/proc`` tells it, in a folder that looks like it."""
 
+import os
 from pathlib import Path
 
 from dodo_dsl.run.process.confined.memory_watch import above
@@ -29,3 +30,18 @@ def test_shared_pages_count_once(tmp_path: Path) -> None:
 
 def test_processes_that_end_meanwhile_are_no_problem(tmp_path: Path) -> None:
     assert above({10: 1}, PARENTS, tmp_path) == {}
+
+
+def test_what_only_a_descriptor_holds_counts_once() -> None:
+    """Also where a child holds it, too, as forks do."""
+    me, parents = os.getpid(), {os.getpid(): 1}
+    before = above({me: 0}, parents)[me]
+    first = os.memfd_create("x")
+    second = os.dup(first)
+    try:
+        os.write(first, bytes(64 << 20))
+        assert above({me: 0}, parents)[me] - before > 50 << 20
+        assert above({me: before + (100 << 20)}, parents) == {}
+    finally:
+        os.close(first)
+        os.close(second)
