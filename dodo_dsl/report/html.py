@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jinja2
 
@@ -44,7 +44,10 @@ MEANINGS = {
 def render(outcomes: Sequence[Outcome], files: ReportFiles) -> str:
     """The page."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(package_data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
+        loader=jinja2.FileSystemLoader(package_data.templates()),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
+        finalize=_without_control,
     )
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
     return environment.get_template("report.html.j2").render(
@@ -56,3 +59,11 @@ def render(outcomes: Sequence[Outcome], files: ReportFiles) -> str:
         check_line=check_line,
         machine_line=machine_line,
     )
+
+
+def _without_control(value: Any) -> Any:
+    """No control characters but line ends and tabs: they would command the terminal of who looks at the source."""
+    if not isinstance(value, str) or value.isprintable():
+        return value
+    plain = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in value)
+    return type(value)(plain)  # what is marked as safe stays so
