@@ -33,7 +33,7 @@ COMMANDS = {
     "report": Subcommand("report", "write the report of a finished run again"),
     "judge": Subcommand("judge.command", "judge the recording of a test again, also by other limits"),
     "rec": Subcommand("rec.command", "inspect, cut and export recordings"),
-    "images": Subcommand("images", "build and push the images of DoDo's services"),
+    "images": Subcommand("images", "build and push the images of DoDo's services, and say what they are made of"),
     "rig": Subcommand("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }
