@@ -4,6 +4,8 @@ DODO := .venv/bin/dodo
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
+# Words for `make bench`, as "rec bus", "--against FILE" or "--against-checkout DIR"
+BENCH ?=
 # `make test` has three parts, so that what takes the whole machine disturbs neither real time nor containers
 RIGS ?= 2
 PARTS := realtime-tests engine-tests fast-tests slow-tests first second third
@@ -18,7 +20,7 @@ help:
 	@echo "make check    format, lint, types, imports, and the tests that need only Python: two minutes"
 	@echo "make test     set up, then every check and every test: a quarter of an hour"
 	@echo "make lint     format, lint, types, imports"
-	@echo "make bench    measure, beside a peer in the same run"
+	@echo "make bench    measure, beside a peer in the same run: ten minutes, a table in build/bench"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
@@ -79,7 +81,7 @@ third: slow-tests
 
 bench:
 	@scripts/setup dev
-	@for script in benchmarks/bench_*.py; do .venv/bin/python $$script || exit 1; done
+	@.venv/bin/python -m benchmarks.ledger $(BENCH)
 
 firmware:
 	@scripts/install-firmware-tools

@@ -7,17 +7,20 @@ the messages a second depend on how much of it there is; processor time, of both
 """
 
 import datetime
+import importlib.util
 import statistics
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, rate_row, report
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
@@ -164,29 +167,39 @@ def show(name: str, rounds: list[Round]) -> None:
     print(f"{name:9} {rate:7,.0f} messages/s; processor time of a message: {sending:.0f} us + {receiving:.0f} us")
 
 
-def compare(text: str, ours: list[Round], theirs: list[Round], rate: Callable[[Round], float]) -> None:
-    ratios = sorted(rate(own) / rate(other) for own, other in zip(ours, theirs, strict=True))
-    print(f"{text}{statistics.median(ratios):.2f} times ({ratios[0]:.2f} to {ratios[-1]:.2f} in {ROUNDS} rounds)")
+def compare(text: str, ratios: Sequence[float]) -> None:
+    print(f"{text}{statistics.median(ratios):.2f} times ({min(ratios):.2f} to {max(ratios):.2f}, {len(ratios)} rounds)")
+
+
+def rows(ours: list[Round], theirs: list[Round], note: str) -> tuple[Row, Row]:
+    """Messages a second, and the processor time of a message."""
+    name, goal = "pycluon" if theirs else "", Goal(2, quartile=1.5)
+    columns = [found[0] for found in ours], name, [found[0] for found in theirs]
+    many = rate_row("bus: messages sent and received", "messages/s", *columns, goal=goal, note=note)
+    times = [found[1] + found[2] for found in ours], name, [found[1] + found[2] for found in theirs]
+    return many, cost_row("bus: processor time of a message", "us", *times, note=note)
 
 
 def main() -> int:
     if len(sys.argv) > 2:
         return member(sys.argv[1], sys.argv[2])
-    try:
-        import pycluon  # noqa: F401
-    except ImportError:
-        print("pycluon is not installed: no peer to measure against")
-        show("Session:", [round_of("ours") for _ in range(ROUNDS)])
-        return 0
-    ours, theirs = [], []
-    for number in range(ROUNDS):
-        turns = (("ours", ours), ("pycluon", theirs))
+    ours: list[Round] = []
+    theirs: list[Round] = []
+    note, budget = "", Budget.given()
+    if importlib.util.find_spec("pycluon") is None:
+        note = "pycluon is not installed: no peer to measure against"
+        print(note)
+    for number in budget.rounds(ROUNDS):
+        turns = (("ours", ours), *(() if note else (("pycluon", theirs),)))
         for name, rounds in turns if number % 2 else reversed(turns):
             rounds.append(round_of(name))
+        report(*rows(ours, theirs, note))
     show("Session:", ours)
-    show("pycluon:", theirs)
-    compare("as many a second: ", ours, theirs, lambda found: found[0])
-    compare("as many a second of processor time: ", ours, theirs, lambda found: 1 / (found[1] + found[2]))
+    if theirs:
+        show("pycluon:", theirs)
+        many, times = rows(ours, theirs, note)
+        compare("as many a second: ", many.ratios)
+        compare("as many a second of processor time: ", times.ratios)
     return 0
 
 

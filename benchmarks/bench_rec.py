@@ -1,28 +1,34 @@
 """A recording to CSV, cold start included, beside ``cluon-rec2csv``; and how fast recordings are written and read.
 
-The recording is one of a drive (poses, readings, requests and detections in the mix of a simulation), made here.
+Peak memory is that of the process, beside the size of the file. The recording is one of a drive (poses, readings,
+requests and detections in the mix of a simulation), made here.
 """
 
 import random
 import resource
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from players import ROOT, cost_of
+
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, rate_row, report
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import STANDARD
 from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
 from dodo_dsl.opendlv.recordings.writer import RecordingWriter
 
-ROOT = Path(__file__).parents[1]
 PEER = Path(sys.executable).with_name("cluon-rec2csv")
-ENVELOPES, ROUNDS = 300_000, 5
+ENVELOPES, ROUNDS = 300_000, 9
+NO_PEER = "pycluon is not installed: no peer to measure against"
 MIX = {
     "opendlv.sim.Frame": 4,
     "opendlv.sim.KinematicState": 4,
@@ -32,6 +38,10 @@ MIX = {
     "opendlv.logic.perception.DetectionBoundingBox": 2,
     "opendlv.logic.perception.DetectionProperty": 2,
 }
+
+
+Run = tuple[float, float]
+"""Seconds, and peak memory in MiB."""
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -63,47 +73,80 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.glob("*.csv")}
 
 
-def export(path: Path, folder: Path) -> None:
-    command = [sys.executable, "-m", "dodo_dsl", "rec", "export", path, "--csv", "--messages=1.0", "-o", folder]
-    subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+def export(path: Path, folder: Path) -> Run:
+    words = ["rec", "export", path, "--csv", "--messages=1.0", "-o", folder]
+    return cost_of([sys.executable, "-m", "dodo_dsl", *words], ROOT)
 
 
-def peer(path: Path, folder: Path) -> None:
+def info(path: Path, _folder: Path) -> Run:
+    return cost_of([sys.executable, "-m", "dodo_dsl", "rec", "info", path], ROOT)
+
+
+def peer(path: Path, folder: Path) -> Run:
     folder.mkdir()
-    subprocess.run([PEER, f"--rec={path}", f"--odvd={STANDARD}"], cwd=folder, check=True, capture_output=True)
+    return cost_of([PEER, f"--rec={path}", f"--odvd={STANDARD}"], folder)
 
 
-def compare(path: Path, folder: Path) -> None:
-    ours, theirs = [], []
-    for _ in range(ROUNDS):
-        for target, work, times in ((folder / "ours", export, ours), (folder / "theirs", peer, theirs)):
-            shutil.rmtree(target, ignore_errors=True)
-            times.append(seconds(lambda work=work, target=target: work(path, target)))
-    same = contents(folder / "ours") == contents(folder / "theirs")
-    own, others = statistics.median(ours), statistics.median(theirs)
-    print(f"dodo rec export --csv: {ENVELOPES / own:9,.0f} envelopes/s, cold start included")
-    print(f"cluon-rec2csv:         {ENVELOPES / others:9,.0f} envelopes/s")
-    print(f"the peer takes {others / own:.2f} times as long; the tables are {'equal' if same else 'NOT EQUAL'}")
+WORKS = {"export": export, "info": info, "peer": peer}
+
+
+def compare(path: Path, folder: Path) -> dict[str, list[Run]]:
+    """Seconds and peak memory of each work, in turns."""
+    found: dict[str, list[Run]] = {name: [] for name in WORKS if name != "peer" or PEER.is_file()}
+    for number in Budget.given().rounds(ROUNDS):
+        for name in found if number % 2 else reversed(found):
+            shutil.rmtree(folder / name, ignore_errors=True)
+            found[name].append(WORKS[name](path, folder / name))
+        report(*rows(found, path.stat().st_size))
+    return found
+
+
+def rows(found: dict[str, list[Run]], size: int) -> list[Row]:
+    """``size`` of the recording in bytes."""
+    theirs = [run[0] for run in found.get("peer", [])]
+    note = "" if theirs else NO_PEER
+    rows = []
+    for name, words in (("export", "rec export --csv"), ("info", "rec info")):
+        each = [run[0] for run in found[name]], "cluon-rec2csv" if theirs else "", theirs
+        rows.append(cost_row(f"{words}, from a cold start", "s", *each, goal=Goal(8), note=note))
+        peaks = [run[1] * 2**20 / size for run in found[name]]
+        rows.append(cost_row(f"{words}, peak memory", "x the file", peaks, goal=Goal(3, of="value")))
+    return rows
+
+
+def show(found: dict[str, list[Run]], folder: Path) -> None:
+    for name, runs in found.items():
+        took, memory = (statistics.median(column) for column in zip(*runs, strict=True))
+        print(f"{name:7} {ENVELOPES / took:9,.0f} envelopes/s, cold start included; peak memory {memory:.0f} MiB")
+    if "peer" in found:
+        ratio = statistics.median(other[0] / own[0] for own, other in zip(found["export"], found["peer"], strict=True))
+        same = contents(folder / "export") == contents(folder / "peer")
+        print(f"the peer takes {ratio:.2f} times as long; the tables are {'equal' if same else 'NOT EQUAL'}")
+    else:
+        print(NO_PEER)
+
+
+def streams(path: Path, envelopes: list[Envelope]) -> None:
+    """Writes the recording, and shows how fast it is written and read in this process."""
+    with RecordingWriter(path) as writer:
+        one_by_one = seconds(lambda: [writer.write(envelope) for envelope in envelopes])  # type: ignore[func-returns-value]
+    encoded = seconds(lambda: [encode_frame(envelope) for envelope in envelopes])
+    read, indexed = seconds(lambda: list(read_envelopes(path))), seconds(lambda: Recording(path).close())
+    print(f"written one by one:    {ENVELOPES / one_by_one:9,.0f} envelopes/s ({ENVELOPES / encoded:,.0f} encoded)")
+    print(f"read as a stream:      {ENVELOPES / read:9,.0f} envelopes/s")
+    print(f"indexed:               {ENVELOPES / indexed:9,.0f} envelopes/s")
+    print(f"the recording has {path.stat().st_size / 1e6:.0f} MB", end="; ")
+    print(f"peak memory here {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000:.0f} MB")
+    report(rate_row("recording written one by one", "envelopes/s", [ENVELOPES / one_by_one]))
+    report(rate_row("recording indexed", "envelopes/s", [ENVELOPES / indexed]))
 
 
 def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         path = folder / "drive.rec"
-        envelopes = drive(ENVELOPES)
-        with RecordingWriter(path) as writer:
-            one_by_one = seconds(lambda: [writer.write(envelope) for envelope in envelopes])
-        encoded = seconds(lambda: [encode_frame(envelope) for envelope in envelopes])
-        size = path.stat().st_size / 1e6
-        print(f"written one by one:    {ENVELOPES / one_by_one:9,.0f} envelopes/s ({ENVELOPES / encoded:,.0f} encoded)")
-        print(f"read as a stream:      {ENVELOPES / seconds(lambda: list(read_envelopes(path))):9,.0f} envelopes/s")
-        print(f"indexed:               {ENVELOPES / seconds(lambda: Recording(path).close()):9,.0f} envelopes/s")
-        print(f"the recording has {size:.0f} MB", end="; ")
-        print(f"peak memory here {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000:.0f} MB")
-        if PEER.is_file():
-            compare(path, folder)
-        else:
-            print("pycluon is not installed: no peer to measure against")
+        streams(path, drive(ENVELOPES))
+        show(compare(path, folder), folder)
     return 0
 
 

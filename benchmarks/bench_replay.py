@@ -9,9 +9,10 @@ import statistics
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from bench_rec import drive
 from players import Measured, peer, service, tool
 
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, rate_row, report
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.recordings.writer import RecordingWriter
@@ -29,6 +32,7 @@ CID = 126
 STATUS, END = 10, 2901
 QUIET = 3.0
 PEER = tool("cluon-replay")
+NO_PEER = "pycluon is not installed: no peer to measure against"
 
 
 class Heard(NamedTuple):
@@ -90,24 +94,37 @@ def write(path: Path, envelopes: list[Envelope]) -> Path:
     return path
 
 
-def in_turns(path: Path, count: int) -> dict[str, list[Heard]]:
+def in_turns(path: Path, count: int, budget: Budget, until: float) -> dict[str, list[Heard]]:
     names = ["rec-replay", "cluon-replay"] if PEER else ["rec-replay"]
     found: dict[str, list[Heard]] = {name: [] for name in names}
-    for number in range(ROUNDS):
+    for number in budget.rounds(ROUNDS, until):
         for name in names if number % 2 else reversed(names):
             found[name].append(listen(path, name, count))
     return found
+
+
+def columns(found: dict[str, list[Heard]], value: Callable[[Heard], float]) -> dict[str, Any]:
+    """Values of both, as a row takes them."""
+    ours, *theirs = ([value(heard) for heard in rounds] for rounds in found.values())
+    return {"ours": ours, "peer": "cluon-replay", "theirs": theirs[0]} if theirs else {"ours": ours, "note": NO_PEER}
+
+
+def fast_row(found: dict[str, list[Heard]]) -> Row:
+    return rate_row("replay, all due at once", "messages/s", **columns(found, Heard.rate), goal=Goal(1))
+
+
+def even_row(found: dict[str, list[Heard]]) -> Row:
+    """The 90th percentile: single late ones say more of the machine than of the player."""
+    return cost_row("replay in real time, 90 % within", "ms", **columns(found, lambda heard: heard.deviations()[1]))
 
 
 def show_fast(found: dict[str, list[Heard]]) -> None:
     print("as fast as possible:")
     for name, rounds in found.items():
         rate, lost = statistics.median(h.rate() for h in rounds), sum(h.lost for h in rounds)
-        print(f"  {name:13} {rate:9,.0f} messages/s ({lost} of {ROUNDS * FAST} overran the listener's buffer)")
-    if PEER:
-        pairs = zip(*found.values(), strict=True)
-        ratios = sorted(own.rate() / other.rate() for own, other in pairs)
-        print(f"  {statistics.median(ratios):.2f} times as many ({ratios[0]:.2f} to {ratios[-1]:.2f})")
+        print(f"  {name:13} {rate:9,.0f} messages/s ({lost} of {len(rounds) * FAST} overran the listener's buffer)")
+    if ratios := fast_row(found).ratios:
+        print(f"  {statistics.median(ratios):.2f} times as many ({min(ratios):.2f} to {max(ratios):.2f})")
 
 
 def show_even(found: dict[str, list[Heard]]) -> None:
@@ -125,10 +142,15 @@ def main() -> int:
         envelopes = drive(FAST)
         at_once = [e._replace(sample_time=1_700_000_000_000_000) for e in envelopes]
         even = [e._replace(sample_time=e.sent) for e in envelopes[:EVEN]]
-        show_fast(in_turns(write(Path(name) / "fast.rec", at_once), FAST))
-        show_even(in_turns(write(Path(name) / "even.rec", even), EVEN))
+        budget = Budget.given()
+        fast = in_turns(write(Path(name) / "fast.rec", at_once), FAST, budget, until=0.4)
+        report(fast_row(fast))
+        show_fast(fast)
+        found = in_turns(write(Path(name) / "even.rec", even), EVEN, budget, until=1.0)
+        report(even_row(found))
+        show_even(found)
     if not PEER:
-        print("pycluon is not installed: no peer to measure against")
+        print(NO_PEER)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Processes under measurement: services of ours and cluon's tools, with the processor time that they take."""
+"""Processes under measurement, services of ours and cluon's tools: the processor time and memory that they take."""
 
 import importlib.util
 import os
@@ -10,6 +10,13 @@ from pathlib import Path
 from typing import IO
 
 ROOT = Path(__file__).resolve().parents[1]
+_MEASURE = """
+import os, sys, time
+begin = time.perf_counter()
+child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=[(os.POSIX_SPAWN_OPEN, 1, os.devnull, 1, 0)])
+_, status, usage = os.wait4(child, 0)
+print(time.perf_counter() - begin, usage.ru_maxrss / 1024, os.waitstatus_to_exitcode(status))
+"""
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 
 
@@ -28,6 +35,19 @@ class Measured:
             return self._last
         self._last = max(self._last, (int(fields[11]) + int(fields[12])) * TICK)
         return self._last
+
+
+def cost_of(command: Sequence[str | Path], folder: Path) -> tuple[float, float]:
+    """Seconds of a program by its path, and its peak memory in MiB; raises RuntimeError when it fails.
+
+    A small process starts it, as Linux counts the memory of the one that starts a program as the program's own.
+    """
+    words = [sys.executable, "-ISc", _MEASURE, *map(str, command)]
+    found = subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True)
+    seconds, memory, code = map(float, found.stdout.split())
+    if code:
+        raise RuntimeError(f"{' '.join(map(str, command))} ended with {code:.0f}: {found.stderr.strip()[-300:]}")
+    return seconds, memory
 
 
 def tool(name: str) -> Path | None:

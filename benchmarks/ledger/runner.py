@@ -1,0 +1,86 @@
+"""Starts benchmarks as processes, each with its budget of seconds, and reads their rows."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from benchmarks.ledger import budget, row
+from benchmarks.ledger.ledger import Bench
+
+SECONDS = {
+    "bench_bus": 40,
+    "bench_camera": 40,
+    "bench_compile": 100,
+    "bench_docker": 75,
+    "bench_lockstep": 50,
+    "bench_parallel": 50,
+    "bench_pull": 40,
+    "bench_rec": 35,
+    "bench_recorder": 35,
+    "bench_replay": 40,
+    "bench_services": 30,
+}
+"""Budgets of the benchmarks, less than ten minutes together."""
+OTHERS = 40
+RESERVE = 0.85
+"""Of its budget a benchmark plans with this part, so that it ends by itself."""
+GRACE = 5.0
+"""Seconds to clean up for one that did not end."""
+
+
+def scripts(checkout: Path) -> list[Path]:
+    return sorted((checkout / "benchmarks").glob("bench_*.py"))
+
+
+def run(script: Path, seconds: float) -> Bench:
+    """One benchmark of the checkout that the script is in; one that does not end in time is ended."""
+    checkout = script.parents[1]
+    with tempfile.TemporaryDirectory() as folder:
+        rows = Path(folder) / "rows.jsonl"
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(checkout),
+            row.FILE_VARIABLE: str(rows),
+            budget.VARIABLE: str(seconds * RESERVE),
+        }
+        begin, load = time.monotonic(), os.getloadavg()[0]
+        with _started([sys.executable, str(script)], checkout, environment) as process:
+            trouble = _wait(process, seconds)
+        took = time.monotonic() - begin
+        found = tuple(row.read_rows(rows))
+    if not found:
+        trouble = trouble or "reported no row"
+        found = (row.Row(script.stem, "", note=trouble),)
+    return Bench(script.stem, found, round(took, 1), seconds, (load, os.getloadavg()[0]), trouble)
+
+
+def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> str:
+    """What was wrong, in a few words."""
+    try:
+        code = process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        return f"did not end in {seconds:g} s, and was ended"
+    return f"ended with {code}" if code else ""
+
+
+@contextmanager
+def _started(command: list[str], folder: Path, environment: dict[str, str]) -> Iterator["subprocess.Popen[bytes]"]:
+    """A process with a group of its own, all of which is gone after the block; first it may clean up."""
+    process = subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True)
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(GRACE)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()

@@ -1,0 +1,98 @@
+"""Benchmarks of three lines each: rows, budgets, and what becomes of those that fail or hang."""
+
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks.ledger import runner
+from benchmarks.ledger.row import Row, rate_row
+from benchmarks.ledger.runner import GRACE, SECONDS, run, scripts
+
+ROOT = Path(__file__).parents[2]
+REPORTS = """
+import json, os
+with open(os.environ["DODO_BENCH_ROWS"], "a") as file:
+    print(json.dumps({"what": "a", "unit": "1/s", "ours": [6.5]}), file=file)
+"""
+HANGS = """
+import pathlib, subprocess, time
+try:
+    child = subprocess.Popen(["sleep", "999"])
+    pathlib.Path("part").write_text(str(child.pid))
+    pathlib.Path("part").rename("child")
+    time.sleep(999)
+finally:
+    open("end", "w")
+"""
+ROW = rate_row("a", "1/s", [6.5])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "benchmarks").mkdir()
+    return tmp_path / "benchmarks"
+
+
+def is_running(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2][0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_rows_are_read(folder: Path) -> None:
+    (folder / "bench_a.py").write_text(f"{REPORTS}\nassert 0 < float(os.environ['DODO_BENCH_SECONDS']) < 60")
+    bench = run(folder / "bench_a.py", 60)
+    assert (bench.name, bench.rows, bench.trouble, bench.budget) == ("bench_a", (ROW,), "", 60)
+
+
+def test_modules_come_from_the_checkout_of_the_benchmark(folder: Path) -> None:
+    (folder.parent / "dodo_dsl.py").write_text("")
+    (folder / "bench_a.py").write_text(
+        "import dodo_dsl, pathlib; assert pathlib.Path(dodo_dsl.__file__).parent == pathlib.Path().resolve()"
+    )
+    assert run(folder / "bench_a.py", 60).trouble == "reported no row"
+
+
+def test_one_that_fails_is_told(folder: Path) -> None:
+    (folder / "bench_a.py").write_text(f"{REPORTS}\nos._exit(3)")
+    bench = run(folder / "bench_a.py", 60)
+    assert (bench.rows, bench.trouble) == ((ROW,), "ended with 3")
+
+
+def test_one_that_hangs_is_ended_with_its_children_and_keeps_its_rows(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    up, wait = folder.parent / "child", runner._wait
+
+    def wait_until_it_hangs(process: "subprocess.Popen[bytes]", _seconds: float) -> str:
+        while not up.exists() and process.poll() is None:
+            time.sleep(0.01)
+        return wait(process, 0)
+
+    monkeypatch.setattr(runner, "_wait", wait_until_it_hangs)
+    (folder / "bench_a.py").write_text(f"{REPORTS}\n{HANGS}")
+    bench = run(folder / "bench_a.py", 60)
+    assert (bench.rows, bench.trouble) == ((ROW,), "did not end in 0 s, and was ended")
+    assert (folder.parent / "end").exists(), "it may clean up"
+    while is_running(int(up.read_text())):
+        time.sleep(0.01)
+
+
+def test_one_without_rows_has_a_row_that_says_why(folder: Path) -> None:
+    (folder / "bench_a.py").write_text("import time; time.sleep(999)")
+    assert run(folder / "bench_a.py", 0.1).rows == (Row("bench_a", "", note="did not end in 0.1 s, and was ended"),)
+
+
+def test_all_together_stay_below_ten_minutes() -> None:
+    assert SECONDS.keys() == {script.stem for script in scripts(ROOT)}
+    assert sum(SECONDS.values()) + GRACE * len(SECONDS) < 600
+
+
+def test_its_variables_are_not_ours(folder: Path) -> None:
+    (folder / "bench_a.py").write_text("")
+    run(folder / "bench_a.py", 60)
+    assert "DODO_BENCH_ROWS" not in os.environ
