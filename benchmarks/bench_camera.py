@@ -21,7 +21,11 @@ from statistics import median
 import cv2
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
 from benchmarks.gl_peer import GlPeer, ssim
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, cost_row, rate_row, report
 from dodo_dsl import package_data
 from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.light import Light
@@ -37,6 +41,7 @@ from services.virtual_camera.truth import SceneTruth, TruthLimits, classes_of
 SIZE, FOVY = (1280, 720), math.radians(48.8)
 CONES = 90
 ROUNDS, FRAMES = 7, 40
+NO_PEER = "moderngl with EGL is not here"
 BODY = CameraPose.at(0, 0, 0)
 ONE_THREAD = dict.fromkeys(("LP_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
@@ -82,11 +87,11 @@ def peer(folder: Path) -> GlPeer | None:
     try:
         return GlPeer(folder, *SIZE, FOVY)
     except Exception as error:  # noqa: BLE001 - moderngl raises just that without EGL
-        print(f"llvmpipe is not here ({type(error).__name__}: {error}): the virtual camera alone")
+        print(f"{NO_PEER} ({type(error).__name__}: {error}): the virtual camera alone")
         return None
 
 
-def beside(folder: Path, keep: Path | None) -> None:
+def beside(folder: Path, keep: Path | None, budget: Budget) -> None:
     """The rates of both in turns, and how alike their pictures are."""
     camera, gl = Renderer(load_scene(folder), *SIZE, FOVY), peer(folder)
     image = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
@@ -100,13 +105,17 @@ def beside(folder: Path, keep: Path | None) -> None:
         return gl.render(view.position, view.axes)
 
     draws = [ours, theirs] if gl else [ours]
-    rates = [[rate(draw) for draw in draws] for _ in range(ROUNDS)]
-    print(f"virtual-camera {median(r[0] for r in rates):7.1f} pictures/s")
+    columns = list(zip(*([rate(draw) for draw in draws] for _ in budget.rounds(ROUNDS, until=0.4)), strict=True))
+    rest = {"peer": "moderngl on llvmpipe", "theirs": columns[1]} if gl else {"note": NO_PEER}
+    row = rate_row("virtual camera", "pictures/s", columns[0], goal=Goal(3), **rest)
+    report(row)
+    print(f"virtual-camera {median(row.ours):7.1f} pictures/s")
     if gl is None:
         return
-    print(f"moderngl       {median(r[1] for r in rates):7.1f} pictures/s on {gl.name}")
-    print(f"ratio          {median(r[0] / r[1] for r in rates):7.2f} (target 3)")
+    print(f"moderngl       {median(row.theirs):7.1f} pictures/s on {gl.name}")
+    print(f"ratio          {median(row.ratios):7.2f} (target 3)")
     alike = [ssim(ours(pose), theirs(pose)) for pose in drive()]
+    report(rate_row("virtual camera, SSIM with the peer at worst", "", [min(alike)], goal=Goal(0.95, of="value")))
     print(f"SSIM           {min(alike):7.4f} at worst, {np.mean(alike):.4f} on average (target 0.95)")
     if keep is not None:
         for number, pose in enumerate(drive()[::10]):
@@ -143,11 +152,13 @@ def condition(folder: Path, name: str) -> Callable[[CameraPose], object]:
     return draw
 
 
-def costs(folder: Path) -> Iterator[str]:
+def costs(folder: Path, budget: Budget) -> Iterator[str]:
     """What each condition adds to a picture, in ms, measured in turns with none."""
     draws = {name: condition(folder, name) for name in CONDITIONS}
-    rounds = [{name: 1000 / rate(draw) for name, draw in draws.items()} for _ in range(ROUNDS)]
+    rounds = [{name: 1000 / rate(draw) for name, draw in draws.items()} for _ in budget.rounds(ROUNDS)]
     for name in list(CONDITIONS)[1:]:
+        both = [r[name] for r in rounds], "no condition", [r["nothing"] for r in rounds]
+        report(cost_row(f"virtual camera, {name}", "ms a picture", *both))
         added = median(r[name] - r["nothing"] for r in rounds)
         times = median(r[name] / r["nothing"] for r in rounds)
         yield f"{name:<14} {added:+7.2f} ms a picture, {times:.2f} times the time"
@@ -165,9 +176,10 @@ def main(argv: list[str]) -> int:
     keep = Path(argv[0]) if argv else None
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
+    budget = Budget.given()
     with map_folder() as folder:
-        beside(folder, keep)
-        for line in costs(folder):
+        beside(folder, keep, budget)
+        for line in costs(folder, budget):
             print(line)
     return 0
 

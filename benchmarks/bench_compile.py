@@ -1,24 +1,47 @@
-"""Compiling and checking 10, 100 and 1,000 instances, beside ``docker compose config -q`` on the output.
+"""Compiling and checking 10 to 10,000 instances, beside ``docker compose config -q`` on the output; and start-up.
 
-Each number of instances is compiled twice: as one spec with a matrix, and as as many specs. Everything is written
-below the system's temporary folder, so its file system has a share in the figures; ``--check`` writes nothing.
+Each number of instances is compiled twice: as one spec with a matrix, and as as many specs; 10,000 only as a matrix.
+The seconds a test include the start of the command. Everything is written below the system's temporary folder, so its
+file system has a share in the figures; ``--check`` writes nothing.
 """
 
-import os
 import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
-ROOT = Path(__file__).parents[1]
-PLUGIN = Path.home() / ".docker/cli-plugins/docker-compose"
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from players import ROOT, cost_of
+
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, report
+
+PLUGINS = (Path.home() / ".docker", Path("/usr/local/lib/docker"), Path("/usr/libexec/docker"), Path("/usr/lib/docker"))
+PLUGIN = next((path for folder in PLUGINS if (path := folder / "cli-plugins" / "docker-compose").is_file()), None)
+NO_PEER = "Compose v2 is not installed: no peer to measure against"
 SPEC = ROOT / "tests_registry" / "sil-closed-straight" / "sil-closed-straight.dodo.yml"
-NUMBERS = (1, 10, 100, 1000)
+CASES = ((100, True, 0.3), (1000, True, 0.6), (100, False, 0.7), (1000, False, 0.8), (10_000, True, 0.9),
+         (10, True, 1.0), (10, False, 1.0))  # fmt: skip
+"""Instances, whether of a matrix, and the part of the budget by which they are done."""
 ROUNDS = 5
 PEER_CALLS = 10
+STARTS = {"--help": 0.2, "compile --check": 0.4}
+"""Commands and the seconds that are their goal."""
+
+
+class Call(NamedTuple):
+    """Seconds to check and to compile, peak memory in MiB, and seconds that the peer takes for a test."""
+
+    check: float
+    write: float
+    peak: float
+    peer: float
 
 
 def write_specs(folder: Path, name: str, number: int, matrix: bool) -> None:
@@ -39,21 +62,15 @@ def write_specs(folder: Path, name: str, number: int, matrix: bool) -> None:
     (folder / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\n")
 
 
-def compiled(folder: Path, *words: str) -> tuple[float, float]:
+def dodo(folder: Path, *words: str) -> tuple[float, float]:
     """Seconds of one cold call, and its peak memory in MiB."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "dodo_dsl", "compile", *words], cwd=folder, stdout=subprocess.DEVNULL
-    )
-    start = time.perf_counter()
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise RuntimeError(f"dodo compile {' '.join(words)} ended with {process.returncode}")
-    return time.perf_counter() - start, usage.ru_maxrss / 1024
+    return cost_of([sys.executable, "-m", "dodo_dsl", *words], folder)
 
 
 def peer(folder: Path) -> float:
-    """Seconds that compose takes to check one compiled test."""
+    """Seconds that compose takes to check one compiled test; 0 where there is no compose."""
+    if PLUGIN is None:
+        return 0.0
     tests = sorted(p.parent for p in (folder / "generated").glob("*/test.json"))[:PEER_CALLS]
     start = time.perf_counter()
     for test in tests:
@@ -61,39 +78,71 @@ def peer(folder: Path) -> float:
     return (time.perf_counter() - start) / len(tests)
 
 
-def measure(number: int, matrix: bool) -> tuple[float, float, float, float]:
-    """Medians: seconds to check, seconds to compile afresh, peak MiB, seconds of the peer a test."""
-    checks, writes, peaks, peers = [], [], [], []
+def measure(number: int, matrix: bool, budget: Budget, until: float) -> list[Call]:
+    """Rounds of one case, reported after each."""
+    calls = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_specs(folder, "bench", number, matrix)
-        for turn in range(ROUNDS):
-            checks.append(compiled(folder, "--check", "-o", "absent")[0])
-            seconds, peak = compiled(folder, *([] if turn == 0 else ["-o", f"generated-{turn}"]))
-            writes.append(seconds)
-            peaks.append(peak)
-            peers.append(peer(folder))
-    return tuple(statistics.median(column) for column in (checks, writes, peaks, peers))  # type: ignore[return-value]
+        for _ in budget.rounds(ROUNDS, until):
+            shutil.rmtree(folder / "generated", ignore_errors=True)
+            check = dodo(folder, "compile", "--check", "-o", "absent")[0]
+            write, peak = dodo(folder, "compile")
+            calls.append(Call(check, write, peak, peer(folder)))
+            report(*rows(number, matrix, calls))
+    return calls
+
+
+def rows(number: int, matrix: bool, calls: Sequence[Call]) -> list[Row]:
+    kind, checks, writes = f"{number:,} {kind_of(matrix)}", [c.check for c in calls], [c.write for c in calls]
+    theirs = [c.peer * 1000 for c in calls]
+    rest: dict[str, Any] = {"peer": "compose config", "theirs": theirs} if PLUGIN else {"note": NO_PEER}
+    goal = Goal(20) if number >= 100 else None
+    found = [
+        cost_row(f"{verb} a test, {kind}", "ms", [1000 * value / number for value in values], goal=goal, **rest)
+        for verb, values in (("check", checks), ("compile", writes))
+    ]
+    return [*found, cost_row(f"compile, peak memory, {kind}", "MiB", [c.peak for c in calls])]
+
+
+def kind_of(matrix: bool) -> str:
+    return "of a matrix" if matrix else "specs"
+
+
+def starts(budget: Budget) -> None:
+    """How long short commands take, from a cold start, beside ``docker compose version``."""
+    found: dict[str, list[float]] = {words: [] for words in STARTS}
+    peers: list[float] = []
+    for _ in budget.rounds(ROUNDS, until=0.1):
+        if PLUGIN is not None:
+            peers.append(cost_of([PLUGIN, "version"], ROOT)[0])
+        for words, times in found.items():
+            times.append(dodo(ROOT, *words.split(), *(("-o", "build/absent") if "--check" in words else ()))[0])
+    for words, times in found.items():
+        rest = ("compose version", peers) if peers else ()
+        row = cost_row(f"dodo {words}", "s", times, *rest, goal=Goal(STARTS[words], of="value"))
+        report(row)
+        print(f"dodo {words}: {statistics.median(times) * 1000:.0f} ms")
 
 
 def main() -> int:
-    if not PLUGIN.is_file():
-        print("Compose v2 is not installed: no peer to measure against")
-        return 0
-    print("instances         check    compile   a test after start-up (check, compile)   peak    peer a test   ratio")
-    for matrix in (True, False):
-        base_check = base_write = 0.0
-        for number in NUMBERS:
-            check, write, peak, other = measure(number, matrix)
-            if number == 1:
-                base_check, base_write = check, write
-                continue
-            each, written = (check - base_check) / (number - 1), (write - base_write) / (number - 1)
-            kind = "of a matrix" if matrix else "specs"
-            after = f"{each * 1000:10.2f} ms {written * 1000:10.2f} ms"
-            ratio = other / (write / number)
-            print(f"{number:5d} {kind:11s} {check:6.2f} s  {write:6.2f} s   {after}          {peak:6.0f} MiB"
-                  f"  {other * 1000:6.1f} ms   {ratio:6.1f}")  # fmt: skip
+    budget = Budget.given()
+    starts(budget)
+    print("instances          check    compile     peak    peer a test   times as fast a test: check, compile")
+    last = 0.0
+    for number, matrix, until in CASES:
+        if number == max(case[0] for case in CASES) and budget.left() < 12 * last:
+            report(
+                Row(f"compile a test, {number:,} {kind_of(matrix)}", "ms", note="no time left for it", goal=Goal(20))
+            )
+            continue
+        begin = time.perf_counter()
+        calls = measure(number, matrix, budget, until)
+        last = max(last, (time.perf_counter() - begin) / len(calls))
+        check, write, peak, other = (statistics.median(column) for column in zip(*calls, strict=True))
+        ratios = f"{other * number / check:6.1f} {other * number / write:6.1f}" if other else NO_PEER
+        print(f"{number:6d} {kind_of(matrix):11s} {check:6.2f} s  {write:6.2f} s   {peak:6.0f} MiB"
+              f"  {other * 1000:6.1f} ms   {ratios}")  # fmt: skip
     return 0
 
 

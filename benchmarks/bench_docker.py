@@ -1,9 +1,10 @@
-"""The closed-loop tests on the docker backend, at once, beside ``docker compose up`` of the same one after the other.
+"""Closed-loop tests on the docker backend beside ``docker compose up`` and ``down`` of the same files.
 
-Both drive the same cars for the same time. The images must exist (``dodo images build``).
+First one test: what ``dodo run`` takes beyond compose, command and report included. Then several at once, beside
+compose one after the other. Both drive the same cars for the same time. The images must exist (``dodo images build``).
 """
 
-import json
+import shutil
 import statistics
 import subprocess
 import sys
@@ -12,9 +13,16 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
-TESTS = ("sil-closed-left-curve", "sil-closed-straight")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, report
+
+ROOT = Path(__file__).resolve().parents[1]
+TESTS = ("sil-closed-straight", "sil-closed-left-curve")
 ROUNDS = 3
+COMPOSE = "docker compose up, down"
+BEYOND, AT_ONCE = "docker test, beyond compose up and down", f"{len(TESTS)} docker tests at once"
 
 
 def seconds(*commands: Sequence[str], folder: Path) -> float:
@@ -24,28 +32,56 @@ def seconds(*commands: Sequence[str], folder: Path) -> float:
     return time.perf_counter() - start
 
 
+def ours(tests: Sequence[str], folder: Path) -> float:
+    words = ["--backend", "docker", "-j", str(len(tests)), "--report", str(folder / "report")]
+    return seconds([sys.executable, "-m", "dodo_dsl", "run", *tests, *words], folder=ROOT)
+
+
+def theirs(tests: Sequence[str], folder: Path) -> float:
+    """One after the other."""
+    up = ["docker", "compose", "up", "--exit-code-from", "track"]
+    down = ["docker", "compose", "down", "-v"]
+    return sum(seconds(up, down, folder=folder / "generated" / test) for test in tests)
+
+
+def rounds(tests: Sequence[str], folder: Path, budget: Budget, until: float) -> tuple[list[float], list[float]]:
+    """Seconds of both, in turns, reported after each round."""
+    found: tuple[list[float], list[float]] = [], []
+    for number in budget.rounds(ROUNDS, until):
+        ways = list(zip(found, (ours, theirs), strict=True))
+        for times, way in ways if number % 2 else reversed(ways):
+            times.append(way(tests, folder))
+        report(*rows(tests, *found))
+    return found
+
+
+def rows(tests: Sequence[str], own: list[float], other: list[float]) -> list[Row]:
+    if len(tests) > 1:
+        return [cost_row(AT_ONCE, "s", own, f"{COMPOSE}, one by one", other)]
+    beyond = [a - b for a, b in zip(own, other, strict=True)]
+    return [
+        cost_row("docker test, command to end", "s", own, COMPOSE, other),
+        cost_row(BEYOND, "s", beyond, goal=Goal(1, of="value"), less=True),
+    ]
+
+
 def main() -> int:
-    if subprocess.run(["docker", "info"], capture_output=True, check=False).returncode:
-        print("no Docker engine answers: nothing to measure")
+    if (
+        shutil.which("docker") is None
+        or subprocess.run(["docker", "info"], capture_output=True, check=False).returncode
+    ):
+        note = "no Docker engine answers: nothing to measure"
+        report(Row(BEYOND, "s", note=note, goal=Goal(1, of="value"), less=True), Row(AT_ONCE, "s", note=note))
+        print(note)
         return 0
-    dodo = [sys.executable, "-m", "dodo_dsl"]
-    rows = []
+    budget = Budget.given()
     with tempfile.TemporaryDirectory() as name:
-        out, report = Path(name) / "generated", Path(name) / "report"
-        seconds([*dodo, "compile", *TESTS, "-o", str(out)], folder=ROOT)
-        up = ["docker", "compose", "up", "--exit-code-from", "track"]
-        down = ["docker", "compose", "down", "-v"]
-        for _ in range(ROUNDS):
-            run = [*dodo, "run", *TESTS, "--backend", "docker", "-j", str(len(TESTS)), "--report", str(report)]
-            ours = seconds(run, folder=ROOT)
-            tests = json.loads((report / "results.json").read_text())["tests"]
-            setup, execution = (max(test[key] for test in tests) for key in ("setup_s", "execution_s"))
-            rows.append((ours, setup, execution, sum(seconds(up, down, folder=out / test) for test in TESTS)))
-    total, setup, execution, peer = (statistics.median(column) for column in zip(*rows, strict=True))
-    parts = f"set-up {setup:.1f} s, test {execution:.1f} s, the rest {total - setup - execution:.1f} s"
-    print(f"dodo run --backend docker, {len(TESTS)} at once:   {total:5.1f} s: {parts}")
-    print(f"docker compose up and down, one by one: {peer:5.1f} s")
-    print(f"the peer takes {peer / total:.2f} times as long")
+        folder = Path(name)
+        compiled = [sys.executable, "-m", "dodo_dsl", "compile", *TESTS, "-o", str(folder / "generated")]
+        seconds(compiled, folder=ROOT)
+        for tests, until in ((TESTS[:1], 0.6), (TESTS, 1.0)):
+            own, other = (statistics.median(times) for times in rounds(tests, folder, budget, until))
+            print(f"{len(tests)} at once: dodo run --backend docker {own:5.1f} s, compose one by one {other:5.1f} s")
     return 0
 
 

@@ -1,7 +1,8 @@
-"""The registry's tests in lockstep beside the same in real time, with the example application, one after the other.
+"""The registry's tests in lockstep beside real time, with the example application.
 
 Prints test time over wall time of each (sim_s / execution_s, in real time about 1), where the wall time of a step went,
-and the whole suite's time. The target is 10 times real time at 640 x 480 pixels and 10 Hz.
+and the whole suite's time; then how long one short test takes from command to end, and how many more of it a minute
+brings with two at once. In the ledger the test's own time stands for real time, and the tests are those with a goal.
 """
 
 import json
@@ -14,17 +15,25 @@ import time
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[1]
-ROUNDS = 3
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, cost_row, rate_row, report
+
+ROOT = Path(__file__).resolve().parents[1]
+ROUNDS, REPEATS = 3, 10
+SHORT = "sil-closed-straight"
+GOALS = {SHORT: None, "sil-closed-kiwi-track": Goal(20), "sil-perception": Goal(8)}
+LEVELS = ("--level", "sil", "--level", "dil")
 _SPENT = re.compile(r"(?P<who>[^,]+?) (?P<seconds>\d+\.\d+) s")
+Tests = dict[str, dict[str, Any]]
 
 
-def run(clock: str, report: Path) -> tuple[dict[str, dict[str, Any]], float]:
+def run(report: Path, *words: str) -> tuple[Tests, float]:
     """The tests' results by slug, and the command's seconds."""
-    command = [sys.executable, "-m", "dodo_dsl", "run", "--level", "sil", "--level", "dil", "-j", "1"]
+    command = [sys.executable, "-m", "dodo_dsl", "run", *words, "--report", str(report)]
     start = time.perf_counter()
-    words = ["--clock", clock, "--report", str(report)]
-    subprocess.run([*command, *words], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     seconds = time.perf_counter() - start
     return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}, seconds
 
@@ -38,21 +47,49 @@ def spent(report: Path, slug: str) -> str:
     return ", ".join(f"{who} {seconds / frames * 1000:.1f}" for who, seconds in parts[:6])
 
 
-def main() -> int:
-    with tempfile.TemporaryDirectory() as name:
-        report = Path(name)
-        peer, peer_s = run("realtime", report / "realtime")
-        rounds = [run("lockstep", report / str(number)) for number in range(ROUNDS)]
-        print(f"{'test':24s} real time  lockstep    test time   times real time (median of {ROUNDS}, best)")
-        for slug, test in peer.items():
+def speeds(folder: Path, budget: Budget) -> None:
+    """The tests one after the other in lockstep."""
+    chosen = tuple(GOALS) if budget.limited else LEVELS
+    rounds = []
+    for number in budget.rounds(ROUNDS, until=0.6):
+        rounds.append(run(folder / str(number), *chosen, "--clock", "lockstep", "-j", "1"))
+        for slug in rounds[0][0]:
             ours = [tests[slug] for tests, _ in rounds]
-            speeds = [t["sim_s"] / t["execution_s"] for t in ours]
-            execution = statistics.median(t["execution_s"] for t in ours)
-            times = f"{test['execution_s']:7.1f} s {execution:7.2f} s {ours[0]['sim_s']:9.1f} s"
-            print(f"{slug:24s} {times}   {statistics.median(speeds):6.1f} {max(speeds):6.1f}")
-            print(f"    ms a step: {spent(report / '0', slug)}")
-        suite = statistics.median(seconds for _, seconds in rounds)
-    print(f"the suite, one after the other: {peer_s:.1f} s in real time, {suite:.1f} s in lockstep")
+            both = [t["execution_s"] for t in ours], "real time", [t["sim_s"] for t in ours]
+            report(cost_row(f"{slug} in lockstep", "s", *both, goal=GOALS.get(slug)))
+    print(f"{'test':24s} lockstep    test time   times real time (median of {len(rounds)}, best)")
+    for slug in rounds[0][0]:
+        ours = [tests[slug] for tests, _ in rounds]
+        times = [t["sim_s"] / t["execution_s"] for t in ours]
+        execution = statistics.median(t["execution_s"] for t in ours)
+        ratio = f"{statistics.median(times):6.1f} {max(times):6.1f}"
+        print(f"{slug:24s} {execution:7.2f} s {ours[0]['sim_s']:9.1f} s   {ratio}")
+        print(f"    ms a step: {spent(folder / '0', slug)}")
+    print(f"all of them, one after the other: {statistics.median(seconds for _, seconds in rounds):.1f} s in lockstep")
+
+
+def one_and_more(folder: Path, budget: Budget) -> None:
+    """A short test alone, and again and again in one command."""
+    alone, minutes = [], []
+    for _ in budget.rounds(ROUNDS):
+        alone.append(run(folder / "one", SHORT)[1])
+        more = run(folder / "more", SHORT, "--repeat", str(REPEATS), "-j", "2")[1]
+        minutes.append(60 * (REPEATS - 1) / (more - alone[-1]))
+        report(cost_row(f"{SHORT}, command to end", "s", alone, goal=Goal(1.2, of="value")))
+        report(rate_row(f"{SHORT}, further runs, two at once", "a minute", minutes, goal=Goal(60, of="value")))
+    print(f"{SHORT}: {statistics.median(alone):.2f} s, {statistics.median(minutes):.0f} further ones a minute")
+
+
+def main() -> int:
+    budget = Budget.given()
+    with tempfile.TemporaryDirectory() as name:
+        speeds(Path(name), budget)
+        one_and_more(Path(name), budget)
+        if not budget.limited:
+            tests, seconds = run(Path(name) / "realtime", *LEVELS, "--clock", "realtime", "-j", "1")
+            for slug, test in tests.items():
+                print(f"{slug:24s} {test['execution_s']:7.1f} s in real time")
+            print(f"all of them, one after the other: {seconds:.1f} s in real time")
     return 0
 
 

@@ -1,20 +1,29 @@
-"""Real-time tests at once against one after the other: python benchmarks/bench_parallel.py [TESTS].
+"""Tests at once against one after the other, in lockstep and in real time: python benchmarks/bench_parallel.py [TESTS].
 
 Closed loops with pictures of 320x240 at 10 Hz and the example application, on the process backend. Prints how long both
-ways take, and their ratio: with N tests, N times as fast is the most that there can be. All of them have to pass.
+ways take, and their ratio: with N tests in real time, N times as fast is the most that there can be; in lockstep, as
+many times as there are cores. All of them have to pass.
 """
 
 import json
 import os
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, report
+
 ROOT = Path(__file__).resolve().parents[1]
-TESTS = 8
+CORES = len(os.sched_getaffinity(0))
+TESTS, FEWER, ROUNDS = 8, 3, 3
+OF_A_CORE = 0.9
 SMALL = {"width: 640": "width: 320", "height: 480": "height: 240"}
 
 
@@ -34,27 +43,49 @@ def small(folder: Path, tests: int) -> None:
     (folder / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: app/docker-compose.yml\n")
 
 
-def run(folder: Path, jobs: int) -> float:
-    """Seconds of ``dodo run`` with so many jobs; raises AssertionError when a test does not pass."""
+def run(folder: Path, clock: str, tests: int, jobs: int) -> float:
+    """Seconds of ``dodo run`` with so many jobs; raises RuntimeError when a test does not pass."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_HISTORY": str(folder / "history.jsonl")}
+    names = [f"small[n={number}]" for number in range(1, tests + 1)]
+    command = [sys.executable, "-m", "dodo_dsl", "run", *names, "--clock", clock, "-j", str(jobs)]
     began = time.monotonic()
-    command = [sys.executable, "-m", "dodo_dsl", "run", "--clock", "realtime", "-j", str(jobs)]
     subprocess.run(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, check=False)
     took = time.monotonic() - began
-    tests = json.loads((folder / "dodo-report" / "results.json").read_text())["tests"]
-    wrong = [f"{t['slug']}: {t['reason']}" for t in tests if t["outcome"] != "passed"]
-    times = [t["execution_s"] for t in tests]
-    print(f"{jobs} at once: {took:.1f} s, each {min(times):.2f} to {max(times):.2f} s; not passed: {wrong or 'none'}")
+    found = json.loads((folder / "dodo-report" / "results.json").read_text())["tests"]
+    wrong = [f"{t['slug']}: {t['reason']}" for t in found if t["outcome"] != "passed"]
+    times = [t["execution_s"] for t in found]
+    print(f"{clock}, {jobs} at once: {took:.1f} s, each {min(times):.2f} to {max(times):.2f} s")
+    if wrong:
+        raise RuntimeError(f"not passed: {'; '.join(wrong)}")
     return took
 
 
+def rounds(folder: Path, clock: str, tests: int, budget: Budget, until: float) -> Row:
+    """Both ways in turns."""
+    goal = Goal(OF_A_CORE * CORES) if clock == "lockstep" else None
+    together: list[float] = []
+    alone: list[float] = []
+    row = Row("", "")
+    for number in budget.rounds(ROUNDS, until):
+        ways = ((together, CORES if clock == "lockstep" else tests), (alone, 1))
+        for times, jobs in ways if number % 2 else reversed(ways):
+            times.append(run(folder, clock, tests, jobs))
+        words = f"{tests} tests at once, {clock}"
+        row = cost_row(words, "s", together, "one after the other", alone, goal=goal)
+        report(row)
+    return row
+
+
 def main() -> int:
+    budget = Budget.given()
     tests = int(sys.argv[1]) if len(sys.argv) > 1 else TESTS
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         small(folder, tests)
-        together, alone = run(folder, tests), run(folder, 1)
-    print(f"{tests} tests on {os.cpu_count()} cores: {alone / together:.2f} times as fast as one after the other")
+        rows = [rounds(folder, "lockstep", tests, budget, 0.6)]
+        rows.append(rounds(folder, "realtime", FEWER if budget.limited else tests, budget, 1.0))
+    for row in rows:
+        print(f"{row.what}: {statistics.median(row.ratios):.2f} times as fast as one after the other, {CORES} cores")
     return 0
 
 

@@ -1,7 +1,8 @@
 """A cold pull of all services' images: shared layers beside one independent image a service.
 
-Pushes DoDo's images (``dodo images build``) to an image registry of its own on 127.0.0.1, once as they are and once
-flattened to one layer each, and pulls both into an empty engine. Root on Debian with docker.io and docker-registry.
+First the largest of all images as it lies on the engine. Then pushes DoDo's images (``dodo images build``) to an image
+registry of its own on 127.0.0.1, once as they are and once flattened to one layer each, and pulls both into an empty
+engine. Root on Debian with docker.io and docker-registry.
 """
 
 import contextlib
@@ -17,11 +18,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+from benchmarks.ledger.row import Goal, Row, cost_row, report
 from dodo_dsl import __version__
 
 PORT = 5917
 HOST = f"127.0.0.1:{PORT}"
 NAMES = ("sandbox", "collision", "dynamic-model", "integrator", "rec-recorder", "virtual-camera")
+LARGEST, PULL = "largest image, unpacked", "cold pull of the suite"
+GOALS = {LARGEST: Goal(250, of="value"), PULL: Goal(1.15, of="value")}
 MANIFEST = "application/vnd.docker.distribution.manifest.v2+json"
 
 
@@ -67,15 +73,23 @@ def empty_engine(folder: Path) -> Iterator[str]:
 def push(kind: str, name: str) -> None:
     target = f"{HOST}/{kind}/{name}:1"
     source = f"dodo/{name}:{__version__}"
-    if kind == "shared":
-        docker("tag", source, target)
-    else:
-        container = docker("create", source, "true")
+    try:
+        if kind == "shared":
+            docker("tag", source, target)
+        else:
+            flatten(source, target)
+        docker("push", "-q", target)
+    finally:
+        docker("image", "rm", target)
+
+
+def flatten(source: str, target: str) -> None:
+    container = docker("create", source, "true")
+    try:
         flat = ["bash", "-c", 'docker export "$1" | docker import - "$2"', "flat", container, target]
         subprocess.run(flat, check=True, capture_output=True)
+    finally:
         docker("rm", container)
-    docker("push", "-q", target)
-    docker("image", "rm", target)
 
 
 def manifest(kind: str, name: str) -> list[dict[str, Any]]:
@@ -104,18 +118,49 @@ def cold_pull(kind: str, folder: Path) -> float:
         return time.perf_counter() - start
 
 
+def largest_here() -> None:
+    """The largest unpacked image of DoDo on the engine."""
+    tag = f"dodo/*:{__version__}"
+    images = docker("image", "ls", "--filter", f"reference={tag}", "--format", "{{.Repository}}:{{.Tag}}").split()
+    sizes = {image: int(docker("image", "inspect", "--format", "{{.Size}}", image)) / 1e6 for image in images}
+    name = max(sizes, key=lambda image: sizes[image], default="")
+    note = f"{name} of {len(sizes)}" if name else f"there is no image {tag} (dodo images build)"
+    row = cost_row(LARGEST, "MB", [sizes[name]] if name else [], goal=GOALS[LARGEST], note=note)
+    report(row)
+    print(f"largest image: {note}, {sizes.get(name, 0):.0f} MB unpacked")
+
+
+def pulls(folder: Path) -> None:
+    found: dict[str, float] = {}
+    for kind in ("shared", "alone"):
+        for service in NAMES:
+            push(kind, service)
+        found[kind], size = cold_pull(kind, folder), sum(layers(kind).values())
+        times = size / largest(kind)
+        print(f"{kind:<7} {size / 1e6:7.1f} MB in {len(layers(kind))} layers, {found[kind]:5.1f} s;", end=" ")
+        print(f"{times:.3f} times the largest image")
+        if kind == "shared":
+            report(cost_row(PULL, "x the largest image", [times], goal=GOALS[PULL]))
+    report(cost_row("cold pull, seconds", "s", [found["shared"]], "independent images", [found["alone"]]))
+
+
 def main() -> int:
-    ready = os.getuid() == 0 and shutil.which("docker-registry") and shutil.which("dockerd")
-    if not ready or subprocess.run(["docker", "info"], capture_output=True, check=False).returncode:
-        print("needs root, docker-registry, dockerd and an engine that answers: nothing to measure")
-        return 0
+    if (
+        shutil.which("docker") is None
+        or subprocess.run(["docker", "info"], capture_output=True, check=False).returncode
+    ):
+        return absent(LARGEST, "no Docker engine answers") + absent(PULL, "no Docker engine answers")
+    largest_here()
+    if os.getuid() or not shutil.which("docker-registry") or not shutil.which("dockerd"):
+        return absent(PULL, "needs root, docker-registry and dockerd")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name, image_registry(Path(name)):
-        for kind in ("shared", "alone"):
-            for service in NAMES:
-                push(kind, service)
-            seconds, size = cold_pull(kind, Path(name)), sum(layers(kind).values())
-            print(f"{kind:<7} {size / 1e6:7.1f} MB in {len(layers(kind))} layers, {seconds:5.1f} s;", end=" ")
-            print(f"{size / largest(kind):.3f} times the largest image")
+        pulls(Path(name))
+    return 0
+
+
+def absent(what: str, why: str) -> int:
+    report(Row(what, "", note=why, goal=GOALS[what], less=True))
+    print(f"{what}: {why}: nothing to measure")
     return 0
 
 

@@ -19,6 +19,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from bench_rec import drive
 from players import ROOT, Measured, peer, service, tool
 
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import cost_row, report
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
@@ -26,7 +28,10 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
 
-CID, ROUNDS, SECONDS = 125, 5, 4.0
+BUDGET = Budget.given()
+CID, ROUNDS = 125, 5
+SECONDS = 2.0 if BUDGET.limited else 4.0
+NO_PEER = "pycluon is not installed: no peer to measure against"
 MESSAGE_HZ, FRAME_HZ = 1000, 10
 SIZE = "640x480"
 FRAMES = ROOT / "tests_registry" / "recordings" / "kiwi-track.rec"
@@ -97,12 +102,15 @@ def messages_only(folder: Path) -> None:
     envelopes = drive(round(SECONDS * MESSAGE_HZ))
     recorders = {"rec-recorder": ours, **({"cluon-OD4toStdout": theirs} if PEER else {})}
     found: dict[str, list[tuple[float, float, int]]] = {name: [] for name in recorders}
-    for number in range(ROUNDS):
+    for number in BUDGET.rounds(ROUNDS, until=0.5):
         for name, recorder in recorders.items():
             path = folder / f"{name}-{number}.rec"
             with recorder(path) as measured:
                 shares = idle(measured), with_messages(measured, envelopes)
             found[name].append((*shares, len(list(read_envelopes(path)))))
+    ours_us, *theirs_us = ([(busy - none) / MESSAGE_HZ * 1e6 for none, busy, _ in rounds] for rounds in found.values())
+    rest = ("cluon-OD4toStdout", theirs_us[0]) if PEER else ()
+    report(cost_row("recorder, processor time of a message", "us", ours_us, *rest, note="" if PEER else NO_PEER))
     print(f"messages only, {MESSAGE_HZ} a second:")
     for name, rounds in found.items():
         none, busy, count = (statistics.median(column) for column in zip(*rounds, strict=True))
@@ -111,16 +119,18 @@ def messages_only(folder: Path) -> None:
         print(f"  {name:18} {busy:6.2%} of a processor ({none:.2%} idle), {cost:3.0f} us a message; {recorded}")
 
 
-def frames_as_well(folder: Path, kind: str, *flags: str) -> None:
+def frames_as_well(folder: Path, until: float, kind: str, *flags: str) -> None:
     shown = pictures()
     rounds = []
-    for number in range(ROUNDS):
+    for number in BUDGET.rounds(ROUNDS, until):
         name, path = f"bench-{os.getpid()}.i420", folder / f"{kind}-{number}.rec".replace(" ", "-")
         options = (f"--cid={CID}", f"--rec={path}", f"--frames={FRAME_HZ}", f"--memories={name}:{SIZE}", *flags)
         with SharedMemory.create(name, len(shown[0])) as memory, service("rec_recorder", folder, *options) as measured:
             none, busy = idle(measured), with_frames(measured, memory, shown)
         recorded = len(list(read_envelopes(path)))
         rounds.append((none, busy, recorded, path.stat().st_size / max(recorded, 1)))
+    costs = [(busy - none) / FRAME_HZ * 1e3 for none, busy, *_ in rounds]
+    report(cost_row(f"recorder, processor time of a frame, {kind}", "ms", costs))
     none, busy, count, size = (statistics.median(column) for column in zip(*rounds, strict=True))
     cost = (busy - none) / FRAME_HZ * 1e3
     print(
@@ -133,10 +143,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         messages_only(Path(name))
         print(f"frames of {SIZE} at {FRAME_HZ} Hz:")
-        frames_as_well(Path(name), "default quality")
-        frames_as_well(Path(name), "lossless", "--lossless")
+        frames_as_well(Path(name), 0.75, "default quality")
+        frames_as_well(Path(name), 1.0, "lossless", "--lossless")
     if not PEER:
-        print("pycluon is not installed: no peer to measure against")
+        print(NO_PEER)
     return 0
 
 

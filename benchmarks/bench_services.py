@@ -9,6 +9,7 @@ memory, when its readers are told, to GroundSteeringRequest for this picture bei
 which the picture was due, which includes drawing it.
 """
 
+import itertools
 import os
 import subprocess
 import sys
@@ -24,6 +25,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import cost_row, report
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from tests.services.gantry.fake_rig import FakeRig
@@ -33,7 +36,10 @@ CID = 126
 REQUEST = "opendlv.proxy.GroundSteeringRequest"
 MAP = "--map-path=tests_registry/maps/kiwi-track"
 SETTLE = 3.0
+PARTS = 4  # of the drive, which are the rounds of the ledger
+LONG, SHORT = 40.0, 8.0  # seconds of the drive, alone and in the ledger
 TICKS = os.sysconf("SC_CLK_TCK")
+Shares = dict[str, list[float]]
 Processes = dict[str, "subprocess.Popen[bytes]"]
 
 
@@ -134,42 +140,48 @@ def answers(session: Session, seconds: float) -> dict[int, int]:
     return heard
 
 
-def report(name: str, milliseconds: Sequence[float]) -> None:
+def show(name: str, milliseconds: Sequence[float]) -> None:
+    report(cost_row(name, "ms", [float(np.median(part)) for part in np.array_split(milliseconds, PARTS)]))
     half, most, nearly_all = np.percentile(milliseconds, (50, 95, 99))
     print(f"{name}: median {half:.1f} ms, 95 % {most:.1f} ms, 99 % {nearly_all:.1f} ms ({len(milliseconds)} pictures)")
 
 
-def measured(programs: dict[str, list[str]], folder: Path, seconds: float, memory: str | None) -> dict[str, float]:
-    """Percent of a core of each; with a memory, prints the latencies of its pictures, too."""
+def measured(programs: dict[str, list[str]], folder: Path, seconds: float, memory: str | None) -> Shares:
+    """Percent of a core of each in each part of the time; with a memory, prints the latencies of its pictures, too."""
+    heard: dict[int, int] = {}
     with running(programs, folder) as processes, Session(CID) as session, ExitStack() as stack:
         watcher = Watcher(memory) if memory else None
         if watcher is not None:
             stack.callback(watcher.close)
-        before, begin = used(processes), time.monotonic()
-        heard = answers(session, seconds)
-        after, span = used(processes), time.monotonic() - begin
+        marks = [(time.monotonic(), used(processes))]
+        for _ in range(PARTS):
+            heard = answers(session, seconds / PARTS) | heard
+            marks.append((time.monotonic(), used(processes)))
         ended = [name for name, process in processes.items() if process.poll() is not None]
     if ended:
         sys.exit(f"ended too soon: {', '.join(ended)}")
     if watcher is not None:
         both = sorted(heard.keys() & watcher.shown.keys())
-        report("picture in memory to request", [(heard[time] - watcher.shown[time]) / 1000 for time in both])
-        report("picture due to request", [(heard[time] - time) / 1000 for time in both])
+        show("picture in memory to request", [(heard[time] - watcher.shown[time]) / 1000 for time in both])
+        show("picture due to request", [(heard[time] - time) / 1000 for time in both])
         print(f"pictures: {len(watcher.shown)} seen, {len(both)} answered")
-    return {name: 100 * (after[name] - before[name]) / span for name in processes}
+    spans = list(itertools.pairwise(marks))
+    return {n: [100 * (b[n] - a[n]) / (end - begin) for (begin, a), (end, b) in spans] for n in processes}
 
 
 def main() -> None:
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 40.0
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SHORT if Budget.given().limited else LONG
     memory = f"bench-{uuid.uuid4().hex[:8]}"
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         shares = measured(in_the_drive(memory, folder), folder, seconds, f"{memory}.argb")
         with FakeRig(folder / "rig") as rig:
             shares.update(measured(alone(memory, rig), folder, seconds / 2, None))
+    for name, parts in shares.items():
+        report(cost_row(f"{name.replace('_', '-')}, processor", "% of a core", parts))
     print(f"processor, percent of a core (load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores):")
-    for name, share in sorted(shares.items(), key=lambda item: -item[1]):
-        print(f"  {name.replace('_', '-'):<18} {share:5.1f} %")
+    for name, parts in sorted(shares.items(), key=lambda item: -sum(item[1])):
+        print(f"  {name.replace('_', '-'):<18} {sum(parts) / len(parts):5.1f} %")
 
 
 if __name__ == "__main__":

@@ -16,16 +16,16 @@ from benchmarks.ledger.ledger import Bench
 
 SECONDS = {
     "bench_bus": 40,
-    "bench_camera": 40,
-    "bench_compile": 100,
-    "bench_docker": 75,
-    "bench_lockstep": 50,
-    "bench_parallel": 50,
-    "bench_pull": 40,
+    "bench_camera": 37,
+    "bench_compile": 85,
+    "bench_docker": 70,
+    "bench_lockstep": 60,
+    "bench_parallel": 75,
+    "bench_pull": 25,
     "bench_rec": 35,
-    "bench_recorder": 35,
-    "bench_replay": 40,
-    "bench_services": 30,
+    "bench_recorder": 33,
+    "bench_replay": 45,
+    "bench_services": 38,
 }
 """Budgets of the benchmarks, less than ten minutes together."""
 OTHERS = 40
