@@ -23,7 +23,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("names", nargs="*", metavar="NAME", help="benchmarks, as 'bus' (default: all)")
     found.add_argument("-o", "--output", type=Path, default=ROOT / "build" / "bench", metavar="DIR")
     found.add_argument(
-        "--seconds", type=float, default=TOTAL, help="budget of all benchmarks together (default: %(default)s)"
+        "--seconds", type=float, default=TOTAL, help="budget of all together, by shares (default: %(default)s)"
     )
     other = found.add_mutually_exclusive_group()
     other.add_argument("--against", type=Path, metavar="FILE", help="compare with a ledger of another commit")
@@ -96,9 +96,12 @@ def main(words: Sequence[str] | None = None) -> int:
     after = ledger_of(ROOT, benches)
     changes = compare(before, after, in_turns=bool(options.against_checkout)) if before else None
     write(options.output, after, changes, before.commit if before else "")
-    failed = any(bench.trouble.startswith("ended with") for bench in benches)
+    failed = any(bench.failed for bench in benches)
     return int(failed or any(change.verdict == WORSE for change in changes or ()))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)

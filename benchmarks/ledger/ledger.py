@@ -22,7 +22,10 @@ class Machine:
 
 @dataclass(frozen=True)
 class Bench:
-    """A run of one benchmark: its rows, how it ended, seconds, and the load average before and after it."""
+    """A run of one benchmark: its rows, seconds, and the load average before and after it.
+
+    ``trouble`` says what was wrong. One that was ended because its time was over has not failed.
+    """
 
     name: str
     rows: tuple[Row, ...]
@@ -30,6 +33,7 @@ class Bench:
     budget: float
     load: tuple[float, float]
     trouble: str = ""
+    failed: bool = False
 
 
 @dataclass(frozen=True)

@@ -52,22 +52,22 @@ def run(script: Path, seconds: float) -> Bench:
         }
         begin, load = time.monotonic(), os.getloadavg()[0]
         with _started([sys.executable, str(script)], checkout, environment) as process:
-            trouble = _wait(process, seconds)
+            code = _wait(process, seconds)
         took = time.monotonic() - begin
         found = tuple(row.read_rows(rows))
+    trouble = f"did not end in {seconds:g} s, and was ended" if code is None else f"ended with {code}" if code else ""
     if not found:
         trouble = trouble or "reported no row"
         found = (row.Row(script.stem, "", note=trouble),)
-    return Bench(script.stem, found, round(took, 1), seconds, (load, os.getloadavg()[0]), trouble)
+    return Bench(script.stem, found, round(took, 1), seconds, (load, os.getloadavg()[0]), trouble, bool(code))
 
 
-def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> str:
-    """What was wrong, in a few words."""
+def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> int | None:
+    """The exit code, None for one that does not end in time."""
     try:
-        code = process.wait(seconds)
+        return process.wait(seconds)
     except subprocess.TimeoutExpired:
-        return f"did not end in {seconds:g} s, and was ended"
-    return f"ended with {code}" if code else ""
+        return None
 
 
 @contextmanager

@@ -60,7 +60,7 @@ def test_modules_come_from_the_checkout_of_the_benchmark(folder: Path) -> None:
 def test_one_that_fails_is_told(folder: Path) -> None:
     (folder / "bench_a.py").write_text(f"{REPORTS}\nos._exit(3)")
     bench = run(folder / "bench_a.py", 60)
-    assert (bench.rows, bench.trouble) == ((ROW,), "ended with 3")
+    assert (bench.rows, bench.trouble, bench.failed) == ((ROW,), "ended with 3", True)
 
 
 def test_one_that_hangs_is_ended_with_its_children_and_keeps_its_rows(
@@ -68,7 +68,7 @@ def test_one_that_hangs_is_ended_with_its_children_and_keeps_its_rows(
 ) -> None:
     up, wait = folder.parent / "child", runner._wait
 
-    def wait_until_it_hangs(process: "subprocess.Popen[bytes]", _seconds: float) -> str:
+    def wait_until_it_hangs(process: "subprocess.Popen[bytes]", _seconds: float) -> int | None:
         while not up.exists() and process.poll() is None:
             time.sleep(0.01)
         return wait(process, 0)
@@ -76,9 +76,11 @@ def test_one_that_hangs_is_ended_with_its_children_and_keeps_its_rows(
     monkeypatch.setattr(runner, "_wait", wait_until_it_hangs)
     (folder / "bench_a.py").write_text(f"{REPORTS}\n{HANGS}")
     bench = run(folder / "bench_a.py", 60)
-    assert (bench.rows, bench.trouble) == ((ROW,), "did not end in 0 s, and was ended")
+    assert (bench.rows, bench.trouble, bench.failed) == ((ROW,), "did not end in 60 s, and was ended", False)
     assert (folder.parent / "end").exists(), "it may clean up"
+    patience = time.monotonic() + 20
     while is_running(int(up.read_text())):
+        assert time.monotonic() < patience, "its child is still there"
         time.sleep(0.01)
 
 
