@@ -20,7 +20,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, rate_row, report
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, rate_row, report
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
@@ -186,6 +186,7 @@ def main() -> int:
     ours: list[Round] = []
     theirs: list[Round] = []
     note, budget = "", Budget.given()
+    plan(*rows([], [], ""))
     if importlib.util.find_spec("pycluon") is None:
         note = "pycluon is not installed: no peer to measure against"
         print(note)

@@ -8,19 +8,20 @@ brings with two at once. In the ledger the test's own time stands for real time,
 import json
 import re
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, cost_row, rate_row, report
+from players import ROOT, finished
 
-ROOT = Path(__file__).resolve().parents[1]
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, rate_row, report
+
 ROUNDS, REPEATS = 3, 10
 SHORT = "sil-closed-straight"
 GOALS = {SHORT: None, "sil-closed-kiwi-track": Goal(20), "sil-perception": Goal(8)}
@@ -33,7 +34,8 @@ def run(report: Path, *words: str) -> tuple[Tests, float]:
     """The tests' results by slug, and the command's seconds."""
     command = [sys.executable, "-m", "dodo_dsl", "run", *words, "--report", str(report)]
     start = time.perf_counter()
-    subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    if code := finished(command, ROOT):
+        raise RuntimeError(f"dodo run {' '.join(words)} ended with {code}")
     seconds = time.perf_counter() - start
     return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}, seconds
 
@@ -47,16 +49,27 @@ def spent(report: Path, slug: str) -> str:
     return ", ".join(f"{who} {seconds / frames * 1000:.1f}" for who, seconds in parts[:6])
 
 
+def speed_row(slug: str, ours: list[float], peer: str = "real time", theirs: Sequence[float] = ()) -> Row:
+    return cost_row(f"{slug} in lockstep", "s", ours, peer, theirs, goal=GOALS.get(slug))
+
+
+def rows_of(alone: list[float], minutes: list[float]) -> list[Row]:
+    return [
+        cost_row(f"{SHORT}, command to end", "s", alone, goal=Goal(1.2, of="value")),
+        rate_row(f"{SHORT}, further runs, two at once", "a minute", minutes, goal=Goal(60, of="value")),
+    ]
+
+
 def speeds(folder: Path, budget: Budget) -> None:
     """The tests one after the other in lockstep."""
     chosen = tuple(GOALS) if budget.limited else LEVELS
     rounds = []
-    for number in budget.rounds(ROUNDS, until=0.6):
+    for number in budget.rounds(ROUNDS):
         rounds.append(run(folder / str(number), *chosen, "--clock", "lockstep", "-j", "1"))
         for slug in rounds[0][0]:
             ours = [tests[slug] for tests, _ in rounds]
             both = [t["execution_s"] for t in ours], "real time", [t["sim_s"] for t in ours]
-            report(cost_row(f"{slug} in lockstep", "s", *both, goal=GOALS.get(slug)))
+            report(speed_row(slug, *both))
     print(f"{'test':24s} lockstep    test time   times real time (median of {len(rounds)}, best)")
     for slug in rounds[0][0]:
         ours = [tests[slug] for tests, _ in rounds]
@@ -70,21 +83,23 @@ def speeds(folder: Path, budget: Budget) -> None:
 
 def one_and_more(folder: Path, budget: Budget) -> None:
     """A short test alone, and again and again in one command."""
-    alone, minutes = [], []
-    for _ in budget.rounds(ROUNDS):
+    alone: list[float] = []
+    minutes: list[float] = []
+    for _ in budget.rounds(ROUNDS, until=0.4):
         alone.append(run(folder / "one", SHORT)[1])
+        report(rows_of(alone, minutes)[0])
         more = run(folder / "more", SHORT, "--repeat", str(REPEATS), "-j", "2")[1]
         minutes.append(60 * (REPEATS - 1) / (more - alone[-1]))
-        report(cost_row(f"{SHORT}, command to end", "s", alone, goal=Goal(1.2, of="value")))
-        report(rate_row(f"{SHORT}, further runs, two at once", "a minute", minutes, goal=Goal(60, of="value")))
+        report(*rows_of(alone, minutes))
     print(f"{SHORT}: {statistics.median(alone):.2f} s, {statistics.median(minutes):.0f} further ones a minute")
 
 
 def main() -> int:
     budget = Budget.given()
+    plan(*(speed_row(slug, []) for slug in GOALS), *rows_of([], []))
     with tempfile.TemporaryDirectory() as name:
-        speeds(Path(name), budget)
         one_and_more(Path(name), budget)
+        speeds(Path(name), budget)
         if not budget.limited:
             tests, seconds = run(Path(name) / "realtime", *LEVELS, "--clock", "realtime", "-j", "1")
             for slug, test in tests.items():

@@ -9,7 +9,6 @@ import json
 import os
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -17,10 +16,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, report
+from players import ROOT, finished
 
-ROOT = Path(__file__).resolve().parents[1]
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
+
 CORES = len(os.sched_getaffinity(0))
 TESTS, FEWER, ROUNDS = 8, 3, 3
 OF_A_CORE = 0.9
@@ -49,7 +49,7 @@ def run(folder: Path, clock: str, tests: int, jobs: int) -> float:
     names = [f"small[n={number}]" for number in range(1, tests + 1)]
     command = [sys.executable, "-m", "dodo_dsl", "run", *names, "--clock", clock, "-j", str(jobs)]
     began = time.monotonic()
-    subprocess.run(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, check=False)
+    finished(command, folder, environment)
     took = time.monotonic() - began
     found = json.loads((folder / "dodo-report" / "results.json").read_text())["tests"]
     wrong = [f"{t['slug']}: {t['reason']}" for t in found if t["outcome"] != "passed"]
@@ -62,23 +62,25 @@ def run(folder: Path, clock: str, tests: int, jobs: int) -> float:
 
 def rounds(folder: Path, clock: str, tests: int, budget: Budget, until: float) -> Row:
     """Both ways in turns."""
-    goal = Goal(OF_A_CORE * CORES) if clock == "lockstep" else None
     together: list[float] = []
     alone: list[float] = []
-    row = Row("", "")
     for number in budget.rounds(ROUNDS, until):
         ways = ((together, CORES if clock == "lockstep" else tests), (alone, 1))
         for times, jobs in ways if number % 2 else reversed(ways):
             times.append(run(folder, clock, tests, jobs))
-        words = f"{tests} tests at once, {clock}"
-        row = cost_row(words, "s", together, "one after the other", alone, goal=goal)
-        report(row)
-    return row
+        report(row_of(clock, tests, together, alone))
+    return row_of(clock, tests, together, alone)
+
+
+def row_of(clock: str, tests: int, together: list[float], alone: list[float]) -> Row:
+    goal = Goal(OF_A_CORE * CORES) if clock == "lockstep" else None
+    return cost_row(f"{tests} tests at once, {clock}", "s", together, "one after the other", alone, goal=goal)
 
 
 def main() -> int:
     budget = Budget.given()
     tests = int(sys.argv[1]) if len(sys.argv) > 1 else TESTS
+    plan(row_of("lockstep", tests, [], []), row_of("realtime", FEWER if budget.limited else tests, [], []))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         small(folder, tests)

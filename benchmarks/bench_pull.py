@@ -20,7 +20,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from benchmarks.ledger.row import Goal, Row, cost_row, report
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
 from dodo_dsl import __version__
 
 PORT = 5917
@@ -28,6 +28,7 @@ HOST = f"127.0.0.1:{PORT}"
 NAMES = ("sandbox", "collision", "dynamic-model", "integrator", "rec-recorder", "virtual-camera")
 LARGEST, PULL = "largest image, unpacked", "cold pull of the suite"
 GOALS = {LARGEST: Goal(250, of="value"), PULL: Goal(1.15, of="value")}
+UNITS = {LARGEST: "MB", PULL: "x the largest image"}
 MANIFEST = "application/vnd.docker.distribution.manifest.v2+json"
 
 
@@ -125,7 +126,7 @@ def largest_here() -> None:
     sizes = {image: int(docker("image", "inspect", "--format", "{{.Size}}", image)) / 1e6 for image in images}
     name = max(sizes, key=lambda image: sizes[image], default="")
     note = f"{name} of {len(sizes)}" if name else f"there is no image {tag} (dodo images build)"
-    row = cost_row(LARGEST, "MB", [sizes[name]] if name else [], goal=GOALS[LARGEST], note=note)
+    row = cost_row(LARGEST, UNITS[LARGEST], [sizes[name]] if name else [], goal=GOALS[LARGEST], note=note)
     report(row)
     print(f"largest image: {note}, {sizes.get(name, 0):.0f} MB unpacked")
 
@@ -140,7 +141,7 @@ def pulls(folder: Path) -> None:
         print(f"{kind:<7} {size / 1e6:7.1f} MB in {len(layers(kind))} layers, {found[kind]:5.1f} s;", end=" ")
         print(f"{times:.3f} times the largest image")
         if kind == "shared":
-            report(cost_row(PULL, "x the largest image", [times], goal=GOALS[PULL]))
+            report(cost_row(PULL, UNITS[PULL], [times], goal=GOALS[PULL]))
     report(cost_row("cold pull, seconds", "s", [found["shared"]], "independent images", [found["alone"]]))
 
 
@@ -159,7 +160,7 @@ def main() -> int:
 
 
 def absent(what: str, why: str) -> int:
-    report(Row(what, "", note=why, goal=GOALS[what], less=True))
+    plan(Row(what, UNITS[what], goal=GOALS[what], less=True), note=why)
     print(f"{what}: {why}: nothing to measure")
     return 0
 

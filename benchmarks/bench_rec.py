@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from players import ROOT, cost_of
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, rate_row, report
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, rate_row, report
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import STANDARD
@@ -145,6 +145,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         path = folder / "drive.rec"
+        plan(*rows({"export": [], "info": []}, 1))
         streams(path, drive(ENVELOPES))
         show(compare(path, folder), folder)
     return 0

@@ -30,7 +30,7 @@ from dodo_dsl.opendlv.video.decoder import VideoDecoder
 
 BUDGET = Budget.given()
 CID, ROUNDS = 125, 5
-SECONDS = 2.0 if BUDGET.limited else 4.0
+SECONDS = 1.0 if BUDGET.limited else 4.0
 NO_PEER = "pycluon is not installed: no peer to measure against"
 MESSAGE_HZ, FRAME_HZ = 1000, 10
 SIZE = "640x480"

@@ -23,7 +23,7 @@ from bench_rec import drive
 from players import Measured, peer, service, tool
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, rate_row, report
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, rate_row, report
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.recordings.writer import RecordingWriter
@@ -143,6 +143,7 @@ def main() -> int:
         envelopes = drive(FAST)
         at_once = [e._replace(sample_time=1_700_000_000_000_000) for e in envelopes]
         budget = Budget.given()
+        plan(fast_row({"": []}), even_row({"": []}))
         count = SHORT if budget.limited else EVEN
         even = [e._replace(sample_time=e.sent) for e in envelopes[:count]]
         fast = in_turns(write(Path(name) / "fast.rec", at_once), FAST, budget, until=0.4)

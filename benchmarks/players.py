@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -17,7 +17,6 @@ child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=[(os.
 _, status, usage = os.wait4(child, 0)
 print(time.perf_counter() - begin, usage.ru_maxrss / 1024, os.waitstatus_to_exitcode(status))
 """
-TICK = 1 / os.sysconf("SC_CLK_TCK")
 
 
 class Measured:
@@ -29,11 +28,9 @@ class Measured:
 
     def processor_time(self) -> float:
         """Seconds so far, of all threads; once it has ended, what was seen last."""
-        try:
-            fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(") ")[2].split()
-        except OSError:
-            return self._last
-        self._last = max(self._last, (int(fields[11]) + int(fields[12])) * TICK)
+        with suppress(OSError):
+            threads = Path(f"/proc/{self.process.pid}/task").glob("*/schedstat")
+            self._last = max(self._last, sum(int(thread.read_text().split()[0]) for thread in threads) / 1e9)
         return self._last
 
 
@@ -48,6 +45,16 @@ def cost_of(command: Sequence[str | Path], folder: Path) -> tuple[float, float]:
     if code:
         raise RuntimeError(f"{' '.join(map(str, command))} ended with {code:.0f}: {found.stderr.strip()[-300:]}")
     return seconds, memory
+
+
+def finished(command: Sequence[str | Path], folder: Path, environment: dict[str, str] | None = None) -> int:
+    """Exit code of a program that stays silent; one that is interrupted with this process may tear down first."""
+    null = subprocess.DEVNULL
+    process = subprocess.Popen(command, cwd=folder, env=environment, stdout=null, stderr=null)
+    try:
+        return process.wait()
+    finally:
+        process.wait()
 
 
 def tool(name: str) -> Path | None:

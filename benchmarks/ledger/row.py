@@ -3,11 +3,12 @@
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 FILE_VARIABLE = "DODO_BENCH_ROWS"
+NOT_REACHED = "no time was left for it"
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,11 @@ def report(*rows: Row) -> None:
     if name:
         with Path(name).open("a") as file:
             file.writelines(json.dumps(row.to_json()) + "\n" for row in rows)
+
+
+def plan(*rows: Row, note: str = NOT_REACHED) -> None:
+    """Reports rows that a benchmark means to measure, with the reason if it does not come to them."""
+    report(*(replace(row, note=note) for row in rows))
 
 
 def read_rows(path: Path) -> list[Row]:

@@ -1,9 +1,9 @@
 """The ledger as a table in Markdown, whose columns are aligned, so that it reads as well in a terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from benchmarks.ledger.compare import Change
-from benchmarks.ledger.ledger import Ledger
+from benchmarks.ledger.ledger import Bench, Ledger
 from benchmarks.ledger.row import Row
 from benchmarks.ledger.spread import Spread
 
@@ -40,7 +40,7 @@ def goal_text(row: Row) -> str:
     if goal is None:
         return ""
     if goal.of == "value":
-        return f"at {'most' if row.less else 'least'} {number(goal.limit)} {row.unit}"
+        return f"at {'most' if row.less else 'least'} {number(goal.limit)} {row.unit}".rstrip()
     rest = "" if goal.quartile is None else f", lower quartile above {number(goal.quartile)}"
     return f"at least {number(goal.limit)}{rest}"
 
@@ -57,13 +57,23 @@ def ledger_table(ledger: Ledger) -> str:
         "",
         *aligned(HEAD, [_cells(row) for row in rows.values()]),
     ]
-    notes = [f"- {row.what}: {row.note}" for row in rows.values() if row.note]
-    notes += [
-        f"- {bench.name}: {bench.trouble}"
-        for bench in ledger.benches
-        if bench.trouble and any(r.ours for r in bench.rows)
-    ]
+    notes = [f"- {note}: {', '.join(names)}" for note, names in by_note(rows).items()]
+    notes += [f"- {bench.trouble}: {bench.name}" for bench in ledger.benches if bench.trouble and is_news(bench)]
     return "\n".join([*lines, *([""] if notes else []), *notes]) + "\n"
+
+
+def is_news(bench: Bench) -> bool:
+    """Whether no row says the benchmark's trouble."""
+    return bench.trouble not in {row.note for row in bench.rows}
+
+
+def by_note(rows: Mapping[str, Row]) -> dict[str, list[str]]:
+    """What has the same note."""
+    found: dict[str, list[str]] = {}
+    for row in rows.values():
+        if row.note:
+            found.setdefault(row.note, []).append(row.what)
+    return found
 
 
 def change_table(changes: Sequence[Change], before: str, after: str) -> str:

@@ -3,7 +3,18 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.ledger.row import FILE_VARIABLE, Goal, Row, cost_row, joined, rate_row, read_rows, report
+from benchmarks.ledger.row import (
+    FILE_VARIABLE,
+    NOT_REACHED,
+    Goal,
+    Row,
+    cost_row,
+    joined,
+    plan,
+    rate_row,
+    read_rows,
+    report,
+)
 
 
 def test_a_ratio_says_how_many_times_as_good_in_each_round() -> None:
@@ -33,6 +44,14 @@ def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path) -> None:
     file.write_text(f'{line}\n[]\n{{"what": 1, "colour": 2}}\n{line[:-9]}')
     assert read_rows(file) == [row]
     assert read_rows(tmp_path / "absent") == []
+
+
+def test_a_planned_row_stays_until_it_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "rows.jsonl"
+    monkeypatch.setenv(FILE_VARIABLE, str(file))
+    plan(rate_row("a", "1/s", [], goal=Goal(2)), cost_row("b", "s", []))
+    report(cost_row("b", "s", [3]))
+    assert read_rows(file) == [Row("a", "1/s", goal=Goal(2), note=NOT_REACHED), cost_row("b", "s", [3])]
 
 
 def test_alone_nothing_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

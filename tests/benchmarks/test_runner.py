@@ -20,7 +20,7 @@ with open(os.environ["DODO_BENCH_ROWS"], "a") as file:
 HANGS = """
 import pathlib, subprocess, time
 try:
-    child = subprocess.Popen(["sleep", "999"])
+    child = subprocess.Popen(["sh", "-c", "trap '' INT; sleep 999"])
     pathlib.Path("part").write_text(str(child.pid))
     pathlib.Path("part").rename("child")
     time.sleep(999)
@@ -89,9 +89,9 @@ def test_one_without_rows_has_a_row_that_says_why(folder: Path) -> None:
     assert run(folder / "bench_a.py", 0.1).rows == (Row("bench_a", "", note="did not end in 0.1 s, and was ended"),)
 
 
-def test_all_together_stay_below_ten_minutes() -> None:
+def test_all_stay_below_ten_minutes_even_if_some_have_to_be_ended() -> None:
     assert SECONDS.keys() == {script.stem for script in scripts(ROOT)}
-    assert sum(SECONDS.values()) + GRACE * len(SECONDS) < 600
+    assert sum(SECONDS.values()) + 5 * GRACE < 600
 
 
 def test_its_variables_are_not_ours(folder: Path) -> None:

@@ -50,9 +50,14 @@ def test_the_table_has_every_row_and_says_what_was_not_measured() -> None:
         "| bus  | 20 messages/s | a peer | 10 messages/s | 2     | 1.75 to 2.5 | 3      | at least 2 | yes     |",
         "| pull | not measured  |        |               |       |             |        | at least 1 | unknown |",
         "",
-        "- pull: no engine answers",
-        "- bench_bus: did not end in 40 s, and was ended",
+        "- no engine answers: pull",
+        "- did not end in 40 s, and was ended: bench_bus",
     ]
+
+
+def test_trouble_that_a_row_tells_is_told_once() -> None:
+    text = ledger_table(ledger(Row("bench_bus", "", note="ended with 3"), trouble="ended with 3"))
+    assert text.splitlines()[-2:] == ["", "- ended with 3: bench_bus"]
 
 
 def test_the_table_of_changes() -> None:
