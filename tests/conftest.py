@@ -30,7 +30,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
-    A test in real time has two more tries if other work on this machine kept it waiting; none if it hangs.
+    A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs.
     """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
@@ -38,7 +38,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.timeout(REALTIME_LIMIT_S))
             tries = {"reruns": REALTIME_RERUNS, "reruns_delay": REALTIME_REST_S, "rerun_except": [HANGS]}
-            item.add_marker(pytest.mark.flaky(**tries, condition=PRESSURE.is_high))
+            item.add_marker(pytest.mark.flaky(**tries))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
 

@@ -9,8 +9,6 @@ import time
 from pathlib import Path
 
 _KERNEL = Path("/proc/pressure/cpu")
-_BUSY = 0.1
-"""Share of the time, as that for which an application may wait until a verdict is undecided."""
 
 
 def _waited() -> float | None:
@@ -36,7 +34,3 @@ class Pressure:
         if waited is None or self._waited is None:
             return None
         return (waited - self._waited) / max(time.monotonic() - self._begin, 0.001)
-
-    def is_high(self) -> bool:
-        """Also where the kernel does not count."""
-        return self.share is None or self.share > _BUSY
