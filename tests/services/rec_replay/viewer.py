@@ -47,8 +47,17 @@ class Viewer:
         raise AssertionError(f"there is no memory {name}")
 
     def _watch(self) -> None:
+        """Looks after each wait: who is told between two of them is not told again."""
         with suppress(SharedMemoryError):
+            last = self._sampled(0)
             while not self._over:
-                if self._memory.wait(0.1):
-                    with self._memory.lock():
-                        self.seen.append((bytes(self._memory.buffer), self._memory.sample_time()))
+                self._memory.wait(0.02)
+                last = self._sampled(last)
+
+    def _sampled(self, last: int) -> int:
+        """The sample time of the picture that is there now, which is kept if it is another one than the ``last``."""
+        with self._memory.lock():
+            sampled = self._memory.sample_time()
+            if last and sampled != last:
+                self.seen.append((bytes(self._memory.buffer), sampled))
+        return sampled
