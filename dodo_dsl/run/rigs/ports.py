@@ -19,17 +19,19 @@ _NUMBER = re.compile(r"[0-9]{1,3}")
 
 
 def known_ports(plan: Plan) -> list[str]:
-    """The ports of the test's rig, of its deployment's others, and of those that the machine's operator names."""
+    """The ports of the test's rig, of its deployment's others, and of those that the machine's operator names.
+
+    Raises MachineError: where the operator's file cannot be read, nobody knows which ports to keep.
+    """
     found = [service.port for service in plan.services if service.port]
     return list(dict.fromkeys([*found, *plan.application.access.ports, *_of_operator()]))
 
 
 def _of_operator() -> Iterator[str]:
     """Terminals among the operator's devices: the others are cameras."""
-    with contextlib.suppress(operator.MachineError):  # said where a rig is used
-        known = operator.machine()
-        for rig in known.rigs if known else ():
-            yield from (device for device in rig.devices if _is_terminal(device))
+    known = operator.machine()
+    for rig in known.rigs if known else ():
+        yield from (device for device in rig.devices if _is_terminal(device))
 
 
 def _is_terminal(device: str) -> bool:

@@ -11,6 +11,7 @@ import pytest
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from dodo_dsl.run.rigs import ports
 from dodo_dsl.run.rigs.problems import RigProblem
+from dodo_dsl.spec.deployment import machine as operator
 from tests.run.scripted import plan
 
 
@@ -71,3 +72,13 @@ def test_no_other_service_opens_the_port_under_any_name(terminals: list[Path]) -
         ports.refuse_shared_port(on_rig(str(rig), camera(str(rig.resolve()))))
     with pytest.raises(RigProblem, match="which only 'pose' may open"):
         ports.refuse_shared_port(on_rig("socket://127.0.0.1:4242", camera("socket://localhost:4242")))
+
+
+def test_where_the_operators_file_is_broken_nothing_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody knows then which ports to keep."""
+    file = tmp_path / "rigs.yml"
+    file.write_text("dodo: 1\nrigs: 3\n")
+    file.chmod(0o644)
+    monkeypatch.setattr(operator, "FILE", file)
+    with pytest.raises(operator.MachineError):
+        ports.masked(plan(), None)
