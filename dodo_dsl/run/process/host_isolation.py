@@ -31,17 +31,23 @@ def namespaces_refusal(fork_server: ForkServer | None = None) -> str:
 
     A sandbox tries it, which the fork server forks, where there is one.
     """
-    answer = _probe(fork_server.fork) if fork_server is not None else {}
+    answer: dict[str, Any] = {}
+    if fork_server is not None:
+        with contextlib.suppress(OSError):  # it has ended, which says nothing about the machine
+            answer = _probe(fork_server.fork)
     answer = answer or _probe(_start)
     return str(answer.get("probe", answer.get("down", "the kernel refuses them")))
 
 
 def _probe(start: Callable[[socket.socket, int, str], "subprocess.Popen[bytes] | None"]) -> dict[str, Any]:
-    """What a sandbox answers that was started with its channel, its log and its slot; nothing when it ended."""
+    """What a sandbox answers that was started with its channel, its log and its slot; nothing when it ended.
+
+    Raises OSError when it cannot be started.
+    """
     process = None
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, Path(os.devnull).open("wb") as nowhere:
-        with theirs, contextlib.suppress(OSError):
+        with theirs:
             process = start(theirs, nowhere.fileno(), "")
         answer: dict[str, Any] = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
         if "up" in answer:
