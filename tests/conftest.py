@@ -12,7 +12,6 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.faults import Book
-from tests.pressure import Pressure
 
 settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
@@ -20,7 +19,6 @@ settings.load_profile("dodo")  # how fast a machine is decides no test; `make ch
 
 REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"
-PRESSURE = Pressure()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -37,19 +35,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.realtime)
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.timeout(REALTIME_LIMIT_S))
-            tries = {"reruns": REALTIME_RERUNS, "reruns_delay": REALTIME_REST_S, "rerun_except": [HANGS]}
-            item.add_marker(pytest.mark.flaky(**tries))
+            item.add_marker(
+                pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S, rerun_except=[HANGS])
+            )
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
-
-
-@pytest.fixture(autouse=True)
-def pressure(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Measured for each try of a test in real time, and kept beside its result."""
-    PRESSURE.begin()
-    yield
-    if request.node.get_closest_marker("realtime") and PRESSURE.share is not None:
-        request.node.user_properties.append(("share of time in which programs waited", round(PRESSURE.share, 3)))
 
 
 @pytest.fixture(autouse=True, scope="session")
