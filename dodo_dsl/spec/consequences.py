@@ -1,4 +1,4 @@
-"""Schema errors that only follow from another one: one mistake is told once."""
+"""Leaves out schema errors that only follow from another one, so that each mistake is reported once."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any

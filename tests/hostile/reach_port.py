@@ -1,4 +1,4 @@
-"""A test on the host whose services and application try to open the port of a rig: as whoever calls it.
+"""Runs a test on the host whose services and application try to open the port of a rig, as the user who calls it.
 
     python -m tests.hostile.reach_port FOLDER PORT
 

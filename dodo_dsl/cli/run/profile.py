@@ -136,7 +136,7 @@ def _row(name: str, phases: list[Phase]) -> str:
 
 
 def _machine_s() -> float:
-    """Seconds that all processors have been busy, whoever used them; NaN where the kernel does not say."""
+    """Processor time used on the whole machine so far, in s; NaN where the kernel does not say."""
     with contextlib.suppress(OSError, ValueError, IndexError):
         user, nice, system, _idle, _wait, *interrupts = map(int, _STAT.read_text().split("\n", 1)[0].split()[1:8])
         return (user + nice + system + sum(interrupts)) / _TICKS

@@ -39,7 +39,7 @@ def decisive(outcome: Outcome, duration: float) -> Moment:
 def _time(evidence: Mapping[str, Any], failed: set[str]) -> tuple[float, str] | None:
     broken, gap, worst = (_number(evidence.get(key)) for key in ("broken-time", "gap-begin", "time"))
     if "broken" in failed and broken is not None:
-        return broken, "the first sample that is no number"
+        return broken, "the first sample that is not a number"
     if failed and failed <= {*_GAPS, "samples", "answered"} and gap is not None:
         return gap, "the begin of the longest silence"
     if worst is None:
