@@ -43,6 +43,12 @@ class MachineLoad:
     """Whether a test that failed is in error, as the machine was too busy."""
 
 
+SLOW_ANSWERS = "slow-answers"
+"""The check of how long answers took; its value differs from run to run, unlike all others of lockstep."""
+SAMPLE_TIMES = "sample-times"
+"""The check that answers carry the sample times of their frames."""
+
+
 @dataclass(frozen=True)
 class Response:
     """How long the application took for an answer in lockstep, without the first; times in s.

@@ -39,7 +39,7 @@ dodo.signals = (function () {
       const wanted = dodo.dom.number(interpolated(target, time));
       return `${n < 0 ? "–" : dodo.dom.number(values[n])} · target ${wanted}`;
     };
-    const parts = [raw.band !== null && `band ±${dodo.dom.number(raw.band)}`, raw.distance !== null && `at most ±${dodo.dom.number(raw.distance)}`];
+    const parts = [raw.band !== null && `band ±${dodo.dom.number(raw.band)}`, raw.distance !== null && `at most ±${dodo.dom.number(raw.distance)}`, raw.problem];
     const title = `${raw.field} of ${data.short(raw.message)}/${raw.sender}`;
     return { title, unit: "", times, values, target, band: raw.band, reach: raw.distance, marked, text, note: parts.filter(Boolean).join(", ") };
   }

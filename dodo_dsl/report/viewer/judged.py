@@ -60,10 +60,12 @@ def number(text: str | None) -> float | None:
 def _signal(
     service: PlannedService, flags: Mapping[str, str], folder: Path, test: RecordedTest, messages: MessageSet
 ) -> dict[str, Any]:
+    problem = ""
     try:
         times, values = _target(flags, folder, test, messages)
-    except (OSError, ValueError, IndexError):
+    except (OSError, ValueError, IndexError) as error:
         times, values = target.EMPTY
+        problem = shown(f"its target is not shown: {getattr(error, 'strerror', None) or error}", 200)
     return {
         "kind": "signal",
         "evaluator": service.name,
@@ -75,6 +77,7 @@ def _signal(
         "distance": number(flags.get("max-distance")),
         "from": number(flags.get("from")),
         "until": number(flags.get("until")),
+        "problem": problem,
     }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS, Outcome
 from dodo_dsl.plan.model import Place, Plan, PlannedService
 from dodo_dsl.report.viewer.encoded import shown
 from dodo_dsl.report.viewer.scene import flags_of
@@ -15,9 +15,10 @@ _OTHER_NAMES = {
     "time-to-goal": ("max-time", "goal"),
     "wall-margin": ("min-margin", "walls"),
     "answered": ("min-frames",),
-    "response": ("max-response",),
 }
 """Parameters that set the limit of a check whose name does not name them."""
+_OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
+"""Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
 _ENDINGS = ("-over-time",)
 _MOST_SPEC = 1 << 20
 
@@ -66,6 +67,8 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines) -> Iterator[dict[str,
 
 
 def _places(plan: Plan, check: str) -> Iterator[tuple[str, Place]]:
+    if check in _OF_THE_TEST and "response" in plan.source_map:
+        yield _OF_THE_TEST[check], plan.source_map["response"]
     for service in plan.services:
         if not service.judge:
             continue

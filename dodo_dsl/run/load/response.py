@@ -4,14 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dodo_dsl.outcome import Response
+from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS, Response
 from dodo_dsl.plan.model import Lockstep
 from dodo_dsl.run.outcomes import Finding
 
-CHECK = "slow-answers"
-"""The check of a test's limit; its value differs from run to run, unlike all others of lockstep."""
-COPIED = "sample-times"
-"""The check that answers carry the sample times of their frames."""
 UNSEEN = "the limit of the time of an answer is not judged, as what containers wait for a processor cannot be seen"
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
@@ -48,7 +44,7 @@ def _times(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
     limit = f"{lockstep.max_response_s * 1000:g} ms (at most {allowed * 100:g} %)"
     reason = f"{response.over} of {response.answers} answers took longer than {limit}: {response.in_words()}"
     ok = share <= allowed
-    yield "" if ok else reason, {"name": CHECK, "value": share, "limit": {"max": allowed}, "unit": "", "ok": ok}
+    yield "" if ok else reason, {"name": SLOW_ANSWERS, "value": share, "limit": {"max": allowed}, "unit": "", "ok": ok}
 
 
 def _copies(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
@@ -56,7 +52,7 @@ def _copies(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
         return
     reason = f"{response.uncopied} of {response.answers} answers did not carry the sample time of their frame"
     ok = response.uncopied == 0
-    check = {"name": COPIED, "value": response.uncopied, "limit": {"max": 0}, "unit": "", "ok": ok}
+    check = {"name": SAMPLE_TIMES, "value": response.uncopied, "limit": {"max": 0}, "unit": "", "ok": ok}
     yield "" if ok else reason, check
 
 

@@ -83,3 +83,11 @@ def test_lines_of_the_map_have_roles(tmp_path: Path) -> None:
         "finish": "goal",
     }
     assert (shown["length"], shown["width"], shown["frame"]["sender"]) == (0.36, 0.16, 0)
+
+
+def test_a_target_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+    record(tmp_path / "test.rec", MadeDrive("x", 5.0, [], {}))
+    test = recorded.read(tmp_path / "test.rec", MESSAGES)
+    (signal,) = judged.judged(plan(Flag("target", "none.csv", "path")), tmp_path, test, MESSAGES)
+    assert signal["problem"] == "its target is not shown: No such file or directory"
+    assert signal["target"] == {"times": "", "values": ""}

@@ -11,6 +11,7 @@ from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.report.viewer.limits import SpecLines, checks
 from tests.report.viewer.drives import GOLDEN, ROOT, check
 
+RESPONSE = "response: {max: 100 ms, over: 10 %, sample-times: copied}"
 OUTCOME = Outcome("t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad", 130, 0, "lockstep", "process")
 
 
@@ -21,6 +22,9 @@ OUTCOME = Outcome("t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad", 1
         ("sil-open-straight", "mean-over-time", [("max-mean", 19, "max-mean: 0.014")]),
         ("sil-open-straight", "gap", [("", 13, "signal:")]),
         ("sil-open-straight", "unheard-of", []),
+        ("sil-open-straight", "slow-answers", []),
+        ("dil-static-rig", "slow-answers", [("max", 9, RESPONSE)]),
+        ("dil-static-rig", "sample-times", [("sample-times", 9, RESPONSE)]),
     ],
 )
 def test_places_of_limits(slug: str, name: str, expected: list[tuple[str, int, str]]) -> None:

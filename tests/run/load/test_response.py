@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from dodo_dsl.outcome import Response
+from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS, Response
 from dodo_dsl.plan.model import Lockstep
-from dodo_dsl.run.load.response import CHECK, COPIED, UNSEEN, judged
+from dodo_dsl.run.load.response import UNSEEN, judged
 
 FAST = Response(60, 0.1, 0.012, 0.02, 0.03, 0.01, 0.015, 0.02, 0, None, "Some CPU, 2000 MHz")
 PLAIN, LIMITED = Lockstep(1, 60.0), Lockstep(1, 60.0, 0.1, 0.1)
@@ -36,7 +36,9 @@ def test_too_slow_for_real_time_is_a_note() -> None:
 @pytest.mark.parametrize(("over", "passes"), [(0, True), (6, True), (7, False)])
 def test_a_limit_is_a_check(over: int, passes: bool) -> None:
     found = judged(replace(FAST, over=over), LIMITED, ["perception", "steering"])
-    assert found.checks == ({"name": CHECK, "value": over / 60, "limit": {"max": 0.1}, "unit": "", "ok": passes},)
+    assert found.checks == (
+        {"name": SLOW_ANSWERS, "value": over / 60, "limit": {"max": 0.1}, "unit": "", "ok": passes},
+    )
     assert bool(found.findings) is not passes
 
 
@@ -57,7 +59,7 @@ def test_where_processes_cannot_be_seen_a_busy_machine_blames_nobody() -> None:
 @pytest.mark.parametrize("uncopied", [0, 1, 60])
 def test_sample_times_have_to_be_copied_where_the_test_says_so(uncopied: int) -> None:
     found = judged(replace(FAST, uncopied=uncopied), replace(LIMITED, is_copied=True), ["perception"])
-    (check,) = (check for check in found.checks if check["name"] == COPIED)
+    (check,) = (check for check in found.checks if check["name"] == SAMPLE_TIMES)
     assert (check["value"], check["limit"], check["ok"]) == (uncopied, {"max": 0}, uncopied == 0)
     reasons = [f"{uncopied} of 60 answers did not carry the sample time of their frame"] if uncopied else []
     assert [finding.reason for finding in found.findings] == reasons
