@@ -45,8 +45,8 @@ class MachineLoad:
 
 SLOW_ANSWERS = "slow-answers"
 """The check of how long answers took; its value differs from run to run, unlike all others of lockstep."""
-SAMPLE_TIMES = "sample-times"
-"""The check that answers carry the sample times of their frames."""
+SAMPLE_TIMES = "uncopied-sample-times"
+"""The check of how many answers lacked the sample times of their frames."""
 
 
 @dataclass(frozen=True)

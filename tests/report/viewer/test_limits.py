@@ -24,7 +24,7 @@ OUTCOME = Outcome("t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad", 1
         ("sil-open-straight", "unheard-of", []),
         ("sil-open-straight", "slow-answers", []),
         ("dil-static-rig", "slow-answers", [("max", 9, RESPONSE)]),
-        ("dil-static-rig", "sample-times", [("sample-times", 9, RESPONSE)]),
+        ("dil-static-rig", "uncopied-sample-times", [("sample-times", 9, RESPONSE)]),
     ],
 )
 def test_places_of_limits(slug: str, name: str, expected: list[tuple[str, int, str]]) -> None:
