@@ -1,6 +1,8 @@
 """The network of a test: its containers hear one another's multicast, and reach neither the host nor others."""
 
+import ipaddress
 import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from tests.docker.compose import IMAGE, Crate
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
-SUBNET = "10.213.239.0/28"
+SUBNETS = [f"10.213.{third}.{fourth}/28" for third in range(230, 240) for fourth in range(0, 256, 16)]
 TALK = """
 import errno, json, socket, threading, time
 GROUP = ("225.0.0.111", 12175)
@@ -39,14 +41,14 @@ threading.Thread(target=say, daemon=True).start()
 names = set()
 while len(names) < 2:
     names.add(heard.recv(100))
-print(json.dumps({"gateway": reaches("10.213.239.1"), "host": reaches(HOST)}), flush=True)
+print(json.dumps({"gateway": reaches(GATEWAY), "host": reaches(HOST)}), flush=True)
 time.sleep(8)
 """
 
 
 def networks(outside: bool) -> object:
     """The networks of a compiled test."""
-    common = ("", "sil", "closed-loop", 10.0, "realtime", "network", 1, 140, SUBNET, "sil", "dodo/sandbox:1", ())
+    common = ("", "sil", "closed-loop", 10.0, "realtime", "network", 1, 140, SUBNETS[0], "sil", "dodo/sandbox:1", ())
     plan = Plan("t", "t", "t.dodo.yml", *common, Application(".", (), access=Access(outside=outside)))
     texts = {file.path: file.text for file in render_plan(plan)}
     return yaml.safe_load(texts["t/environment.compose.yml"])["networks"]
@@ -58,18 +60,28 @@ def host() -> str:
     return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
 
 
+def up(folder: Path, project: str, outside: bool) -> subprocess.CompletedProcess[str]:
+    """What two containers say, in the first subnet that is free: an interrupted run may have left its network."""
+    file = folder / "docker-compose.yml"
+    compose = ["docker", "compose", "-p", project, "-f", str(file)]
+    for subnet in SUBNETS:
+        gateway = str(next(ipaddress.ip_network(subnet).hosts()))
+        script = f"HOST, GATEWAY = {host()!r}, {gateway!r}\n{TALK}".replace("$", "$$")
+        service = {"image": IMAGE, "entrypoint": ["python3", "-c", script], "stop_grace_period": "0s"}
+        file.write_text(yaml.safe_dump({"services": {"a": service, "b": service}, "networks": networks(outside)}))
+        environment = os.environ | {"DODO_SUBNET": subnet}
+        words = [*compose, "up", "--no-log-prefix"]
+        try:
+            done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120, env=environment)
+        finally:
+            subprocess.run([*compose, "down", "-v"], capture_output=True, check=True, env=environment)
+        if "overlaps" not in done.stderr:
+            return done
+    pytest.fail(f"no subnet is free: {done.stderr}")
+
+
 @pytest.mark.parametrize("outside", [False, True])
 def test_what_containers_reach(outside: bool, tmp_path: Path, crate: Crate) -> None:
-    script = f"HOST = {host()!r}\n{TALK}"
-    service = {"image": IMAGE, "entrypoint": ["python3", "-c", script.replace("$", "$$")], "stop_grace_period": "0s"}
-    file = tmp_path / "docker-compose.yml"
-    file.write_text(yaml.safe_dump({"services": {"a": service, "b": service}, "networks": networks(outside)}))
-    command = ["docker", "compose", "-p", f"dodo-{crate.mark}-net", "-f", str(file)]
-    try:
-        done = subprocess.run(
-            [*command, "up", "--no-log-prefix"], capture_output=True, text=True, check=False, timeout=120
-        )
-    finally:
-        subprocess.run([*command, "down", "-v"], capture_output=True, check=True)
+    done = up(tmp_path, f"dodo-{crate.mark}-net", outside)
     said = [json.loads(line[line.index("{") :]) for line in done.stdout.splitlines() if "{" in line]
     assert said == 2 * [{"gateway": outside, "host": outside}], done.stdout + done.stderr
