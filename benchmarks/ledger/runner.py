@@ -70,10 +70,18 @@ def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> int | None:
         return None
 
 
+def _interruptible() -> None:
+    """Undoes what shells do to programs in the background: they ignore SIGINT, and so would the benchmark."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @contextmanager
 def _started(command: list[str], folder: Path, environment: dict[str, str]) -> Iterator["subprocess.Popen[bytes]"]:
     """A process with a group of its own, all of which is gone after the block; first they may clean up."""
-    process = subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True)
+    process = subprocess.Popen(
+        command, cwd=folder, env=environment, start_new_session=True,
+        preexec_fn=_interruptible,  # noqa: PLW1509 - the ledger has one thread
+    )  # fmt: skip
     try:
         yield process
     finally:
