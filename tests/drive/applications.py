@@ -32,7 +32,7 @@ def dodo(*words: str, code: int | tuple[int, ...], before: Sequence[str] = ()) -
     finally:
         process.kill()
     assert process.returncode in (code if isinstance(code, tuple) else (code,)), output
-    assert "Traceback" not in output
+    assert "Traceback" not in output, output
     return output
 
 

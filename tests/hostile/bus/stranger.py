@@ -264,7 +264,8 @@ def attached(app: Application) -> SharedMemory:
 
 def main() -> None:
     by_bus = dict(pair.split("=") for pair in FLAGS["attacks"].split(","))
-    attack = ATTACKS[by_bus[FLAGS["cid"]]]
+    names = set(by_bus.values())
+    attack = ATTACKS[names.pop() if len(names) == 1 else by_bus[FLAGS["cid"]]]
     with Session(int(FLAGS["cid"])) as session:
         app = Application(session)
         app.sampled = time.time_ns() // 1000

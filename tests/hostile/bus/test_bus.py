@@ -34,7 +34,10 @@ ON_THE_HOST = [
 
 
 def attacked(folder: Path, attacks: list[BusAttack], isolation: str = "network") -> dict[str, dict[str, Any]]:
-    """The results of attacks, in one run: the application knows by its bus which is its own."""
+    """The results of attacks, in one run: the application knows by its bus which is its own.
+
+    On the host other tests may have leased the first buses, so there one attack runs at a time.
+    """
     tests = registry(folder)
     specs = [str(variant(tests, each.test, named(each), isolation=isolation)) for each in attacks]
     by_bus = ",".join(f"{cid}={each.name}" for cid, each in enumerate(attacks, FIRST_CID))
@@ -46,9 +49,10 @@ def attacked(folder: Path, attacks: list[BusAttack], isolation: str = "network")
     given = ("--application", str(compose), "--report", str(report), "--clock", attacks[0].clock)
     dodo("run", *specs, *given, code=(1, 3))
     found = {slug.partition("--")[0]: test for slug, test in results(report).items()}
-    assert {name: test["cid"] for name, test in found.items()} == {
-        named(each): cid for cid, each in enumerate(attacks, FIRST_CID)
-    }
+    if isolation == "network":
+        assert {name: test["cid"] for name, test in found.items()} == {
+            named(each): cid for cid, each in enumerate(attacks, FIRST_CID)
+        }
     return found
 
 
