@@ -16,11 +16,13 @@ from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled
 from dodo_dsl.application.access.model import AccessFinding
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
 from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
+from dodo_dsl.run.docker.builds import is_built, private_images
 from dodo_dsl.run.docker.masks import masks
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.protocol import BackendError
@@ -41,6 +43,7 @@ class Compose:
         self.project = project
         self.services: dict[str, Any] = {}
         self._volumes: dict[str, Any] = {}
+        self._images: dict[str, str] = {}
         self._say = say
         self._paths = application_paths(plan.application, folder)
         outside = secret_variables.visible(os.environ, plan.application.access.passed)
@@ -96,14 +99,19 @@ class Compose:
     async def provide_images(self, pulls: Pulls) -> None:
         """Pulls and builds the services' images, once for all tests of a run; raises BackendError."""
         application = {s.name for s in self.plan.application.services}
-        built = [name for name, s in self.services.items() if "build" in s and "@" not in s.get("image", "")]
+        built = [name for name, s in self.services.items() if is_built(s)]
+        self._images = private_images(self.services, application)
         own = {s["image"] for name, s in self.services.items() if name not in application}
-        foreign = {s["image"] for name, s in self.services.items() if name in application and name not in built}
+        foreign = {
+            s["image"]
+            for name, s in self.services.items()
+            if name in application and name not in built and image_variable(name) not in self._images
+        }
         for note in await pulls.provide(own, foreign, self._say):
             self._say(note)
         named = [name for name in built if "image" in self.services[name]]
         if named:
-            key = json.dumps([self.services[name]["build"] for name in named])
+            key = json.dumps([self._images[image_variable(name)] for name in named])
             await pulls.once(key, lambda: self._build(named, _BUILD_PROJECT))
         if len(named) < len(built):
             await self._build([name for name in built if name not in named], self.project)
@@ -152,7 +160,8 @@ class Compose:
         self, *words: str, subnet: str = "", log: Path | None = None, project: str = "", files: str = ""
     ) -> tuple[int, str, str]:
         """Exit code, standard output and the last line of standard error of a compose command."""
-        environment = {**self._outside, "COMPOSE_PROJECT_NAME": project or self.project, "COMPOSE_PROGRESS": "plain"}
+        environment = {**self._outside, **self._images, "COMPOSE_PROGRESS": "plain"}
+        environment["COMPOSE_PROJECT_NAME"] = project or self.project
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
             environment.pop(name, None)  # the test's own .env sets them
         environment[RUNNER_VARIABLE] = "dodo"
