@@ -53,7 +53,7 @@ engine-tests:
 	$(PYTEST) -m engine --junitxml=$(JUNIT)/engine.xml
 
 fast-tests:
-	nice -n 5 $(PYTEST) -m "not slow" --junitxml=$(JUNIT)/fast.xml
+	$(PYTEST) -m "not slow" --junitxml=$(JUNIT)/fast.xml
 
 slow-tests:
 	$(PYTEST) -n $(WORKERS) --dist loadgroup -m "slow and not engine and not realtime" --junitxml=$(JUNIT)/slow.xml
