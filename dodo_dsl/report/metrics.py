@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
+from dodo_dsl.margins import worst_margin
 from dodo_dsl.outcome import Outcome
 
 
 def to_text(outcomes: Sequence[Outcome]) -> str:
-    """Duration of set-up and execution, outcome and every check's value, labelled with the test."""
+    """Duration of set-up and execution, outcome, margins and every check's value, labelled with the test."""
     from prometheus_client import CollectorRegistry, Gauge
     from prometheus_client.openmetrics.exposition import generate_latest
 
@@ -15,14 +16,22 @@ def to_text(outcomes: Sequence[Outcome]) -> str:
     execution = Gauge("dodo_execution_seconds", "Time from ready to the end", ["test"], registry=registry)
     passed = Gauge("dodo_passed", "1 when the test passed", ["test"], registry=registry)
     value = Gauge("dodo_check_value", "Value of an evaluator's check", ["test", "check", "unit"], registry=registry)
+    margin = Gauge(
+        "dodo_check_margin", "Distance of the value to its limit", ["test", "check", "unit"], registry=registry
+    )
+    worst = Gauge("dodo_worst_margin", "Least margin of the checks, -1 to 1", ["test"], registry=registry)
     for outcome in outcomes:
         passed.labels(outcome.slug).set(outcome.outcome == "passed")
         if outcome.setup_s is not None:
             setup.labels(outcome.slug).set(round(outcome.setup_s, 3))
         if outcome.execution_s is not None:
             execution.labels(outcome.slug).set(round(outcome.execution_s, 3))
+        if (share := worst_margin(outcome)) is not None:
+            worst.labels(outcome.slug).set(share)
         for check in outcome.checks:
             if check["value"] is not None:
                 value.labels(outcome.slug, check["name"], check.get("unit") or "").set(check["value"])
+            if check.get("margin") is not None:
+                margin.labels(outcome.slug, check["name"], check.get("unit") or "").set(check["margin"])
     text: str = generate_latest(registry).decode()  # type: ignore[no-untyped-call]
     return text

@@ -15,7 +15,7 @@ class Ready:
 
 @dataclass(frozen=True)
 class VerdictEvent:
-    """A well-formed verdict line of an evaluator."""
+    """A well-formed verdict line of an evaluator; its checks have their margins."""
 
     service: str
     passed: bool

@@ -6,6 +6,7 @@ import math
 import re
 from typing import Any
 
+from dodo_dsl.margins import with_margin
 from dodo_dsl.outcome import Response
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.recorder_service import RECORDER
@@ -60,7 +61,7 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         if problem := _problem(message):
             return Malformed(service, problem)
         passed, evidence = message["outcome"] == "passed", message.get("evidence", {})
-        return VerdictEvent(service, passed, message["reason"], tuple(message["checks"]), evidence)
+        return VerdictEvent(service, passed, message["reason"], tuple(map(with_margin, message["checks"])), evidence)
     if kind == "flood" and service == RECORDER:
         return _flood(service, message)
     return _clock_event(kind, message) if service == CLOCK else None

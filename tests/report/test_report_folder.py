@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.margins import with_margin
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.outcome import Outcome
@@ -77,6 +78,7 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     report = tmp_path / "out" / "report"
     recording(report / "test" / "test.rec", frame(0), frame(1))
     checks = tuple({"name": name, "value": 2, "limit": {}, "unit": "", "ok": True} for name in ("late", "mean"))
+    checks = (*checks, with_margin({"name": "lag", "value": 0.5, "limit": {"max": 0.75}, "unit": "s", "ok": True}))
     outcome = replace(OUTCOME, description="Drive & turn.", checks=checks)
     other = replace(OUTCOME, name="other", slug="other", spec="t/gone.dodo.yml")
     spec = tmp_path / "t" / "t.dodo.yml"
@@ -90,6 +92,7 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     assert "Test: t/gone.dodo.yml" in page
     assert "<td>late<br><small>samples or detections that came too late to be judged, ignored</small></td>" in page
     assert "<td>mean</td>" in page
+    assert '<td class="number">max 0.75 s </td>\n          <td class="number">0.25 s</td>' in page
 
 
 def test_what_the_page_explains_are_checks_of_services() -> None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl.margins import with_margin
 from dodo_dsl.outcome import Response
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.run.protocol import (
@@ -25,6 +26,7 @@ from dodo_dsl.run.protocol import (
 from dodo_dsl.run.service_protocol import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
+JUDGED = {**CHECK, "margin": 0.5, "margin_share": 0.2}
 
 
 def line(**changes: object) -> bytes:
@@ -32,8 +34,8 @@ def line(**changes: object) -> bytes:
 
 
 def test_a_complete_verdict_is_taken_from_an_evaluator() -> None:
-    assert read_line("track", True, line()) == VerdictEvent("track", True, "done", (CHECK,))
-    assert read_line("track", True, line(outcome="failed")) == VerdictEvent("track", False, "done", (CHECK,))
+    assert read_line("track", True, line()) == VerdictEvent("track", True, "done", (JUDGED,))
+    assert read_line("track", True, line(outcome="failed")) == VerdictEvent("track", False, "done", (JUDGED,))
     assert read_line("track", False, line()) is None
     assert read_line("camera", False, b'{"dodo": "ready"}\n') == Ready("camera")
 
@@ -66,7 +68,7 @@ def test_notes_and_the_end_of_the_input_are_taken_from_every_service() -> None:
 def test_a_verdict_may_carry_the_data_of_its_decision() -> None:
     evidence = {"time": 5.2, "obstacle": "left", "x": None, "sample-time": 1_700_000_005_200_000}
     event = read_line("track", True, line(evidence=evidence))
-    assert event == VerdictEvent("track", True, "done", (CHECK,), evidence)
+    assert event == VerdictEvent("track", True, "done", (JUDGED,), evidence)
     assert isinstance(event, VerdictEvent)
     assert event.as_json() == {"evaluator": "track", "outcome": "passed", "reason": "done", "evidence": evidence}
 
@@ -204,7 +206,8 @@ def test_every_well_formed_verdict_is_taken(
 ) -> None:
     document = {"dodo": "verdict", "outcome": "passed" if passed else "failed", "reason": reason, "checks": checks}
     text = json.dumps(document, ensure_ascii=ascii_).encode()
-    assert read_line("track", True, b" " + text + b"\r\n") == VerdictEvent("track", passed, reason, tuple(checks))
+    expected = VerdictEvent("track", passed, reason, tuple(map(with_margin, checks)))
+    assert read_line("track", True, b" " + text + b"\r\n") == expected
 
 
 @given(st.binary(max_size=200) | st.text(max_size=100).map(lambda t: ('{"dodo": ' + t).encode("utf-8", "replace")))

@@ -72,7 +72,9 @@ def _checks(verdict: VerdictEvent) -> Iterator[str]:
         sides = {"min": "at least", "max": "at most"}
         limits = " and ".join(f"{sides[side]} {value:g}{unit}" for side, value in check["limit"].items())
         value = "none" if check["value"] is None else f"{_text(check['value'])}{unit}"
-        said = f"{value}{f' ({limits})' if limits else ''}"
+        margin = check.get("margin")
+        margin_text = "" if margin is None else f", margin {_text(margin)}{unit}"
+        said = f"{value}{f' ({limits})' if limits else ''}{margin_text}"
         yield f"  {printable(check['name']):<16} {said}{'' if check['ok'] else '  broken'}"
 
 

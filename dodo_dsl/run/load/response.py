@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from dodo_dsl.margins import with_margin
 from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS, Response
 from dodo_dsl.plan.model import Lockstep
 from dodo_dsl.run.outcomes import Finding
@@ -32,7 +33,7 @@ def judged(response: Response | None, lockstep: Lockstep | None, services: Seque
     every = [*_times(response, lockstep), *_copies(response, lockstep)]
     who = services[0] if services else ""
     findings = tuple(Finding("failed", reason, who) for reason, _ in every if reason)
-    return JudgedResponse(findings, tuple(check for _, check in every), tuple(_notes(response, lockstep)))
+    return JudgedResponse(findings, tuple(with_margin(check) for _, check in every), tuple(_notes(response, lockstep)))
 
 
 def _times(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:

@@ -8,6 +8,7 @@ import pytest
 from dodo_dsl.cli.judge.known_run import KnownRun
 from dodo_dsl.cli.judge.output import as_text
 from dodo_dsl.cli.main import main
+from dodo_dsl.margins import with_margin
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, Plan
 from dodo_dsl.run.outcomes import Finding
@@ -71,6 +72,7 @@ def test_the_text_has_checks_evidence_and_what_the_run_said() -> None:
     checks: tuple[dict[str, object], ...] = (
         {"name": "time-to-goal", "value": None, "limit": {"max": 3.0}, "unit": "s", "ok": False},
         {"name": "gates", "value": 2, "limit": {}, "unit": "", "ok": True},
+        with_margin({"name": "wall-margin", "value": 0.25, "limit": {"min": 0.125}, "unit": "m", "ok": True}),
     )
     verdict = VerdictEvent("track", False, "too late", checks, {"time": 3.01, "obstacle": "left"})
     judgement = Judgement(Finding("failed", "too late", "track"), (verdict,))
@@ -84,6 +86,7 @@ def test_the_text_has_checks_evidence_and_what_the_run_said() -> None:
         "track failed\n"
         "  time-to-goal     none (at most 3 s)  broken\n"
         "  gates            2\n"
+        "  wall-margin      0.25 m (at least 0.125 m), margin 0.125 m\n"
         "  time             3.01\n"
         "  obstacle         left\n"
     )

@@ -1,0 +1,27 @@
+"""Metrics have the margins of checks with limits, and one of the test."""
+
+from dataclasses import replace
+
+from dodo_dsl.margins import with_margin
+from dodo_dsl.report.metrics import to_text
+from tests.report.test_report_folder import OUTCOME
+
+CHECKS = (
+    with_margin({"name": "wall-margin", "value": 0.03, "limit": {"min": 0.05}, "unit": "m", "ok": False}),
+    with_margin({"name": "distance", "value": 4.5, "limit": {}, "unit": "m", "ok": True}),
+)
+
+
+def samples(text: str, name: str) -> list[str]:
+    return [line.partition("{")[2] for line in text.splitlines() if line.startswith(f"{name}{{")]
+
+
+def test_margins_are_labelled_as_values_are() -> None:
+    text = to_text([replace(OUTCOME, checks=CHECKS)])
+    assert samples(text, "dodo_check_margin") == ['check="wall-margin",test="test",unit="m"} -0.020000000000000004']
+    assert len(samples(text, "dodo_check_value")) == 2
+    assert samples(text, "dodo_worst_margin") == ['test="test"} -0.28571428571428575']
+
+
+def test_an_error_has_no_margin() -> None:
+    assert samples(to_text([replace(OUTCOME, outcome="error")]), "dodo_worst_margin") == []
