@@ -32,6 +32,7 @@ COMMANDS = {
     "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),
     "report": Subcommand("report", "write the report of a finished run again"),
     "judge": Subcommand("judge.command", "judge the recording of a test again, also by other limits"),
+    "stats": Subcommand("stats.command", "show how many services the tests share"),
     "rec": Subcommand("rec.command", "inspect, cut and export recordings"),
     "images": Subcommand("images", "build and push the images of DoDo's services, and say what they are made of"),
     "rig": Subcommand("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),

@@ -1,0 +1,13 @@
+"""Quantiles against SciPy's."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from dodo_dsl.cli.stats.student_t import quantile
+
+
+@given(st.floats(0.5, 0.9999), st.integers(1, 200))
+def test_quantiles(probability: float, freedom: int) -> None:
+    assert quantile(probability, freedom) == pytest.approx(stats.t.ppf(probability, freedom), rel=1e-6, abs=1e-9)
