@@ -18,8 +18,9 @@ from dodo_dsl.emit.render import File, render_pipeline
 from dodo_dsl.plan.build import Compiled, build
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.deployment.rig import PORT
+from dodo_dsl.spec.load import load_spec
 from dodo_dsl.spec.manifest import Manifest, load_manifests
-from dodo_dsl.spec.model import Spec, load_spec
+from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import locate
 from dodo_dsl.spec.settings import Settings, applied
 
@@ -86,9 +87,10 @@ def load(
     if files := application or deployment.application:
         source, problems = read_application(files, access(deployment), deployment.sandbox)
         found.extend(problems)
-    specs = (applied(spec, settings) for instances, _ in loaded for spec in instances)
+    specs = [applied(spec, settings) for instances, _ in loaded for spec in instances]
     tests = tuple(resolve(specs, manifests, deployment, source))
-    by_rules = check(tests, manifests, deployment, source)
+    corners = resolve((applied(c, settings) for s in specs for c in s.corners), manifests, deployment, source)
+    by_rules = check(tests, manifests, deployment, source, corners)
     found.extend(itertools.chain.from_iterable(by_rules.values()))
     return Checked(deployment, manifests, tests, tuple(ordered(found)), settings, source, tuple(empty), by_rules)
 

@@ -47,19 +47,31 @@ def check(
     manifests: Mapping[str, Manifest],
     deployment: Deployment,
     application: ApplicationSource | None = None,
+    corners: Iterable[ResolvedTest] = (),
 ) -> dict[Path, list[Diagnostic]]:
-    """All problems of all instances, by spec; ``tests`` are also the ones whose names may collide."""
+    """All problems of all instances, by spec; ``tests`` are also the ones whose names may collide.
+
+    ``corners`` are instances at the ends of their ranges, whose problems are added to those of the others.
+    """
     everything = tuple(tests)
     by_name: dict[str, dict[Path, Spec]] = {}
     for test in everything:
         by_name.setdefault(test.spec.name or "", {}).setdefault(test.spec.path, test.spec)
     named = {name: list(specs.values()) for name, specs in by_name.items()}
-    instances: dict[Path, list[tuple[Spec, list[Diagnostic]]]] = {}
-    for test in everything:
-        context = RuleContext(test, manifests, named, deployment, application)
-        found = [diagnostic for rule in RULES for diagnostic in rule(context)]
-        instances.setdefault(test.spec.path, []).append((test.spec, found))
-    return {path: list(_with_instances(group)) for path, group in instances.items()}
+
+    def by_path(tests: Iterable[ResolvedTest]) -> dict[Path, list[tuple[Spec, list[Diagnostic]]]]:
+        groups: dict[Path, list[tuple[Spec, list[Diagnostic]]]] = {}
+        for test in tests:
+            context = RuleContext(test, manifests, named, deployment, application)
+            found = [diagnostic for rule in RULES for diagnostic in rule(context)]
+            groups.setdefault(test.spec.path, []).append((test.spec, found))
+        return groups
+
+    at_ends = by_path(corners)
+    return {
+        path: [*_with_instances(group), *_of_corners(at_ends.get(path, ()), {d for _, found in group for d in found})]
+        for path, group in by_path(everything).items()
+    }
 
 
 def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[Diagnostic]:
@@ -74,3 +86,15 @@ def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[
         else:
             others = f" and {len(titles) - 1} more" if len(titles) > 1 else ""
             yield replace(diagnostic, message=f"{diagnostic.message} (in {next(iter(titles))}{others})")
+
+
+def _of_corners(group: Sequence[tuple[Spec, list[Diagnostic]]], known: set[Diagnostic]) -> Iterator[Diagnostic]:
+    """The problems that are not ``known``, each once; one that is not shown at the end itself names the corner."""
+    seen = set(known)
+    for spec, found in group:
+        ends = {end.span for one in spec.ranges for end in one.ends}
+        for diagnostic in found:
+            if diagnostic not in seen:
+                seen.add(diagnostic)
+                at_end = diagnostic.span in ends
+                yield diagnostic if at_end else replace(diagnostic, message=f"{diagnostic.message} (in {spec.title})")

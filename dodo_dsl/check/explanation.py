@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
-from dodo_dsl.diagnostics import shown_path
+from dodo_dsl.diagnostics import Span, shown_path
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.arguments import Argument
@@ -21,6 +21,16 @@ class ArgumentExplained:
     name: str
     value: str
     unit: str
+    origin: str
+
+
+@dataclass(frozen=True)
+class RangeExplained:
+    """What ``dodo search`` varies: ``values`` are the ends with "to" between them, or a list."""
+
+    name: str
+    nominal: str
+    values: str
     origin: str
 
 
@@ -68,6 +78,7 @@ class Explanation:
     rig: str
     services: tuple[ServiceExplained, ...]
     variables: tuple[ArgumentExplained, ...]
+    vary: tuple[RangeExplained, ...]
     wiring: tuple[Line, ...]
     asked: tuple[Asked, ...]
     has_application: bool
@@ -86,6 +97,7 @@ def explain(test: ResolvedTest) -> Explanation:
         spec.rig or "",
         tuple(_service(test, use) for use in spec.uses),
         tuple(_variable(name, entry) for name, entry in spec.variables.items()),
+        tuple(RangeExplained(one.name, one.nominal.text, one.text, _place(one.nominal.span)) for one in spec.ranges),
         tuple(_lines(wiring)),
         tuple(_asked(wiring)),
         wiring.has_application,
@@ -102,7 +114,11 @@ def _service(test: ResolvedTest, use: Use) -> ServiceExplained:
 
 def _variable(name: str, entry: Entry) -> ArgumentExplained:
     value = entry.value.text if isinstance(entry.value, Scalar) else "?"
-    return ArgumentExplained(name, value, "", f"{shown_path(entry.key.file)}:{entry.key.line}")
+    return ArgumentExplained(name, value, "", _place(entry.key))
+
+
+def _place(span: Span) -> str:
+    return f"{shown_path(span.file)}:{span.line}"
 
 
 def _argument(spec: Spec, use: Use, argument: Argument) -> ArgumentExplained:
@@ -117,7 +133,7 @@ def _origin(spec: Spec, use: Use, argument: Argument) -> str:
     entry = argument.entry
     if entry is None:
         return "default"
-    place = f"{shown_path(entry.key.file)}:{entry.key.line}"
+    place = _place(entry.key)
     if argument.parameter.name in use.parameters:
         return place
     if entry.key.file == EMULATED_FILE:

@@ -85,6 +85,9 @@ def _services(one: Explanation) -> str:
         lines.append(_arguments(service.arguments, one))
     if one.variables:
         lines += ["application: its variables\n", _arguments(one.variables, one)]
+    if one.vary:
+        rows = [[r.name, r.nominal, r.values, r.origin.replace(f"{one.file}:", "line ")] for r in one.vary]
+        lines += ["ranges: their nominal values, and what dodo search tries\n", _table(rows, "  ")]
     return "".join(lines)
 
 

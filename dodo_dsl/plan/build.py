@@ -160,6 +160,7 @@ class _Builder:
             "clock",
             "rig",
             "matrix",
+            "vary",
             "seed",
             "isolation",
             "record",

@@ -21,7 +21,7 @@ from dodo_dsl.plan.model import (
     is_device,
 )
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.matrix import SLUG
+from dodo_dsl.spec.instances.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS
 from dodo_dsl.spec.settings import Settings
 

@@ -17,7 +17,7 @@ from dodo_dsl.report.duration_plot import Times
 from dodo_dsl.report.duration_plot import draw as draw_times
 from dodo_dsl.report.trajectory import read_drive
 from dodo_dsl.report.viewer import names as viewer
-from dodo_dsl.spec.matrix import SLUG
+from dodo_dsl.spec.instances.matrix import SLUG
 from dodo_dsl.spec.registry import SUFFIX
 
 TRAJECTORY = "trajectory.png"

@@ -19,8 +19,8 @@ Schema = dict[str, Any]
 
 PREFIX = "with-"
 _NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?"
-_REFERENCE = r"\$\{matrix\."
-_MATRIX: Schema = {"type": "string", "pattern": _REFERENCE}
+_REFERENCE = r"\$\{(matrix|vary)\."
+_PLACEHOLDER: Schema = {"type": "string", "pattern": _REFERENCE}
 _TEXT: Schema = {"type": "string"}
 
 
@@ -103,13 +103,13 @@ def _written(parameter: Parameter, value: Any) -> Any:
 
 
 def _value(parameter: Parameter) -> Schema:
-    """The allowed values: the value itself, or a placeholder of the matrix."""
+    """The allowed values: the value itself, or a placeholder."""
     if parameter.choices:
-        return {"anyOf": [{"enum": list(parameter.choices)}, _MATRIX]}
+        return {"anyOf": [{"enum": list(parameter.choices)}, _PLACEHOLDER]}
     if parameter.type in ("number", "integer"):
         return _number(parameter)
     if parameter.type == "boolean":
-        return {"anyOf": [{"type": "boolean"}, _MATRIX]}
+        return {"anyOf": [{"type": "boolean"}, _PLACEHOLDER]}
     if parameter.type == "list":
         return {"type": ["array", "string"], "items": _TEXT}
     if parameter.type == "string":
@@ -125,7 +125,7 @@ def _number(parameter: Parameter) -> Schema:
     bounds = {"minimum": parameter.minimum, "maximum": parameter.maximum}
     number: Schema = {"type": parameter.type, **{k: v for k, v in bounds.items() if v is not None}}
     percent = [{"type": "string", "pattern": rf"^\s*{_NUMBER}\s*%\s*$"}] if parameter.unit else []
-    return {"anyOf": [number, *percent, _MATRIX]}
+    return {"anyOf": [number, *percent, _PLACEHOLDER]}
 
 
 def _converts(written: str, unit: str) -> bool:

@@ -7,18 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, read
-from dodo_dsl.spec import decimal_commas, extends, matrix, quantity
-from dodo_dsl.spec.matrix import Choice
+from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.source import Entry, Mapping, Node, Scalar
+from dodo_dsl.spec import quantity
+from dodo_dsl.spec.instances import matrix, vary
+from dodo_dsl.spec.instances.matrix import Choice
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.schema import validate
 
 LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
 LEVELS = ("sil", "dil", "hil")
 KINDS = ("perception", "open-loop", "closed-loop")
-_MAPPINGS = (*LAYERS, matrix.KEY, "record", "response", "application")
+_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "application")
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
 
@@ -43,6 +43,8 @@ class Spec:
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``variables`` are those that the application gets from the test.
     ``is_whole`` is False where services could not be read, so that missing producers are not reported.
+    ``ranges`` are those of ``vary``, ``template`` is the instance before their values were filled in, and ``corners``
+    are the same instance at the ends of the ranges, which are checked but never run.
     """
 
     location: Location
@@ -65,6 +67,9 @@ class Spec:
     choice: Choice = field(default_factory=Choice)
     spans: dict[str, Span] = field(default_factory=dict)
     is_whole: bool = True
+    ranges: tuple[vary.Range, ...] = ()
+    template: Mapping | None = field(default=None, repr=False)
+    corners: tuple["Spec", ...] = field(default=(), repr=False)
 
     @property
     def path(self) -> Path:
@@ -82,55 +87,6 @@ class Spec:
 
     def span(self, key: str) -> Span:
         return self.spans.get(key, Span(str(self.path)))
-
-
-def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
-    """The instances of a file, as far as it can be read, and its problems."""
-    node, found = read(location.path)
-    if node is None:
-        if not found:
-            found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
-        return [Spec(location)], found
-    node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root)
-    is_whole = not has_errors(problems) and extends.is_text(node)
-    found = [*found, *problems]
-    choices, problems = matrix.choices(node)
-    found.extend(problems)
-    if not isinstance(node, Mapping):
-        return [Spec(location)], [*found, *validate(node, "dodo")]
-    found.extend(matrix.problems(node))
-    specs = []
-    checked_by_rules = _only_in_parameters(node)
-    for number, choice in enumerate(choices):
-        instance = matrix.substitute(node, choice)
-        assert isinstance(instance, Mapping)
-        if number == 0 or not checked_by_rules:
-            found.extend(d for d in validate(instance, "dodo") if is_whole or not _is_missing(d, node))
-        spec, problems = _spec(location, instance, choice, is_whole)
-        found.extend(problems)
-        specs.append(spec)
-    return specs, found
-
-
-def _is_missing(diagnostic: Diagnostic, node: Node) -> bool:
-    """Whether a key is missing in the test itself, which the test that it extends may have."""
-    return diagnostic.rule == "missing-key" and diagnostic.span == node.span
-
-
-def _only_in_parameters(node: Mapping) -> bool:
-    """Whether all placeholders are under ``with``: rules check those values, so one instance's schema suffices."""
-    for key, entry in node.entries.items():
-        if key in LAYERS and isinstance(entry.value, Mapping):
-            for use in entry.value.entries.values():
-                if not isinstance(use.value, Mapping) or matrix.placeholders(_without_parameters(use.value)):
-                    return False
-        elif key != matrix.KEY and matrix.placeholders(entry.value):
-            return False
-    return True
-
-
-def _without_parameters(use: Mapping) -> Mapping:
-    return Mapping(use.span, {key: entry for key, entry in use.entries.items() if key != "with"})
 
 
 def _number(node: Node | None, unit: str) -> float | None:
@@ -165,7 +121,9 @@ def _frames(node: Node | None) -> float:
     return _number(_part(node, "frames"), "Hz") or 0.0
 
 
-def _spec(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> tuple[Spec, list[Diagnostic]]:
+def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> tuple[Spec, list[Diagnostic]]:
+    """An instance from its values, which have no placeholders any more, and problems that no rule checks."""
+
     def text(key: str, default: Any = None) -> Any:
         value = node.get(key)
         return value.value if isinstance(value, Scalar) and isinstance(value.value, str) else default

@@ -85,6 +85,13 @@ def convert(value: object, unit: str) -> Decimal:
     return _converted(match["number"], written, unit)
 
 
+def written_unit(text: str) -> str | None:
+    """The unit that a quantity is written in, empty for a bare number; None for what is neither."""
+    match = _QUANTITY.fullmatch(text) if len(text) <= _MAX_TEXT else None
+    unit = (match["unit"] or "") if match else None
+    return unit if not unit or unit in _DIMENSION else None
+
+
 def _converted(number: str, written: str, unit: str) -> Decimal:
     units = _FACTORS[_DIMENSION[unit]]
     with localcontext() as context:

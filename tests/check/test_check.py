@@ -31,5 +31,36 @@ def test_a_problem_of_all_instances_is_reported_once(tmp_path: Path) -> None:
     ]
 
 
+def of_ranges(text: str, folder: Path) -> list[tuple[int, str]]:
+    found = checked(text, folder)
+    return [(d.span.column, d.message) for d in found.diagnostics if d.span.file.endswith("example.dodo.yml")]
+
+
+def test_the_ends_of_a_range_are_checked_where_they_are_written(tmp_path: Path) -> None:
+    text = """\
+vary: {goal: {among: [finish, end], nominal: finish}, freq: {from: 10 Hz, to: 2 kHz, nominal: 1 kHz}}
+evaluation: {track: {uses: collision, with: {goal: "${vary.goal}"}}}
+action: {vehicle: {uses: dynamic-model, with: {freq: "${vary.freq}"}}, pose: {uses: integrator}}
+"""
+    assert of_ranges(text, tmp_path) == [
+        (31, "'end' is not among the obstacles of plain/map.json"),
+        (79, "parameter 'freq' is 2 kHz, expected 1 to 1000 Hz"),
+    ]
+
+
+def test_a_problem_elsewhere_at_an_end_names_the_values(tmp_path: Path) -> None:
+    text = """\
+matrix: {yaw: [80 deg, 90 deg]}
+vary: {sender: {among: [0, 3], nominal: 0}}
+action:
+  vehicle: {uses: dynamic-model, with: {frame-id: "${vary.sender}"}}
+  pose: {uses: integrator, with: {yaw: "${matrix.yaw}"}}
+"""
+    assert [message for _, message in of_ranges(text, tmp_path)] == [
+        "'pose' needs opendlv.sim.KinematicState/0, which no service of the test sends "
+        "(in example[yaw=80 deg,sender=3])",
+    ]
+
+
 def test_a_test_without_problems(tmp_path: Path) -> None:
     assert messages("finish", tmp_path) == []

@@ -42,7 +42,15 @@ services:
       in: [opendlv.logic.perception.DetectionType]
       out: [opendlv.proxy.GroundSteeringRequest]
 """
-CASES = {"plain": "", "hil": HIL, "matrix": MATRIX, "variables": VARIABLES, "declared": DECLARED}
+VARY = """\
+vary:
+  yaw: {from: 80 deg, to: 100 deg, nominal: 90 deg}
+  exposure: {among: [0.5, 1], nominal: 1}
+environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, exposure: "${vary.exposure}"}}}
+action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {yaw: "${vary.yaw}"}}}
+"""
+PLACE = "tests/example/example.dodo.yml:{}"
+CASES = {"plain": "", "hil": HIL, "matrix": MATRIX, "vary": VARY, "variables": VARIABLES, "declared": DECLARED}
 
 
 def explained(*words: str) -> tuple[int, str, str]:
@@ -79,6 +87,16 @@ def test_json_has_the_same(folder: Path) -> None:
     (yaw,) = [argument for argument in pose["arguments"] if argument["name"] == "yaw"]
     assert yaw == {"name": "yaw", "value": "100", "unit": "deg", "origin": "tests/example/example.dodo.yml:14"}
     assert rows[0]["asked"][0]["port"] == "opendlv.proxy.GroundSteeringRequest"
+
+
+def test_json_has_the_ranges(folder: Path) -> None:
+    examples.write(VARY, folder)
+    (row,) = json.loads(explained("example", "--json")[1])
+    assert row["slug"] == "example"
+    assert row["vary"] == [
+        {"name": "yaw", "nominal": "90 deg", "values": "80 deg to 100 deg", "origin": PLACE.format(10)},
+        {"name": "exposure", "nominal": "1", "values": "0.5, 1", "origin": PLACE.format(11)},
+    ]
 
 
 def test_a_rule() -> None:

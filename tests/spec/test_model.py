@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.spec.model import Spec, load_spec
+from dodo_dsl.spec.load import load_spec
+from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location
 from tests.check import examples
 

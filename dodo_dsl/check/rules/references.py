@@ -6,6 +6,7 @@ room for the longest time that an evaluator waits.
 
 import functools
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 
 _MAP = "map.json"
 _MAX_BYTES = 20 << 20
+_ATTEMPT = re.compile(r"\$\{(matrix|vary)")
+"""A placeholder that nothing has replaced, which another rule reports."""
 _HELP = {"obstacles": "see docs/maps.md"}
 
 
@@ -40,7 +43,7 @@ def _among(service: ResolvedService, argument: Argument, entry: Entry) -> Iterat
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
     for item in items[:MAX_PROBLEMS]:
-        if isinstance(item, Scalar) and item.text not in names and "${matrix" not in item.text:
+        if isinstance(item, Scalar) and item.text not in names and not _ATTEMPT.search(item.text):
             message = f"'{item.text}' is not among the {key} of {file.parent.name}/{file.name}"
             yield Diagnostic(item.span, "unknown-name", message, did_you_mean(item.text, names))
 

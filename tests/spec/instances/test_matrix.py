@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.matrix import MAX_INSTANCES, SLUG, choices, placeholders, problems, substitute
+from dodo_dsl.spec.instances.matrix import MAX_INSTANCES, PLACEHOLDERS, SLUG, choices, problems, substitute
 from tests.source.nodes import mapping
 
 
@@ -59,7 +59,7 @@ def test_placeholders_and_their_problems() -> None:
     node = mapping(
         "matrix: {a: [1], b: [2]}\nx: ${matrix.a}\ny: ['at ${matrix.c}', '${ matrix.a }', '${matrix}', '${HOME}']\n"
     )
-    assert placeholders(node) == {"a", "c"}
+    assert PLACEHOLDERS.names(node) == {"a", "c"}
     assert [(problem.rule, problem.message) for problem in problems(node)] == [
         ("matrix-unknown", "the matrix has no dimension 'c'"),
         ("matrix-unknown", "'${ matrix.a }' is not a placeholder, expected one such as ${matrix.light}"),

@@ -1,0 +1,1 @@
+"""Instances of a spec: values of ``matrix`` and ``vary`` for their placeholders."""

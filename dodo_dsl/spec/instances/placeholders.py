@@ -1,0 +1,89 @@
+"""Placeholders such as ``${matrix.light}``, which values of the spec's own ``matrix`` or ``vary`` replace."""
+
+import functools
+import re
+from collections.abc import Collection, Iterator
+from collections.abc import Mapping as Values
+from dataclasses import dataclass
+
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
+
+
+@dataclass(frozen=True)
+class Placeholders:
+    """Those of one ``key`` of specs.
+
+    ``lacks`` is the message about a name that the key does not have, with ``{}`` for the name, and ``advice`` the hint
+    where it has no names at all. With ``points_at_value`` a value that replaces a whole scalar keeps its own place, so
+    that problems are shown there and not at the placeholder.
+    """
+
+    key: str
+    lacks: str
+    advice: str
+    points_at_value: bool = False
+
+    @functools.cached_property
+    def _one(self) -> re.Pattern[str]:
+        return re.compile(rf"\$\{{{self.key}\.(?P<name>[a-z][a-z0-9-]*)\}}")
+
+    @functools.cached_property
+    def _attempt(self) -> re.Pattern[str]:
+        return re.compile(rf"\$\{{\s*{self.key}\b[^}}]*\}}?")
+
+    def names(self, node: Node) -> set[str]:
+        """The names that placeholders below a node have."""
+        return {m["name"] for n in walk(node) if isinstance(n, Scalar) for m in self._one.finditer(n.text)}
+
+    def used(self, node: Mapping) -> set[str]:
+        """The names that a spec uses outside the key itself."""
+        others = (entry.value for key, entry in node.entries.items() if key != self.key)
+        return {name for value in others for name in self.names(value)}
+
+    def unknown(self, node: Mapping, known: Collection[str], rule: str) -> Iterator[Diagnostic]:
+        """Placeholders of a spec with names that are not ``known``, or without one."""
+        for key, part in node.entries.items():
+            for scalar in walk(part.value) if key != self.key else ():
+                if isinstance(scalar, Scalar) and "${" in scalar.text:
+                    yield from self._unknown(scalar, known, rule)
+
+    def _unknown(self, scalar: Scalar, known: Collection[str], rule: str) -> Iterator[Diagnostic]:
+        for attempt in self._attempt.finditer(scalar.text):
+            match = self._one.fullmatch(attempt[0])
+            if match is None:
+                message = f"'{attempt[0][:60]}' is not a placeholder, expected one such as ${{{self.key}.light}}"
+                yield Diagnostic(scalar.span, rule, message)
+            elif match["name"] not in known:
+                hint = did_you_mean(match["name"], known) if known else self.advice
+                yield Diagnostic(scalar.span, rule, self.lacks.format(match["name"]), hint)
+
+    def filled(self, node: Node, values: Values[str, Scalar]) -> Node:
+        """The node with values for the placeholders; nodes without placeholders stay the same objects."""
+        return self._filled(node, values) if values else node
+
+    def _filled(self, node: Node, values: Values[str, Scalar]) -> Node:
+        if isinstance(node, Scalar):
+            return self._scalar(node, values)
+        if isinstance(node, Sequence):
+            items = tuple(self._filled(item, values) for item in node.items)
+            same = all(a is b for a, b in zip(items, node.items, strict=True))
+            return node if same else Sequence(node.span, items, node.tag)
+        entries = {}
+        changed = False
+        for key, entry in node.entries.items():
+            value = self._filled(entry.value, values)
+            changed = changed or value is not entry.value
+            entries[key] = entry if value is entry.value else Entry(entry.key, value)
+        return Mapping(node.span, entries, node.tag) if changed else node
+
+    def _scalar(self, node: Scalar, values: Values[str, Scalar]) -> Scalar:
+        if "${" not in node.text:
+            return node
+        whole = self._one.fullmatch(node.text)
+        if whole:
+            chosen = values.get(whole["name"])
+            span = chosen.span if chosen and self.points_at_value else node.span
+            return Scalar(span, chosen.value, chosen.text, node.tag) if chosen else node
+        text = self._one.sub(lambda m: values[m["name"]].text if m["name"] in values else m[0], node.text)
+        return node if text == node.text else Scalar(node.span, text, text, node.tag)

@@ -1,0 +1,98 @@
+"""A file's tests: read, merged over what it extends, and made into instances."""
+
+from dataclasses import replace
+
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
+from dodo_dsl.source import Mapping, Node, read
+from dodo_dsl.spec import decimal_commas, extends
+from dodo_dsl.spec.instances import matrix, vary
+from dodo_dsl.spec.instances.matrix import Choice
+from dodo_dsl.spec.instances.placeholders import Placeholders
+from dodo_dsl.spec.model import LAYERS, Spec, spec_of
+from dodo_dsl.spec.registry import Location
+from dodo_dsl.spec.schema import validate
+
+
+def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
+    """The instances of a file, as far as it can be read, and its problems."""
+    node, found = read(location.path)
+    if node is None:
+        if not found:
+            found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
+        return [Spec(location)], found
+    node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root)
+    is_whole = not has_errors(problems) and extends.is_text(node)
+    found = [*found, *problems]
+    choices, problems = matrix.choices(node)
+    found.extend(problems)
+    if not isinstance(node, Mapping):
+        return [Spec(location)], [*found, *validate(node, "dodo")]
+    found.extend([*matrix.problems(node), *vary.problems(node)])
+    specs = []
+    checked_by_rules = _only_in_parameters(node, matrix.PLACEHOLDERS)
+    for number, choice in enumerate(choices):
+        template = matrix.substitute(node, choice)
+        assert isinstance(template, Mapping)
+        ranges, problems = vary.read(template)
+        found.extend(problems)
+        spec, instance, problems = _at(Spec(location, choice=choice, is_whole=is_whole), template, ranges, {})
+        found.extend(problems)
+        if number == 0 or not checked_by_rules:
+            found.extend(d for d in validate(instance, "dodo") if is_whole or not _is_missing(d, node))
+        corners, problems = _corners(spec)
+        found.extend(problems)
+        specs.append(replace(spec, corners=corners))
+    return specs, found
+
+
+def varied(spec: Spec, values: vary.Values, choice: Choice) -> Spec:
+    """The instance with these values of its ranges, the nominal ones for others, and another choice as its name."""
+    assert spec.template is not None, "only for specs with ranges"
+    found, _, _ = _at(replace(spec, choice=choice), spec.template, spec.ranges, values)
+    return found
+
+
+def _at(
+    spec: Spec, template: Mapping, ranges: tuple[vary.Range, ...], values: vary.Values
+) -> tuple[Spec, Mapping, list[Diagnostic]]:
+    """The spec that a template is with the values, the template with them, and the spec's problems."""
+    instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges) | values)
+    assert isinstance(instance, Mapping)
+    found, problems = spec_of(spec.location, instance, spec.choice, spec.is_whole)
+    return replace(found, ranges=ranges, template=template if ranges else None), instance, problems
+
+
+def _corners(spec: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
+    """The spec at the ends of its ranges, and problems of values there that no rule checks."""
+    corners, found = [], []
+    checked_by_rules = spec.template is None or _only_in_parameters(spec.template, vary.PLACEHOLDERS)
+    for values in vary.corners(spec.ranges):
+        choice = Choice((*spec.choice.values, *values.items()))
+        assert spec.template is not None, "a spec with ranges has one"
+        corner, instance, problems = _at(replace(spec, choice=choice), spec.template, spec.ranges, values)
+        found.extend(problems)
+        if not checked_by_rules and spec.is_whole:
+            found.extend(validate(instance, "dodo"))
+        corners.append(corner)
+    return tuple(corners), found
+
+
+def _is_missing(diagnostic: Diagnostic, node: Node) -> bool:
+    """Whether a key is missing in the test itself, which the test that it extends may have."""
+    return diagnostic.rule == "missing-key" and diagnostic.span == node.span
+
+
+def _only_in_parameters(node: Mapping, placeholders: Placeholders) -> bool:
+    """Whether all of these are under ``with``: rules check those values, so one instance's schema suffices."""
+    for key, entry in node.entries.items():
+        if key in LAYERS and isinstance(entry.value, Mapping):
+            for use in entry.value.entries.values():
+                if not isinstance(use.value, Mapping) or placeholders.names(_without_parameters(use.value)):
+                    return False
+        elif key != placeholders.key and placeholders.names(entry.value):
+            return False
+    return True
+
+
+def _without_parameters(use: Mapping) -> Mapping:
+    return Mapping(use.span, {key: entry for key, entry in use.entries.items() if key != "with"})

@@ -1,0 +1,85 @@
+"""Instances of a file at the nominal values of its ranges, at their ends, and at others."""
+
+from pathlib import Path
+
+from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.source import Scalar
+from dodo_dsl.spec.instances.matrix import Choice
+from dodo_dsl.spec.load import load_spec, varied
+from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.registry import Location
+from tests.check import examples
+
+TEXT = """\
+matrix: {yaw: [80 deg, 90 deg]}
+vary: {start: {from: -8 cm, to: "8 cm", nominal: 0 cm}, limit: {among: [60 s, 90 s, 2 min], nominal: 90 s}}
+timeout: "${vary.limit}"
+action:
+  vehicle: {uses: dynamic-model}
+  pose: {uses: integrator, with: {x: "${vary.start}", yaw: "${matrix.yaw}"}}
+"""
+
+
+def loaded(folder: Path, text: str) -> tuple[list[Spec], list[Diagnostic]]:
+    path = folder / "example.dodo.yml"
+    path.write_text(examples.with_keys_of(examples.EXAMPLE, text))
+    return load_spec(Location(path, folder))
+
+
+def values(spec: Spec) -> tuple[str, str, float | None]:
+    pose = next(use for use in spec.uses if use.name == "pose").parameters
+    start, yaw = pose["x"].value, pose["yaw"].value
+    assert isinstance(start, Scalar)
+    assert isinstance(yaw, Scalar)
+    return start.text, yaw.text, spec.timeout_s
+
+
+def test_a_plain_run_takes_the_nominal_values(tmp_path: Path) -> None:
+    specs, problems = loaded(tmp_path, TEXT)
+    assert problems == []
+    assert [spec.slug for spec in specs] == ["example--yaw-80-deg", "example--yaw-90-deg"]
+    assert [values(spec) for spec in specs] == [("0 cm", "80 deg", 90.0), ("0 cm", "90 deg", 90.0)]
+
+
+def test_corners_have_each_end_once(tmp_path: Path) -> None:
+    (first, _), _ = loaded(tmp_path, TEXT)
+    assert [values(corner) for corner in first.corners] == [
+        ("-8 cm", "80 deg", 60.0),
+        ("8 cm", "80 deg", 90.0),
+        ("0 cm", "80 deg", 120.0),
+    ]
+    assert first.corners[0].title == "example[yaw=80 deg,start=-8 cm,limit=60 s]"
+
+
+def test_other_values_under_another_name(tmp_path: Path) -> None:
+    (_, second), _ = loaded(tmp_path, TEXT)
+    here = Span("")
+    found = varied(second, {"start": Scalar(here, "3 cm", "3 cm")}, Choice((("run", Scalar(here, 7, "7")),)))
+    assert values(found) == ("3 cm", "90 deg", 90.0)
+    assert found.slug == "example--run-7"
+
+
+def test_ends_outside_parameters_are_checked_where_they_are_written(tmp_path: Path) -> None:
+    _, problems = loaded(tmp_path, TEXT.replace("2 min", "2").replace("[60 s", "[60 h"))
+    assert {(d.rule, d.span.column, d.message) for d in problems} == {
+        ("out-of-range", 73, "'timeout' is 60 h, expected 0.1 s to 24 h"),
+        ("wrong-unit", 85, "'timeout': '2' has no unit, expected a time in s"),
+    }
+
+
+def test_a_test_without_ranges_has_no_corners(tmp_path: Path) -> None:
+    ((spec,), _) = loaded(tmp_path, "seed: 3\n")
+    assert (spec.corners, spec.ranges, spec.template) == ((), (), None)
+
+
+def test_a_test_that_extends_another_changes_its_ranges(tmp_path: Path) -> None:
+    loaded(tmp_path, TEXT)
+    path = tmp_path / "own.dodo.yml"
+    path.write_text(
+        "dodo: 1\nname: own\nextends: example.dodo.yml\nmatrix:\nvary: {start: {nominal: 2 cm}}\n"
+        "action: {pose: {with: {yaw: 70 deg}}}\n"
+    )
+    (spec,), problems = load_spec(Location(path, tmp_path))
+    assert problems == []
+    assert values(spec) == ("2 cm", "70 deg", 90.0)
+    assert [one.text for one in spec.ranges] == ["-8 cm to 8 cm", "60 s, 90 s, 2 min"]
