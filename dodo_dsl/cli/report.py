@@ -1,15 +1,21 @@
-"""dodo report: write the report of a finished run again."""
+"""dodo report: draw reports again, and join several into one."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
+from dodo_dsl.report.given_report import GivenReport, read
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.terminal import printable
 
 EXAMPLES = """examples:
-  dodo report dodo-report       index.html, junit.xml and metrics.txt from its results.json
+  dodo report dodo-report            index.html, junit.xml and metrics.txt from its results.json
+  dodo report jobs/* -o joined       the reports of several jobs as one, with all their files
 """
 
 
@@ -18,12 +24,31 @@ REPORT = Path("dodo-report")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", metavar="DIR", type=Path, nargs="?", default=REPORT,
-                        help="folder of the report (default: dodo-report)")  # fmt: skip
+    parser.add_argument("folder", metavar="DIR", type=Path, nargs="*", default=[REPORT],
+                        help="folders of reports, or their results.json (default: dodo-report)")  # fmt: skip
+    parser.add_argument("-o", "--output", metavar="OUT", type=Path,
+                        help="join the reports into this folder: a new or empty one, or an earlier report")  # fmt: skip
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    outcomes = results.load(options.folder / results.FILE_NAME)
-    write_summaries(options.folder, outcomes)
-    stdout.write(f"report: {options.folder / 'index.html'}\n")
+    reports = [read(path) for path in options.folder]
+    target, outcomes = _drawn(reports, options.output, stdout)
+    write_summaries(target, outcomes)
+    stdout.write(f"report: {target / 'index.html'}\n")
     return Exit.OK
+
+
+def _drawn(reports: Sequence[GivenReport], out: Path | None, stdout: TextIO) -> tuple[Path, Sequence[Outcome]]:
+    """The folder whose summaries are to be written, and the outcomes that they show."""
+    if out is None:
+        report, *others = reports
+        if others:
+            raise UsageError(f"{len(reports)} reports, expected one, or with -o a folder into which they are joined")
+        if not report.is_whole:
+            raise UsageError(f"'{report.file}' is not called {results.FILE_NAME}; name a folder for the report with -o")
+        return report.folder, report.outcomes
+    from dodo_dsl.report.joined.join import join
+
+    outcomes, sentences = join(reports, out)
+    stdout.writelines(f"{printable(sentence)}\n" for sentence in sentences)
+    return out, outcomes

@@ -29,6 +29,11 @@ def write_shared(report: Path) -> None:
 def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
     """The page of a test in its folder of the report; ``compiled`` is the compiled test's. Raises OSError."""
     atomic.write_text(folder / DATA, script(document(folder, outcome, plan, compiled)))
+    write_html(folder)
+
+
+def write_html(folder: Path) -> None:
+    """The page alone, which is the same for all tests; raises OSError."""
     atomic.write_bytes(folder / PAGE, (_sources() / PAGE).read_bytes())
 
 

@@ -1,0 +1,1 @@
+"""Several reports as one: their files, copied below one folder."""

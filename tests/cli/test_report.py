@@ -1,0 +1,62 @@
+"""``dodo report`` from its command line to its exit code."""
+
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.cli.main import main
+from dodo_dsl.report import results
+from tests.report.joined.reports import named, tree, write
+
+
+def report(*words: object) -> tuple[int, str, str]:
+    stdout, stderr = StringIO(), StringIO()
+    return main(["report", *map(str, words)], stdout, stderr), stdout.getvalue(), stderr.getvalue()
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_one_report_is_drawn_again_where_it_is(here: Path) -> None:
+    write(here / "dodo-report", [named("a", outcome="failed")])
+    before = tree(here)
+    for name in ("index.html", "junit.xml", "metrics.txt"):
+        (here / "dodo-report" / name).unlink()
+    for words in ([], ["dodo-report"], ["dodo-report/results.json"]):
+        assert report(*words) == (0, "report: dodo-report/index.html\n", "")
+        assert tree(here) == before
+
+
+def test_several_reports_are_joined(here: Path) -> None:
+    for number in (1, 2):
+        write(here / f"job-{number}", [named("a"), named(f"b-{number}")])
+    code, said, _ = report("job-1", "job-2/results.json", "-o", "out")
+    assert (code, said) == (
+        0,
+        "'a' of job-2/results.json is called 'a--report-2', as there is one before it\nreport: out/index.html\n",
+    )
+    assert [o.slug for o in results.load(here / "out" / "results.json")] == ["a", "b-1", "a--report-2", "b-2"]
+
+
+def test_what_cannot_be_joined_is_a_sentence(here: Path) -> None:
+    write(here / "job", [named("a")])
+    (here / "job" / "results.json").rename(here / "main.json")
+    (here / "broken").mkdir()
+    (here / "broken" / "results.json").write_text("{}")
+    (here / "full").mkdir()
+    (here / "full" / "file").touch()
+    for words, said in (
+        (["main.json", "job", "-o", "out"], "there is no job/results.json"),
+        (["main.json", "no.json", "-o", "out"], "there is no no.json"),
+        (["main.json", "broken", "-o", "out"], "broken/results.json: not results of DoDo ('dodo')"),
+        (["main.json", "main.json"], "2 reports, expected one, or with -o a folder into which they are joined"),
+        (["main.json"], "'main.json' is not called results.json; name a folder for the report with -o"),
+        (["main.json", "-o", "full"],
+         "full: neither a new or empty folder nor a report of DoDo; nothing is replaced"),
+    ):  # fmt: skip
+        assert report(*words) == (2, "", f"dodo report: {said}\n")
+    assert not (here / "out").exists()

@@ -1,0 +1,44 @@
+"""Reports as jobs leave them, made without running a test."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.report.report_folder import write_report
+from dodo_dsl.report.viewer import page
+from dodo_dsl.report.viewer.encoded import script
+
+PASSED = Outcome("test", "test", "t/t.dodo.yml", "sil", "closed-loop", "passed", "drove", 130, 0, "lockstep", "process")
+
+
+def named(name: str, **changes: object) -> Outcome:
+    slug = name.replace("[", "--").replace("]", "").replace("=", "-").replace(",", "--")
+    return replace(PASSED, name=name, slug=slug, **changes)  # type: ignore[arg-type]
+
+
+def write(folder: Path, outcomes: Iterable[Outcome]) -> Path:
+    """A report with a recording, a picture, logs and a page of each test, which name folder and test."""
+    outcomes = list(outcomes)
+    for outcome in outcomes:
+        place = folder / outcome.slug
+        content = f"{folder.name} {outcome.slug}"
+        for name in ("test.rec", "trajectory.png", "logs/application.app.log", "logs/application.app.times",
+                     "attempts/1/logs/application.app.log"):  # fmt: skip
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_text(content)
+        (place / "drive.js").write_text(drive(outcome))
+        page.write_html(place)
+    page.write_shared(folder)
+    assert write_report(folder, outcomes, {}) == []
+    return folder
+
+
+def drive(outcome: Outcome) -> str:
+    test = {"name": outcome.name, "slug": outcome.slug, "reason": outcome.reason}
+    return script({"version": page.VERSION, "test": test, "videos": [{"file": "camera-0.mp4"}]})
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    """The contents of all files below it."""
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
