@@ -1,0 +1,1 @@
+"""What changed between two reports: compared as values, and shown as text and Markdown."""

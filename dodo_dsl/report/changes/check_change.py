@@ -1,0 +1,79 @@
+"""How a check's value changed, and whether that is for the better: by the side of its limit and the margin to it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Direction = Literal["worse", "better", "different", "unchanged"]
+"""``different`` is a change of a value that has no limit, or whose limits say nothing of the direction."""
+
+
+@dataclass(frozen=True)
+class CheckChange:
+    """A check of a test in both reports; values in its unit, None where nothing was measured."""
+
+    index: int
+    """Of the check in the newer report's test."""
+    name: str
+    unit: str
+    before: float | None
+    after: float | None
+    direction: Direction
+    limit: Mapping[str, float]
+    """As it is now."""
+    old_limit: Mapping[str, float]
+    old_unit: str
+    is_crossing: bool
+    """Whether it is on the other side of its limit now."""
+
+    @property
+    def difference(self) -> float | None:
+        """Of the values, where they have one unit."""
+        is_comparable = self.before is not None and self.after is not None and self.unit == self.old_unit
+        return self.after - self.before if is_comparable else None  # type: ignore[operator]
+
+
+def check_change(before: Mapping[str, Any], after: Mapping[str, Any], index: int) -> CheckChange:
+    """The change of a check between two ``results.json``."""
+    return CheckChange(
+        index,
+        after["name"],
+        after.get("unit") or "",
+        before["value"],
+        after["value"],
+        _direction(before, after),
+        after.get("limit") or {},
+        before.get("limit") or {},
+        before.get("unit") or "",
+        bool(before["ok"]) != bool(after["ok"]),
+    )
+
+
+def margin(check: Mapping[str, Any]) -> float | None:
+    """The signed distance to the nearest limit in the check's unit, positive on the good side; None without one."""
+    if isinstance(given := check.get("margin"), int | float):
+        return float(given)
+    value, limit = check["value"], check.get("limit") or {}
+    if value is None or not limit:
+        return None
+    distances = [value - limit["min"]] if "min" in limit else []
+    distances += [limit["max"] - value] if "max" in limit else []
+    return float(min(distances))
+
+
+def _direction(before: Mapping[str, Any], after: Mapping[str, Any]) -> Direction:
+    if bool(before["ok"]) != bool(after["ok"]):
+        return "better" if after["ok"] else "worse"
+    is_same_unit = (before.get("unit") or "") == (after.get("unit") or "")
+    is_same_limit = (before.get("limit") or {}) == (after.get("limit") or {})
+    if is_same_unit and is_same_limit and _shown(before["value"]) == _shown(after["value"]):
+        return "unchanged"
+    old, new = margin(before), margin(after)
+    if not is_same_unit or old is None or new is None or _shown(old) == _shown(new):
+        return "different"
+    return "better" if new > old else "worse"
+
+
+def _shown(value: float | None) -> str:
+    """As pages and texts show it: what no one sees is no change."""
+    return "none" if value is None else f"{value:.4g}"

@@ -1,0 +1,37 @@
+"""The words for changes, which the terminal, Markdown and the page have in common."""
+
+from collections.abc import Mapping
+
+from dodo_dsl.report.changes.check_change import CheckChange
+from dodo_dsl.report.changes.comparison import TestChange
+
+
+def value(number: float | None, unit: str) -> str:
+    """``0.052 m``, or ``none``"""
+    return "none" if number is None else f"{number:.4g} {unit}".rstrip()
+
+
+def bounds(limit: Mapping[str, float], unit: str) -> str:
+    """``min 0.03 m, max 1 m``; empty without a limit."""
+    return ", ".join(f"{key} {value(limit[key], unit)}" for key in ("min", "max") if key in limit)
+
+
+def difference(check: CheckChange) -> str:
+    """``-0.07 m``; empty where there is none to tell."""
+    return "" if not check.difference else f"{check.difference:+.3g} {check.unit}".rstrip()
+
+
+def change(check: CheckChange) -> str:
+    """``0.12 m -> 0.05 m (-0.07 m; limit: min 0.03 m)``"""
+    limit = bounds(check.limit, check.unit)
+    old = bounds(check.old_limit, check.old_unit)
+    was = f", was {old or 'none'}" if limit != old else ""
+    notes = [difference(check), f"limit: {limit or 'none'}{was}" if limit or was else ""]
+    told = "; ".join(filter(None, notes))
+    return f"{value(check.before, check.old_unit)} -> {value(check.after, check.unit)}{f' ({told})' if told else ''}"
+
+
+def outcomes(test: TestChange) -> str:
+    """``passed -> failed``, or the only one there is."""
+    found = [outcome.outcome for outcome in (test.before, test.after) if outcome is not None]
+    return " -> ".join(dict.fromkeys(found))

@@ -1,0 +1,71 @@
+"""The direction of a change follows from the limit, whatever the value does."""
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.report.changes import words
+from dodo_dsl.report.changes.check_change import check_change, margin
+
+
+def check(value: float | None, ok: bool | None = None, unit: str = "m", **limit: float) -> dict[str, Any]:
+    kept = value is not None and limit.get("min", value) <= value <= limit.get("max", value)
+    return {"name": "x", "value": value, "limit": limit, "unit": unit, "ok": kept if ok is None else ok}
+
+
+CASES = [
+    (check(1, max=2), check(1.5, max=2), "worse"),
+    (check(1.5, max=2), check(1, max=2), "better"),
+    (check(1, min=0.5), check(1.5, min=0.5), "better"),
+    (check(1, min=0.5), check(0.6, min=0.5), "worse"),
+    (check(1, min=0.5), check(0.4, min=0.5), "worse"),
+    (check(0.4, min=0.5), check(0.6, min=0.5), "better"),
+    (check(0.1, min=0.5), check(0.4, min=0.5), "better"),
+    (check(0.9, min=-1, max=1), check(-0.1, min=-1, max=1), "better"),
+    (check(0.9, min=-1, max=1), check(-0.9, min=-1, max=1), "different"),
+    (check(1, max=2), check(1.00001, max=2), "unchanged"),
+    (check(1), check(2), "different"),
+    (check(1), check(1), "unchanged"),
+    (check(None, ok=True, max=2), check(1, max=2), "different"),
+    (check(1, max=2), check(None, ok=False, max=2), "worse"),
+    (check(None, ok=False, max=2), check(None, ok=False, max=2), "unchanged"),
+    (check(1, max=2), check(1, max=3), "better"),
+    (check(1, max=3), check(2, max=4), "different"),
+    (check(1, max=2), check(1000, unit="mm", max=2000), "different"),
+    ({**check(1, max=2), "margin": 0.3}, {**check(1.5, max=2), "margin": 0.4}, "better"),
+    ({**check(1, max=2), "margin": None}, check(1.5, max=2), "worse"),
+]
+
+
+@pytest.mark.parametrize(("before", "after", "direction"), CASES)
+def test_direction(before: dict[str, Any], after: dict[str, Any], direction: str) -> None:
+    assert check_change(before, after, 0).direction == direction
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.sampled_from(["min", "max"]))
+def test_turned_round_a_change_has_the_other_direction(was: float, now: float, bound: float, side: str) -> None:
+    before, after = check(was, **{side: bound}), check(now, **{side: bound})
+    there, back = check_change(before, after, 0), check_change(after, before, 0)
+    assert back.direction == {"better": "worse", "worse": "better"}.get(there.direction, there.direction)
+    assert (margin(after) or 0.0) >= 0 or not after["ok"]
+    if there.direction == "better":
+        assert now > was if side == "min" else now < was
+
+
+def test_without_a_limit_or_a_value_there_is_no_margin() -> None:
+    assert [margin(each) for each in (check(1), check(None, max=1), check(1, min=0, max=3))] == [None, None, 1]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        (check(0.12, min=0.03), check(0.05, min=0.03), "0.12 m -> 0.05 m (-0.07 m; limit: min 0.03 m)"),
+        (check(1, unit=""), check(3, unit=""), "1 -> 3 (+2)"),
+        (check(1, max=2), check(None, ok=False, max=3), "1 m -> none (limit: max 3 m, was max 2 m)"),
+        (check(1, max=2), check(900, unit="mm"), "1 m -> 900 mm (limit: none, was max 2 m)"),
+    ],
+)
+def test_a_change_in_words(before: dict[str, Any], after: dict[str, Any], told: str) -> None:
+    assert words.change(check_change(before, after, 0)) == told
