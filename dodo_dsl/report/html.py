@@ -1,14 +1,22 @@
-"""``index.html``: the run at a glance, in one file without scripts, with a link to the drive of each test."""
+"""``index.html``: the run at a glance, in one file, with a link to the drive of each test.
 
+It shows everything without its script, which searches, filters and sorts.
+"""
+
+import base64
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import jinja2
+from markupsafe import Markup
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report.junit import check_line
+from dodo_dsl.report import matrix_grid
+from dodo_dsl.report.changes import words
+from dodo_dsl.report.changes.comparison import KINDS, Comparison
 from dodo_dsl.report.machine_line import machine_line
 
 
@@ -41,29 +49,56 @@ MEANINGS = {
 """Explanations of checks whose names do not explain them, as in the READMEs of the evaluators."""
 
 
-def render(outcomes: Sequence[Outcome], files: ReportFiles) -> str:
-    """The page."""
+_MOST_TEXT = 10_000
+"""Characters of one text of others on the page."""
+_URGENCIES = ("error", "failed", "passed")
+_DIRECTIONS = ("worse", "better", "different")
+
+
+def render(outcomes: Sequence[Outcome], files: ReportFiles, comparison: Comparison | None = None) -> str:
+    """The page; with a comparison, what changed since the report that it names."""
+    folder = package_data.templates()
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(package_data.templates()),
+        loader=jinja2.FileSystemLoader(folder),
         undefined=jinja2.StrictUndefined,
         autoescape=True,
-        finalize=_without_control,
+        finalize=_harmless,
     )
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
+    script, style = ((folder / "report" / name).read_text(encoding="utf-8") for name in ("suite.js", "suite.css"))
     return environment.get_template("report.html.j2").render(
         outcomes=outcomes,
         files=files,
         meanings=MEANINGS,
         counts=counts,
         version=__version__,
-        check_line=check_line,
         machine_line=machine_line,
+        grids=matrix_grid.grids(outcomes),
+        decisive_value=matrix_grid.decisive_value,
+        comparison=comparison,
+        changed=comparison.by_slug() if comparison else {},
+        words=words,
+        kinds=KINDS,
+        directions=_DIRECTIONS,
+        urgencies=_URGENCIES,
+        script=script,
+        style=style,
+        hash=_source_hash,
     )
 
 
-def _without_control(value: Any) -> Any:
-    """No control characters but line ends and tabs: they would command the terminal of who looks at the source."""
-    if not isinstance(value, str) or value.isprintable():
+def _source_hash(text: str) -> str:
+    """A script or style, as a Content-Security-Policy allows it alone (CSP level 3, section 2.3.1)."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+def _harmless(value: Any) -> Any:
+    """No control characters but line ends and tabs: they would command the terminal of who looks at the source.
+
+    A long text is cut.
+    """
+    if not isinstance(value, str) or isinstance(value, Markup):
         return value
-    plain = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in value)
-    return type(value)(plain)  # what is marked as safe stays so
+    text = value[:_MOST_TEXT]
+    plain = text if text.isprintable() else "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
+    return plain if text == value else f"{plain} … ({len(value)} characters)"

@@ -13,6 +13,8 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.recorder_service import RECORDING, SNAPSHOT
 from dodo_dsl.report import html, junit, metrics, results
+from dodo_dsl.report.changes import markdown
+from dodo_dsl.report.changes.comparison import Comparison
 from dodo_dsl.report.duration_plot import Times
 from dodo_dsl.report.duration_plot import draw as draw_times
 from dodo_dsl.report.trajectory import read_drive
@@ -117,18 +119,22 @@ def _write_pages(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, 
                 yield f"the page of {outcome.name} cannot be written: {error}"
 
 
-def write_summaries(folder: Path, outcomes: Sequence[Outcome]) -> None:
-    """Writes the four files about the whole run."""
+def write_summaries(folder: Path, outcomes: Sequence[Outcome], comparison: Comparison | None = None) -> None:
+    """Writes the four files about the whole run, and with a comparison that with another report.
+
+    Without one, that of an earlier report is removed. Raises OSError.
+    """
     pictures = {o.slug: _pictures(folder, o) for o in outcomes}
     attachments = {slug: f"{_shown(folder)}/{found[0].path}" for slug, found in pictures.items() if found}
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes))
     with atomic.replacing(folder / "junit.xml") as part:
         junit.write(part, outcomes, attachments)
     atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
-    _write_index(folder, outcomes)
+    markdown.write(folder, comparison)
+    _write_index(folder, outcomes, comparison)
 
 
-def _write_index(folder: Path, outcomes: Sequence[Outcome]) -> None:
+def _write_index(folder: Path, outcomes: Sequence[Outcome], comparison: Comparison | None = None) -> None:
     """The page of the run, with links to what there is."""
     times = TIMES if (folder / TIMES).is_file() else ""
     files = html.ReportFiles(
@@ -139,7 +145,7 @@ def _write_index(folder: Path, outcomes: Sequence[Outcome]) -> None:
         _named(folder, outcomes, viewer.PAGE),
         times,
     )
-    atomic.write_text(folder / "index.html", html.render(outcomes, files))
+    atomic.write_text(folder / "index.html", html.render(outcomes, files, comparison))
 
 
 def _pictures(folder: Path, outcome: Outcome) -> list[html.ReportPicture]:

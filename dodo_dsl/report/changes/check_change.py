@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dodo_dsl.margins import with_margin
+
 Direction = Literal["worse", "better", "different", "unchanged"]
 """``different`` is a change of a value that has no limit, or whose limits say nothing of the direction."""
 
@@ -49,16 +51,9 @@ def check_change(before: Mapping[str, Any], after: Mapping[str, Any], index: int
     )
 
 
-def margin(check: Mapping[str, Any]) -> float | None:
-    """The signed distance to the nearest limit in the check's unit, positive on the good side; None without one."""
-    if isinstance(given := check.get("margin"), int | float):
-        return float(given)
-    value, limit = check["value"], check.get("limit") or {}
-    if value is None or not limit:
-        return None
-    distances = [value - limit["min"]] if "min" in limit else []
-    distances += [limit["max"] - value] if "max" in limit else []
-    return float(min(distances))
+def with_margins(check: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The check with ``margin`` and ``margin_share``, computed where an older ``results.json`` has none."""
+    return check if "margin" in check and "margin_share" in check else with_margin({"limit": {}, **check})
 
 
 def _direction(before: Mapping[str, Any], after: Mapping[str, Any]) -> Direction:
@@ -68,7 +63,7 @@ def _direction(before: Mapping[str, Any], after: Mapping[str, Any]) -> Direction
     is_same_limit = (before.get("limit") or {}) == (after.get("limit") or {})
     if is_same_unit and is_same_limit and _shown(before["value"]) == _shown(after["value"]):
         return "unchanged"
-    old, new = margin(before), margin(after)
+    old, new = with_margins(before)["margin"], with_margins(after)["margin"]
     if not is_same_unit or old is None or new is None or _shown(old) == _shown(new):
         return "different"
     return "better" if new > old else "worse"

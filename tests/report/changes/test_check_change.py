@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.report.changes import words
-from dodo_dsl.report.changes.check_change import check_change, margin
+from dodo_dsl.report.changes.check_change import check_change, with_margins
 
 
 def check(value: float | None, ok: bool | None = None, unit: str = "m", **limit: float) -> dict[str, Any]:
@@ -34,8 +34,12 @@ CASES = [
     (check(1, max=2), check(1, max=3), "better"),
     (check(1, max=3), check(2, max=4), "different"),
     (check(1, max=2), check(1000, unit="mm", max=2000), "different"),
-    ({**check(1, max=2), "margin": 0.3}, {**check(1.5, max=2), "margin": 0.4}, "better"),
-    ({**check(1, max=2), "margin": None}, check(1.5, max=2), "worse"),
+    (
+        {**check(1, max=2), "margin": 0.3, "margin_share": 0.1},
+        {**check(1.5, max=2), "margin": 0.4, "margin_share": 0.2},
+        "better",
+    ),
+    ({**check(1, max=2), "margin": None, "margin_share": None}, check(1.5, max=2), "different"),
 ]
 
 
@@ -49,13 +53,15 @@ def test_turned_round_a_change_has_the_other_direction(was: float, now: float, b
     before, after = check(was, **{side: bound}), check(now, **{side: bound})
     there, back = check_change(before, after, 0), check_change(after, before, 0)
     assert back.direction == {"better": "worse", "worse": "better"}.get(there.direction, there.direction)
-    assert (margin(after) or 0.0) >= 0 or not after["ok"]
     if there.direction == "better":
         assert now > was if side == "min" else now < was
 
 
-def test_without_a_limit_or_a_value_there_is_no_margin() -> None:
-    assert [margin(each) for each in (check(1), check(None, max=1), check(1, min=0, max=3))] == [None, None, 1]
+def test_margins_are_those_of_the_results_where_they_have_any() -> None:
+    assert with_margins(check(1, min=0, max=3))["margin"] == 1
+    assert with_margins({"name": "x", "value": 1, "ok": True})["margin"] is None
+    given = {**check(1, max=3), "margin": 7, "margin_share": 0.5}
+    assert with_margins(given) == given
 
 
 @pytest.mark.parametrize(

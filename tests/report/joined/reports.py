@@ -13,7 +13,7 @@ PASSED = Outcome("test", "test", "t/t.dodo.yml", "sil", "closed-loop", "passed",
 
 
 def named(name: str, **changes: object) -> Outcome:
-    slug = name.replace("[", "--").replace("]", "").replace("=", "-").replace(",", "--")
+    slug = name.replace("[", "--").replace("]", "").replace("=", "-").replace(",", "--").replace(".", "-")
     return replace(PASSED, name=name, slug=slug, **changes)  # type: ignore[arg-type]
 
 
