@@ -30,7 +30,7 @@ COMMANDS = {
     "list": Subcommand("list", "list the tests and services"),
     "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
     "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),
-    "report": Subcommand("report", "draw reports again, and join several into one"),
+    "report": Subcommand("report", "draw reports again, join them into one, and show what changed"),
     "judge": Subcommand("judge.command", "judge the recording of a test again, also by other limits"),
     "stats": Subcommand("stats.command", "show how many services the tests share"),
     "rec": Subcommand("rec.command", "inspect, cut and export recordings"),

@@ -1,4 +1,4 @@
-"""dodo report: draw reports again, and join several into one."""
+"""dodo report: draw reports again, join them into one, and show what changed."""
 
 import argparse
 from collections.abc import Sequence
@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.exits import Exit, of_outcomes
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
+from dodo_dsl.report.changes import text
+from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport, read
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.terminal import printable
@@ -16,6 +18,9 @@ from dodo_dsl.terminal import printable
 EXAMPLES = """examples:
   dodo report dodo-report            index.html, junit.xml and metrics.txt from its results.json
   dodo report jobs/* -o joined       the reports of several jobs as one, with all their files
+  dodo report --against ../main/dodo-report    what changed since that report, also on the page and in changes.md
+
+exit codes: 0 drawn, 2 wrong usage or no report; with --against 1 some tests failed, 3 some ended in error
 """
 
 
@@ -28,14 +33,20 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="folders of reports, or their results.json (default: dodo-report)")  # fmt: skip
     parser.add_argument("-o", "--output", metavar="OUT", type=Path,
                         help="join the reports into this folder: a new or empty one, or an earlier report")  # fmt: skip
+    parser.add_argument("--against", metavar="OTHER", type=Path,
+                        help="show what changed since another report: its folder or results.json")  # fmt: skip
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     reports = [read(path) for path in options.folder]
+    other = read(options.against) if options.against else None
     target, outcomes = _drawn(reports, options.output, stdout)
-    write_summaries(target, outcomes)
+    comparison = compare(outcomes, other) if other else None
+    write_summaries(target, outcomes, comparison)
+    if comparison:
+        stdout.writelines(f"{line}\n" for line in text.lines(comparison))
     stdout.write(f"report: {target / 'index.html'}\n")
-    return Exit.OK
+    return of_outcomes(outcome.outcome for outcome in outcomes) if comparison else Exit.OK
 
 
 def _drawn(reports: Sequence[GivenReport], out: Path | None, stdout: TextIO) -> tuple[Path, Sequence[Outcome]]:

@@ -60,3 +60,27 @@ def test_what_cannot_be_joined_is_a_sentence(here: Path) -> None:
     ):  # fmt: skip
         assert report(*words) == (2, "", f"dodo report: {said}\n")
     assert not (here / "out").exists()
+
+
+@pytest.mark.parametrize(("outcome", "code"), [("passed", 0), ("failed", 1), ("error", 3)])
+def test_what_changed_decides_as_the_run_did(here: Path, outcome: str, code: int) -> None:
+    write(here / "main", [named("a"), named("b")])
+    write(here / "new", [named("a"), named("b", outcome=outcome, reason="hit wall")])
+    told = "1 newly failing, 1 still passing" if code else "2 still passing"
+    for words in (["new"], ["new", "-o", "out"]):
+        assert report(*words, "--against", "main")[0] == code
+        for other in ("main", "main/results.json"):
+            ended, said, _ = report(*words, "--against", other)
+            assert (ended, said.splitlines()[0]) == (code, f"compared with main/results.json: {told}")
+        folder = here / words[-1]
+        assert f"{told}, compared with" in (folder / "changes.md").read_text()
+        assert f"{told}, compared with main/results.json" in (folder / "index.html").read_text()
+        assert (report(words[-1])[0], (folder / "changes.md").exists()) == (0, False)
+        assert "compared with" not in (folder / "index.html").read_text()
+
+
+def test_a_missing_report_to_compare_with_changes_nothing(here: Path) -> None:
+    write(here / "new", [named("a")])
+    before = tree(here)
+    assert report("new", "-o", "out", "--against", "main") == (2, "", "dodo report: there is no main/results.json\n")
+    assert tree(here) == before

@@ -9,7 +9,7 @@ from typing import TextIO, cast
 
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.exits import Exit, of_outcomes
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
@@ -208,7 +208,4 @@ def _run(
 
 
 def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:
-    if interrupted:
-        return Exit.INTERRUPTED
-    kinds = {o.outcome for o in outcomes}
-    return Exit.ERROR if "error" in kinds else Exit.PROBLEMS if "failed" in kinds else Exit.OK
+    return Exit.INTERRUPTED if interrupted else of_outcomes(outcome.outcome for outcome in outcomes)
