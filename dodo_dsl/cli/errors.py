@@ -49,6 +49,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.plan.test_files import FilesError
     from dodo_dsl.rec.coco import LabelError
     from dodo_dsl.rec.excerpt import NothingSelected
+    from dodo_dsl.rec.frames import FramesError
     from dodo_dsl.rec.outputs import OutputExists
     from dodo_dsl.rec.truth import TruthError
     from dodo_dsl.report.results import ResultsError
@@ -59,6 +60,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
         OdvdError,
         NothingSelected,
         LabelError,
+        FramesError,
         OutputExists,
         TruthError,
         NotAFile,

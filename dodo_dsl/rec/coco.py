@@ -20,13 +20,12 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.opendlv.video.decoder import DecodedFrame
-from dodo_dsl.rec.frames import IMAGE, Packet, decoded
+from dodo_dsl.rec.frames import Packet, decoded, write_picture
 
 ANNOTATIONS = "annotations.json"
 PICTURES = "images"
 _PREFIX = "opendlv.logic.perception.Detection"
 _KINDS = ("BoundingBox", "Property", "Type")
-_JPEG_QUALITY = 95
 
 
 class Key(NamedTuple):
@@ -80,22 +79,7 @@ class DataSet:
 
 
 class LabelError(ValueError):
-    """Missing or ambiguous frames or labels; one sentence."""
-
-
-def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Numbers:
-    """The image messages of one camera among some rows; raises LabelError for none, or for several."""
-    index = recording.index[rows]
-    images: Numbers = rows[index["data_type"] == IMAGE]
-    cameras = sorted(set(recording.index["sender_stamp"][images].tolist()))
-    if not cameras:
-        raise LabelError(f"the selection of {recording.path} holds no camera frames (opendlv.proxy.ImageReading)")
-    stamps = ", ".join(map(str, cameras))
-    if camera is None and len(cameras) > 1:
-        raise LabelError(f"{recording.path} holds frames of the cameras {stamps}; choose one with --camera")
-    if camera is not None and camera not in cameras:
-        raise LabelError(f"{recording.path} holds no frames of camera {camera}, expected one of {stamps}")
-    return images if camera is None else images[recording.index["sender_stamp"][images] == camera]
+    """Missing labels; one sentence."""
 
 
 def detections(
@@ -145,7 +129,7 @@ class Export:
                 result.lost += 1
             elif wanted or self.everything:
                 name = f"{PICTURES}/{packet.sender_stamp}-{packet.sample_time}.{self.picture_type}"
-                _write_picture(self.folder / name, frame)
+                write_picture(self.folder / name, frame)
                 _add(result, packet, frame, name, wanted)
             self.progress(done)
         if not result.images:
@@ -171,13 +155,3 @@ def _add(result: DataSet, packet: Packet, frame: DecodedFrame, name: str, wanted
         x, y, width, height = detection.box or (0.0, 0.0, 0.0, 0.0)
         box = [x * frame.width, y * frame.height, width * frame.width, height * frame.height]
         result.boxes.append((number, detection.category, [round(value, 3) for value in box]))
-
-
-def _write_picture(path: Path, frame: DecodedFrame) -> None:
-    import cv2
-
-    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if path.suffix == ".jpg" else []
-    done, data = cv2.imencode(path.suffix, frame.pixels("bgr"), options)
-    if not done:
-        raise OSError(f"{path.name} cannot be encoded")
-    path.write_bytes(data.tobytes())

@@ -1,6 +1,7 @@
 """The camera frames of a recording, decoded."""
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 from dodo_dsl.opendlv.messages.codec import MessageError
@@ -10,9 +11,12 @@ from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.opendlv.video.decoder import DecodedFrame, VideoDecoder, VideoError, refuse_large
 
 IMAGE = 1055
-
-
 MOST_DECODERS = 16
+_JPEG_QUALITY = 95
+
+
+class FramesError(ValueError):
+    """Missing or ambiguous frames; one sentence."""
 
 
 class Packet(NamedTuple):
@@ -24,6 +28,21 @@ class Packet(NamedTuple):
     data: bytes
     width: int = 0
     height: int = 0
+
+
+def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Numbers:
+    """The image messages of one camera among some rows; raises FramesError for none, or for several."""
+    index = recording.index[rows]
+    images: Numbers = rows[index["data_type"] == IMAGE]
+    cameras = sorted(set(recording.index["sender_stamp"][images].tolist()))
+    if not cameras:
+        raise FramesError(f"the selection of {recording.path} holds no camera frames (opendlv.proxy.ImageReading)")
+    stamps = ", ".join(map(str, cameras))
+    if camera is None and len(cameras) > 1:
+        raise FramesError(f"{recording.path} holds frames of the cameras {stamps}; choose one with --camera")
+    if camera is not None and camera not in cameras:
+        raise FramesError(f"{recording.path} holds no frames of camera {camera}, expected one of {stamps}")
+    return images if camera is None else images[recording.index["sender_stamp"][images] == camera]
 
 
 def packets(recording: Recording, rows: Numbers) -> Iterator[Packet]:
@@ -59,6 +78,17 @@ def decoded(
                 reasons.add(str(error))
                 problem(str(error))
         yield packet, frame
+
+
+def write_picture(path: Path, frame: DecodedFrame) -> None:
+    """Writes a frame as PNG or JPEG, as the name ends; raises OSError."""
+    import cv2
+
+    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if path.suffix == ".jpg" else []
+    done, data = cv2.imencode(path.suffix, frame.pixels("bgr"), options)
+    if not done:
+        raise OSError(f"{path.name} cannot be encoded")
+    path.write_bytes(data.tobytes())
 
 
 def _decoder(decoders: dict[tuple[int, str], VideoDecoder], packet: Packet) -> VideoDecoder:

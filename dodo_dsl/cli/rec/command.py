@@ -15,6 +15,7 @@ EXAMPLES = """examples:
   dodo rec cut drive.rec -o front.rec --message opendlv.proxy.DistanceReading/0
   dodo rec export drive.rec --csv -o tables                       the same as cluon-rec2csv
   dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
+  dodo rec export drive.rec --video -o drive.mp4                  what the camera saw
 """
 _CUT = """examples:
   dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5
@@ -22,10 +23,18 @@ _CUT = """examples:
 """
 _EXPORT = """examples:
   dodo rec export drive.rec --csv -o tables
+  dodo rec export drive.rec --frames -o pictures --pictures jpg
+  dodo rec export drive.rec --video -o drive.mp4 --camera 0
   dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
   dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
   dodo rec export desk.rec --coco -o labelled --truth desk.json
 """
+_FORMATS = {
+    "csv": "write one table per message and sender stamp",
+    "coco": "write pictures with the boxes of the detections",
+    "frames": "write the camera's frames as pictures, named by sender stamp and sample time",
+    "video": "write the camera's packets into an MP4, h264 as recorded and other formats encoded again",
+}
 _INFO = """examples:
   dodo rec info drive.rec
   dodo rec info drive.rec --json --no-decode
@@ -39,17 +48,21 @@ def add(parser: argparse.ArgumentParser) -> None:
     info.add_argument("--no-decode", action="store_true", help="count camera frames without decoding them")
     cut = _action(actions, "cut", "copy a part of a recording into a new one, byte for byte", _CUT)
     cut.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="new recording")
-    export = _action(actions, "export", "export a recording as CSV tables or as a labelled data set", _EXPORT)
+    export = _action(actions, "export", "export a recording for other tools", _EXPORT)
     what = export.add_mutually_exclusive_group(required=True)
-    what.add_argument("--csv", action="store_true", help="write one table per message and sender stamp")
-    what.add_argument("--coco", action="store_true", help="write pictures with the boxes of the detections")
+    for name, text in _FORMATS.items():
+        what.add_argument(f"--{name}", dest="format", action="store_const", const=name, help=text)
     export.add_argument(
-        "-o", "--output", metavar="DIR", type=Path, help="output folder (default: the recording's name without .rec)"
+        "-o",
+        "--output",
+        metavar="PATH",
+        type=Path,
+        help="output folder or file (default: the recording's name with another ending)",
     )
-    export.add_argument("--pictures", choices=("png", "jpg"), default="png", help="file type for --coco (default: png)")
     export.add_argument(
-        "--camera", metavar="N", type=_stamp, help="sender stamp of the camera for --coco, if there are several"
+        "--pictures", choices=("png", "jpg"), default="png", help="file type for --coco and --frames (default: png)"
     )
+    export.add_argument("--camera", metavar="N", type=_stamp, help="sender stamp of the camera, if there are several")
     export.add_argument(
         "--labels", metavar="N", type=_stamp, help="sender stamp of the detections for --coco (default: all)"
     )
