@@ -16,6 +16,7 @@ EXAMPLES = """examples:
   dodo rec export drive.rec --csv -o tables                       the same as cluon-rec2csv
   dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
   dodo rec export drive.rec --video -o drive.mp4                  what the camera saw
+  dodo rec export drive.rec --mcap -o drive.mcap                  for Foxglove, Lichtblick or rerun
 """
 _CUT = """examples:
   dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5
@@ -25,6 +26,7 @@ _EXPORT = """examples:
   dodo rec export drive.rec --csv -o tables
   dodo rec export drive.rec --frames -o pictures --pictures jpg
   dodo rec export drive.rec --video -o drive.mp4 --camera 0
+  dodo rec export drive.rec --mcap -o drive.mcap
   dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
   dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
   dodo rec export desk.rec --coco -o labelled --truth desk.json
@@ -34,6 +36,7 @@ _FORMATS = {
     "coco": "write pictures with the boxes of the detections",
     "frames": "write the camera's frames as pictures, named by sender stamp and sample time",
     "video": "write the camera's packets into an MP4, h264 as recorded and other formats encoded again",
+    "mcap": "write an MCAP file for Foxglove, Lichtblick or rerun (needs DoDo's extra 'mcap')",
 }
 _INFO = """examples:
   dodo rec info drive.rec

@@ -15,6 +15,7 @@ from dodo_dsl.rec.frames import images_of
 from dodo_dsl.rec.outputs import refuse_existing
 
 MOST_TABLES = 1000
+MCAP_PACKAGES = "mcap mcap-protobuf-support foxglove-schemas-protobuf"
 
 
 def _csv(job: Job) -> None:
@@ -114,4 +115,28 @@ def _video(job: Job) -> None:
     job.stdout.write(f"{output}: {video.frames} frames of {video.size[0]} x {video.size[1]} pixels, {how}\n")
 
 
-EXPORTS: Mapping[str, Callable[[Job], None]] = {"csv": _csv, "coco": _coco, "frames": _frames, "video": _video}
+def _mcap(job: Job) -> None:
+    try:
+        from dodo_dsl.rec.export import mcap_file
+    except ImportError as error:
+        module = (error.name or "mcap").partition(".")[0]
+        reason = f"--mcap needs the module '{module}', which is not installed; install DoDo with its extra 'mcap'"
+        raise NothingSelected(f"{reason}, or: pip install {MCAP_PACKAGES}") from None
+
+    output = job.file(".mcap")
+    known, unknown = _known(job)
+    topics = len(csv_table.names(job.recording, job.messages, known))
+    _refuse_many(job, topics, "topics")
+    with atomic.replacing(output) as place, job.progress(f"writing {output.name}", len(known)) as progress:
+        written = mcap_file.write(job.recording, job.messages, known, place, progress)
+    _tell_skipped(job, written.undecodable, unknown)
+    job.stdout.write(f"{output}: {written.messages} messages, and {written.converted} of them for Foxglove, too\n")
+
+
+EXPORTS: Mapping[str, Callable[[Job], None]] = {
+    "csv": _csv,
+    "coco": _coco,
+    "frames": _frames,
+    "video": _video,
+    "mcap": _mcap,
+}
