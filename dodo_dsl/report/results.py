@@ -13,6 +13,7 @@ from dodo_dsl.outcome import MachineLoad, Outcome, Response, Wait
 FILE_NAME = "results.json"
 VERSION = 1
 _MAX_PROBLEM_TEXT = 200
+_MOST_DIGITS = 300
 
 
 class ResultsError(ValueError):
@@ -55,7 +56,7 @@ def _rounded_value(name: str, value: Any) -> Any:
 def load(path: Path) -> list[Outcome]:
     """The outcomes of a ``results.json`` that its schema accepts; raises ResultsError."""
     try:
-        document = json.loads(regular_file.text(path))
+        document = json.loads(regular_file.text(path), parse_int=_whole)
         if document["dodo"] != "results" or document["version"] != VERSION:
             raise ResultsError(f"{path}: not results of version {VERSION}")
         _validate(document)
@@ -66,6 +67,11 @@ def load(path: Path) -> list[Outcome]:
         raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ResultsError(f"{path}: not results of DoDo ({error})") from error
+
+
+def _whole(digits: str) -> int | float:
+    """A number as others read it, too: what no float holds is infinite."""
+    return int(digits) if len(digits) < _MOST_DIGITS else float(digits)
 
 
 def _validate(document: Any) -> None:

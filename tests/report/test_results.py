@@ -8,7 +8,9 @@ import pytest
 
 from dodo_dsl.outcome import MachineLoad, Wait
 from dodo_dsl.report import results
-from dodo_dsl.report.report_folder import forget
+from dodo_dsl.report.changes.comparison import compare
+from dodo_dsl.report.given_report import GivenReport
+from dodo_dsl.report.report_folder import forget, write_summaries
 from tests.report.test_report_folder import OUTCOME
 
 
@@ -53,6 +55,18 @@ def test_the_load_of_the_machine_is_kept_in_milliseconds(tmp_path: Path, load: M
     rough = replace(LOAD, others_share=0.61049, application=Wait(1.00049, 2.0, 1.9, "app"))
     (tmp_path / "results.json").write_text(results.to_json([replace(OUTCOME, machine=rough)]))
     assert results.load(tmp_path / "results.json")[0].machine == LOAD
+
+
+@pytest.mark.parametrize("number", ["1" + "0" * 400, "-1" + "0" * 400, "1e999", "NaN", "1" * 5000])
+def test_numbers_of_any_size_can_be_drawn(tmp_path: Path, number: str) -> None:
+    checks = [{"name": "x", "value": "VALUE", "limit": {"max": "VALUE"}, "unit": "", "ok": True}]
+    text = results.to_json([replace(OUTCOME, checks=tuple(checks))]).replace('"VALUE"', number)
+    (tmp_path / "results.json").write_text(text)
+    outcomes = results.load(tmp_path / "results.json")
+    write_summaries(tmp_path, outcomes, compare(outcomes, GivenReport(tmp_path / "results.json", outcomes)))
+    (tmp_path / "results.json").write_text(results.to_json([OUTCOME]).replace('"cid": 130', f'"cid": {number}'))
+    with pytest.raises(results.ResultsError):
+        results.load(tmp_path / "results.json")
 
 
 def test_results_that_cannot_be_read_stop_no_run(tmp_path: Path) -> None:
