@@ -1,5 +1,6 @@
 """The compiler from end to end: from paths to checked tests, and on to Plans."""
 
+import functools
 import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,6 +17,7 @@ from dodo_dsl.emit.output_folder import pipeline_folder
 from dodo_dsl.emit.pipeline import pipeline_problems
 from dodo_dsl.emit.render import File, render_pipeline
 from dodo_dsl.plan.build import Compiled, build
+from dodo_dsl.source import Reader, read
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.deployment.rig import PORT
 from dodo_dsl.spec.load import load_spec
@@ -26,6 +28,7 @@ from dodo_dsl.spec.settings import Settings, applied
 
 UNSATISFIED = ("no-producer", "no-sample")
 """The rules by which a service consumes what nobody produces."""
+_MOST_READ = 256  # files that are kept for the tests that extend them
 
 
 @dataclass(frozen=True)
@@ -73,19 +76,22 @@ def load(
     application: Sequence[Path] = (),
     start: Path | None = None,
     settings: Settings = Settings(),  # noqa: B008  (it is frozen)
+    reader: Reader = read,
 ) -> Checked:
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
     ``application`` are compose files that replace the deployment's. ``start`` is where a deployment is looked for.
+    ``reader`` may know texts that are not saved yet.
     """
-    deployment, found = load_deployment(find_deployment(start or Path.cwd()))
-    manifests, manifest_problems = load_manifests(deployment.services)
-    locations, empty = locate(paths, deployment.registry, _registries_above(paths))
-    loaded = [load_spec(location) for location in locations]
+    deployment, found = load_deployment(find_deployment(start or Path.cwd()), reader)
+    manifests, manifest_problems = load_manifests(deployment.services, reader)
+    once = functools.lru_cache(maxsize=_MOST_READ)(reader)
+    locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
+    loaded = [load_spec(location, once) for location in locations]
     found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
     source = None
     if files := application or deployment.application:
-        source, problems = read_application(files, access(deployment), deployment.sandbox)
+        source, problems = read_application(files, access(deployment), deployment.sandbox, reader)
         found.extend(problems)
     specs = [applied(spec, settings) for instances, _ in loaded for spec in instances]
     tests = tuple(resolve(specs, manifests, deployment, source))
@@ -124,10 +130,10 @@ def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Check
     )
 
 
-def _registries_above(paths: Sequence[Path]) -> list[Path]:
+def _registries_above(paths: Sequence[Path], reader: Reader) -> list[Path]:
     """The registries of the deployments that hold the paths, wherever DoDo was started."""
     files = {find_deployment(path if path.is_dir() else path.parent) for path in paths}
-    return [folder for file in files if file for folder in load_deployment(file)[0].registry]
+    return [folder for file in files if file for folder in load_deployment(file, reader)[0].registry]
 
 
 def plan(checked: Checked, out: Path) -> Compilation:

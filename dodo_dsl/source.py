@@ -6,7 +6,7 @@ without recursion, so that nesting, size and aliases of hostile files are bounde
 
 import codecs
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -76,6 +76,8 @@ class Mapping:
 
 
 Node = Scalar | Sequence | Mapping
+Reader = Callable[[Path], tuple[Node | None, list[Diagnostic]]]
+"""``read``, or what reads the text of an editor in place of a file's."""
 
 
 def plain(node: Node) -> Any:
@@ -313,6 +315,11 @@ def read(path: Path) -> tuple[Node | None, list[Diagnostic]]:
             raw = stream.read(MAX_BYTES + 1)
     except OSError as error:
         return None, [Diagnostic(Span(file), "unreadable-file", f"cannot read the file: {error.strerror}")]
+    return parse_bytes(raw, file)
+
+
+def parse_bytes(raw: bytes, file: str) -> tuple[Node | None, list[Diagnostic]]:
+    """As ``parse``, from the content of a file."""
     if len(raw) > MAX_BYTES:
         return None, [Diagnostic(Span(file), "too-large", f"the file is larger than {MAX_BYTES // 1024} KiB")]
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

@@ -8,7 +8,7 @@ from dodo_dsl import source
 from dodo_dsl.application.access.secret_variables import holds_secret, is_steering
 from dodo_dsl.application.interpolation import dotenv
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Node, Scalar, read
+from dodo_dsl.source import Node, Reader, Scalar, read
 
 MAX_FILES = 64
 MAX_NODES = 50_000
@@ -19,7 +19,8 @@ _MAX_ENV = 1 << 20
 class ComposeFiles:
     """Documents by path, ``variables`` of their ``.env`` files and ``problems``; ``secrets`` has files by variable."""
 
-    def __init__(self) -> None:
+    def __init__(self, reader: Reader = read) -> None:
+        self._reader = reader
         self.problems: list[Diagnostic] = []
         self.variables: dict[str, str] = {}
         self.secrets: dict[str, Path] = {}
@@ -50,7 +51,7 @@ class ComposeFiles:
 
     def document(self, file: Path) -> source.Mapping | None:
         if file not in self._documents:
-            node, found = read(file)
+            node, found = self._reader(file)
             if node is None and not found:
                 found = [Diagnostic(Span(str(file)), "application-file", "the file is empty, expected a compose file")]
             if node is not None and not isinstance(node, source.Mapping):

@@ -22,7 +22,7 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, declar
 from dodo_dsl.application.service_environment import cid_variables, env_files
 from dodo_dsl.application.service_problems import unknown_keys
 from dodo_dsl.diagnostics import Diagnostic, has_errors
-from dodo_dsl.source import Entry
+from dodo_dsl.source import Entry, Reader
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.schema import validate
 
@@ -34,13 +34,14 @@ def read_application(
     path: Path | Sequence[Path],
     access: Access = Access(),  # noqa: B008  (it is frozen)
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008
+    reader: Reader = source.read,
 ) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems.
 
     ``access`` is what the deployment allows it, ``limits`` are the highest that it may set.
     """
     paths = [path] if isinstance(path, Path) else list(path)
-    files = ComposeFiles()
+    files = ComposeFiles(reader)
     document = load(files, paths)
     found = files.problems
     services = document.get("services") if document else None

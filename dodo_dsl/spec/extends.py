@@ -1,10 +1,9 @@
 """``extends``: a spec built on another one. Mappings merge deeply, scalars and lists replace, null removes."""
 
-import functools
 from pathlib import Path
 
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, shown_path
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, path_of, read
+from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, path_of, read
 
 KEY = "extends"
 MAX_CHAIN = 8
@@ -13,12 +12,12 @@ _OWN = (KEY, "name")
 _USES = "uses"
 
 
-def resolve(node: Node, file: Path, root: Path) -> tuple[Node, list[Diagnostic]]:
+def resolve(node: Node, file: Path, root: Path, reader: Reader = read) -> tuple[Node, list[Diagnostic]]:
     """The spec merged over everything that it extends; spans keep the file that each value was written in.
 
     ``root`` is the registry's folder, which holds all files of the chain.
     """
-    return _resolve(node, (file,), root.resolve())
+    return _resolve(node, (file,), root.resolve(), reader)
 
 
 def is_text(node: Node) -> bool:
@@ -27,7 +26,7 @@ def is_text(node: Node) -> bool:
     return written is None or (isinstance(written, Scalar) and isinstance(written.value, str))
 
 
-def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, list[Diagnostic]]:
+def _resolve(node: Node, chain: tuple[Path, ...], root: Path, reader: Reader) -> tuple[Node, list[Diagnostic]]:
     written = node.get(KEY) if isinstance(node, Mapping) else None
     if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not is_text(node):
         return node, []  # reported by the schema
@@ -37,23 +36,17 @@ def _resolve(node: Node, chain: tuple[Path, ...], root: Path) -> tuple[Node, lis
     problem = _problem(written, path, chain, root)
     if problem:
         return node, [problem]
-    base, found = _read(path)
+    base, found = reader(path)
     if not isinstance(base, Mapping):
         if not found:
-            found = (Diagnostic(written.span, "extends-file", f"'{written.text}' does not contain a test"),)
-        return node, list(found)
-    below, deeper = _resolve(base, (*chain, path), root)
+            found = [Diagnostic(written.span, "extends-file", f"'{written.text}' does not contain a test")]
+        return node, found
+    below, deeper = _resolve(base, (*chain, path), root, reader)
     problems = [*found, *deeper]
     assert isinstance(below, Mapping), "a mapping resolves to one"
     inherited = Mapping(base.span, {key: entry for key, entry in below.entries.items() if key not in _OWN})
     own = Mapping(node.span, {key: entry for key, entry in node.entries.items() if key != KEY}, node.tag)
     return _merge(inherited, own, problems), problems
-
-
-@functools.lru_cache(maxsize=256)
-def _read(path: Path) -> tuple[Node | None, tuple[Diagnostic, ...]]:
-    node, found = read(path)
-    return node, tuple(found)
 
 
 def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -> Diagnostic | None:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Mapping, Node, read
+from dodo_dsl.source import Mapping, Node, Reader, read
 from dodo_dsl.spec import decimal_commas, extends
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.instances.matrix import Choice
@@ -13,14 +13,14 @@ from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.schema import validate
 
 
-def load_spec(location: Location) -> tuple[list[Spec], list[Diagnostic]]:
+def load_spec(location: Location, reader: Reader = read) -> tuple[list[Spec], list[Diagnostic]]:
     """The instances of a file, as far as it can be read, and its problems."""
-    node, found = read(location.path)
+    node, found = reader(location.path)
     if node is None:
         if not found:
             found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
         return [Spec(location)], found
-    node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root)
+    node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root, reader)
     is_whole = not has_errors(problems) and extends.is_text(node)
     found = [*found, *problems]
     choices, problems = matrix.choices(node)

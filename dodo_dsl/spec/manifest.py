@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, shown_path
-from dodo_dsl.source import Mapping, plain, read
+from dodo_dsl.source import Mapping, Reader, plain, read
 from dodo_dsl.spec import manifest_consistency
 from dodo_dsl.spec.schema import validate
 
@@ -75,9 +75,9 @@ def _ports(raw: dict[str, list[str]] | None) -> Ports:
     return Ports(tuple(raw.get("in", ())), tuple(raw.get("out", ())))
 
 
-def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
+def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, list[Diagnostic]]:
     """The manifest of a ``service.yml`` and its problems."""
-    node, found = read(path)
+    node, found = reader(path)
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected a service's manifest")]
     if node is not None:
@@ -116,13 +116,15 @@ def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
 
 
 @functools.cache
-def load_manifests(folders: tuple[Path, ...] = ()) -> tuple[dict[str, Manifest], tuple[Diagnostic, ...]]:
+def load_manifests(
+    folders: tuple[Path, ...] = (), reader: Reader = read
+) -> tuple[dict[str, Manifest], tuple[Diagnostic, ...]]:
     """Every manifest ``<folder>/<service>/service.yml``, by service name: the shipped ones and those of ``folders``."""
     manifests: dict[str, Manifest] = {}
     found: list[Diagnostic] = []
     for folder in (package_data.services(), *folders):
         for path in sorted(folder.glob("*/service.yml")):
-            manifest, problems = load_manifest(path)
+            manifest, problems = load_manifest(path, reader)
             found.extend(problems)
             if manifest and manifest.name in manifests:
                 other = manifests[manifest.name].folder

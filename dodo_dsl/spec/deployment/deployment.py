@@ -10,7 +10,7 @@ from pathlib import Path
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Scalar, Sequence, path_of, plain, read
+from dodo_dsl.source import Entry, Mapping, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec.deployment import rig
 from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits, sandbox_limits
@@ -67,11 +67,11 @@ def find_deployment(start: Path) -> Path | None:
     return None
 
 
-def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
+def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deployment, list[Diagnostic]]:
     """The deployment of a ``dodo.yml``; without one, the shipped registry and no application."""
     if path is None:
         return Deployment(Path.cwd(), registry=(package_data.registry(),)), []
-    node, found = read(path)
+    node, found = reader(path)
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:

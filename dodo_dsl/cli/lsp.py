@@ -1,0 +1,41 @@
+"""dodo lsp: check and complete tests in an editor while they are written."""
+
+import argparse
+import contextlib
+import os
+import sys
+from typing import TextIO
+
+from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.exits import Exit
+
+EXAMPLES = """examples:
+  dodo lsp                  what an editor starts; it speaks the language server protocol on standard input and output
+  pip install 'dodo-dsl[lsp]'    what it needs beside DoDo
+
+docs/editors.md has the settings for VS Code, Neovim and PyCharm.
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--stdio", action="store_true", help="what some editors add; it is how the server always speaks"
+    )
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    try:
+        from dodo_dsl.lsp.server import serve
+    except ModuleNotFoundError as error:
+        message = f"the package '{error.name}' is missing; install it with: pip install 'dodo-dsl[lsp]'"
+        raise UsageError(message) from error
+    if sys.stdin is None or sys.stdin.isatty():
+        raise UsageError("an editor starts this program and speaks with it; docs/editors.md says how to set it up")
+    sys.stdout.flush()
+    with (
+        contextlib.redirect_stdout(sys.stderr),  # what is printed by mistake is no message
+        os.fdopen(os.dup(1), "wb") as messages,
+        os.fdopen(os.dup(0), "rb") as requests,
+    ):
+        serve(requests, messages)
+    return Exit.OK
