@@ -25,7 +25,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     try:
-        from dodo_dsl.lsp.server import serve
+        from dodo_dsl.lsp.listeners import serve
     except ModuleNotFoundError as error:
         message = f"the package '{error.name}' is missing; install it with: pip install 'dodo-dsl[lsp]'"
         raise UsageError(message) from error

@@ -3,28 +3,28 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any
 
 from lsprotocol import types
+from lsprotocol.types import Diagnostic as ShownDiagnostic
 from pygls.lsp.server import LanguageServer
 
 from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.lsp.documents import Document, opened, saved_text, uri_of
+from dodo_dsl.lsp.documents import Document, opened, path_of, saved_text, uri_of
 from dodo_dsl.lsp.positions import Lines
 from dodo_dsl.lsp.project import Project, by_file, forget, is_ours, projects
+from dodo_dsl.lsp.scene import Scene, scene
 from dodo_dsl.lsp.texts import Texts
 from dodo_dsl.terminal import printable
 
 PAUSE_S = 0.05
 """After the last change, before a check begins."""
 _IDLE_S = 0.5  # before all tests are planned
-_WATCHED = "**/*.{yml,yaml,json,odvd,env}"
 _SEVERITIES = {"error": types.DiagnosticSeverity.Error, "warning": types.DiagnosticSeverity.Warning}
-_log = logging.getLogger(__name__)
-_Answer = TypeVar("_Answer")
+log = logging.getLogger(__name__)
 
 
 class DodoServer(LanguageServer):
@@ -42,13 +42,20 @@ class DodoServer(LanguageServer):
     def lines(self, text: str) -> Lines:
         return Lines(text, self.workspace.position_codec)
 
-    def log(self, message: str) -> None:
+    def scene(self, uri: str) -> Scene | None:
+        """An open document of a test or deployment with what the last check found; None for any other."""
+        path = path_of(uri)
+        if path is None or not is_ours(path):
+            return None
+        return scene(path, self.lines(self.workspace.get_text_document(uri).source), self.projects)
+
+    def say(self, message: str) -> None:
         self.window_log_message(types.LogMessageParams(types.MessageType.Error, printable(message)))
 
     def report_server_error(self, error: Exception, source: Any) -> None:
         """Errors are messages of the log and not of a window."""
-        _log.error("%s", error, exc_info=error)
-        self.log(f"internal error: {error}")
+        log.error("%s", error, exc_info=error)
+        self.say(f"internal error: {error}")
 
     def changed(self, *, elsewhere: bool = False) -> None:
         """Begins a check soon; ``elsewhere`` where other files than tests may have changed."""
@@ -69,9 +76,9 @@ class DodoServer(LanguageServer):
             self._stale.clear()
             try:
                 await self._check_once()
-            except Exception as error:  # noqa: BLE001
-                _log.exception("the check failed")
-                self.log(f"the check failed: {type(error).__name__}: {error}")
+            except Exception as error:
+                log.exception("the check failed")
+                self.say(f"the check failed: {type(error).__name__}: {error}")
 
     async def _check_once(self) -> None:
         """Checks each test, and plans all tests together if nothing changes for a while."""
@@ -111,73 +118,12 @@ def _planned(found: Sequence[Project]) -> list[Diagnostic]:
     return [problem for project in found for problem in project.planned()]
 
 
-def _shown(lines: Lines, diagnostic: Diagnostic) -> types.Diagnostic:
+def _shown(lines: Lines, diagnostic: Diagnostic) -> ShownDiagnostic:
     hint = f"\n{printable(diagnostic.hint)}" if diagnostic.hint else ""
-    return types.Diagnostic(
+    return ShownDiagnostic(
         lines.range(diagnostic.span),
         printable(diagnostic.message) + hint,
         _SEVERITIES[diagnostic.severity],
         diagnostic.rule,
         source="dodo",
     )
-
-
-def guarded(server: DodoServer, answer: Callable[..., _Answer]) -> Callable[..., _Answer | None]:
-    """An answer to a request that is empty where it fails, which the log then says."""
-
-    def safe(params: Any) -> _Answer | None:
-        try:
-            return answer(server, params)
-        except Exception as error:  # noqa: BLE001
-            _log.exception("a request failed")
-            server.log(f"a request failed: {type(error).__name__}: {error}")
-            return None
-
-    return safe
-
-
-def build() -> DodoServer:
-    """The server with everything that it listens to."""
-    server = DodoServer()
-
-    @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
-    def _opened(_: types.DidOpenTextDocumentParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.TEXT_DOCUMENT_DID_CHANGE)
-    def _changed(params: types.DidChangeTextDocumentParams) -> None:
-        server.changed(elsewhere=params.text_document.uri.endswith("/service.yml"))
-
-    @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
-    def _closed(_: types.DidCloseTextDocumentParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
-    def _saved(_: types.DidSaveTextDocumentParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
-    def _watched(_: types.DidChangeWatchedFilesParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.INITIALIZED)
-    async def _initialized(_: types.InitializedParams) -> None:
-        await _watch(server)
-
-    return server
-
-
-async def _watch(server: DodoServer) -> None:
-    """Asks the editor to say when files change on disk, where it can."""
-    workspace = server.client_capabilities.workspace
-    watching = workspace.did_change_watched_files if workspace else None
-    if not watching or not watching.dynamic_registration:
-        return
-    options = types.DidChangeWatchedFilesRegistrationOptions([types.FileSystemWatcher(_WATCHED)])
-    wanted = types.Registration("dodo-files", types.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
-    await server.client_register_capability_async(types.RegistrationParams([wanted]))
-
-
-def serve(stdin: BinaryIO, stdout: BinaryIO) -> None:
-    """Speaks with one editor until it leaves."""
-    build().start_io(stdin, stdout)

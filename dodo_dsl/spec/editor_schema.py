@@ -32,14 +32,14 @@ def path() -> Path:
 def generate(text: str, manifests: Mapping[str, Manifest]) -> str:
     """The text of the schema with these services and their parameters."""
     schema = json.loads(text)
-    offered = [m for _, m in sorted(manifests.items()) if _is_offered(m)]
+    offered = [m for _, m in sorted(manifests.items()) if is_offered(m)]
     definitions = {k: v for k, v in schema["$defs"].items() if not k.startswith(PREFIX)}
     definitions["use"]["allOf"] = [_uses(offered), *map(_when, offered)]
     schema["$defs"] = {**definitions, **{PREFIX + m.name: _with(m) for m in offered}}
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
-def _is_offered(manifest: Manifest) -> bool:
+def is_offered(manifest: Manifest) -> bool:
     """Whether specs use the service, as DoDo does not add it by itself."""
     node, _ = read(manifest.folder / "service.yml")
     return node is not None and not plain(node).get("automatic", False)
@@ -71,17 +71,18 @@ def _with(manifest: Manifest) -> Schema:
 
 
 def _parameter(parameter: Parameter) -> Schema:
-    schema: Schema = {"description": _description(parameter), **_value(parameter)}
+    schema: Schema = {"description": description(parameter), **_value(parameter)}
     if parameter.default not in (None, []):
-        schema["default"] = _written(parameter, parameter.default)
+        schema["default"] = written(parameter, parameter.default)
     elif parameter.example is not None:
-        schema["examples"] = [_written(parameter, parameter.example)]
+        schema["examples"] = [written(parameter, parameter.example)]
     elif parameter.unit:
-        schema["examples"] = [_written(parameter, 1)]
+        schema["examples"] = [written(parameter, 1)]
     return schema
 
 
-def _description(parameter: Parameter) -> str:
+def description(parameter: Parameter) -> str:
+    """What a parameter is for, its range, and who else may give it."""
     facts = [parameter.help]
     low, high = parameter.minimum, parameter.maximum
     unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
@@ -96,7 +97,7 @@ def _description(parameter: Parameter) -> str:
     return " ".join(facts)
 
 
-def _written(parameter: Parameter, value: Any) -> Any:
+def written(parameter: Parameter, value: Any) -> Any:
     """A value as an author writes it."""
     bare = parameter.unit in ("", quantity.SHARE)
     return value if bare or isinstance(value, str | list) else f"{value} {parameter.unit}"

@@ -1,0 +1,138 @@
+"""Completion: the keys, services, parameters, values and units that may stand at the cursor."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from lsprotocol import types
+
+from dodo_dsl.check.rules import references
+from dodo_dsl.lsp import schema_keys
+from dodo_dsl.lsp.hover import parameter_text, service_text
+from dodo_dsl.lsp.incomplete import Cursor, cursor
+from dodo_dsl.lsp.scene import USES, WITH, Scene
+from dodo_dsl.spec import quantity
+from dodo_dsl.spec.instances import matrix
+from dodo_dsl.spec.deployment.rig import EMULATED
+from dodo_dsl.spec.editor_schema import is_offered, written
+from dodo_dsl.spec.manifest import Manifest, Parameter
+from dodo_dsl.spec.model import LAYERS
+
+_KEY, _SERVICE, _VALUE, _UNIT = (
+    types.CompletionItemKind.Property,
+    types.CompletionItemKind.Class,
+    types.CompletionItemKind.Value,
+    types.CompletionItemKind.Unit,
+)
+Offer = tuple[str, types.CompletionItemKind, str, str]
+"""A word, what it is, what stands beside it, and its documentation as Markdown."""
+_MAP = "map.json"
+TRIGGERS = [" ", ":", "{", "[", ",", "$", ".", "/"]
+
+
+def completion(scene: Scene, position: types.Position) -> types.CompletionList:
+    at = cursor(scene.lines.text, scene.lines.index(position))
+    items = []
+    if at is not None:
+        place = types.Range(scene.lines.position(at.start), position)
+        items = [_item(offer, place, at) for offer in _offers(scene, at)]
+    return types.CompletionList(is_incomplete=False, items=items)
+
+
+def _item(offer: Offer, place: types.Range, at: Cursor) -> types.CompletionItem:
+    word, kind, detail, documentation = offer
+    text = f"{word}: " if kind == _KEY else word
+    return types.CompletionItem(
+        label=word,
+        kind=kind,
+        detail=detail or None,
+        documentation=types.MarkupContent(types.MarkupKind.Markdown, documentation) if documentation else None,
+        filter_text=word,
+        text_edit=types.TextEdit(place, text),
+    )
+
+
+def _offers(scene: Scene, at: Cursor) -> Iterator[Offer]:
+    layered = scene.schema == "dodo" and len(at.steps) > 1 and at.steps[0] in LAYERS
+    manifest = scene.manifest(at.steps, at.values.get((*at.steps[:2], USES), "")) if layered else None
+    if layered and len(at.steps) > 2 and at.steps[2] == WITH:
+        if manifest and at.is_key and len(at.steps) == 3:
+            yield from _parameters(manifest, at.keys)
+        elif manifest and not at.is_key and (parameter := manifest.parameters.get(str(at.steps[3]))):
+            yield from _values(scene, at, parameter)
+    elif layered and at.steps[2:] == (USES,):
+        yield from _services(scene, str(at.steps[0]))
+    elif at.steps == ("rig",) and not at.is_key:
+        rigs = scene.deployment.rigs if scene.deployment else {}
+        yield from ((name, _VALUE, "rig", "") for name in (EMULATED, *rigs))
+    else:
+        yield from _by_schema(scene, at)
+
+
+def _by_schema(scene: Scene, at: Cursor) -> Iterator[Offer]:
+    part = schema_keys.at(scene.schema, at.steps) or {}
+    if at.is_key:
+        for name in part.get("properties", {}):
+            if name not in at.keys:
+                about = schema_keys.at(scene.schema, (*at.steps, name)) or {}
+                yield name, _KEY, "", about.get("description", "")
+    else:
+        yield from ((value, _VALUE, "", "") for value in schema_keys.values(part))
+
+
+def _services(scene: Scene, layer: str) -> Iterator[Offer]:
+    for manifest in scene.manifests.values():
+        if layer in manifest.layers and is_offered(manifest):
+            yield manifest.name, _SERVICE, manifest.description, service_text(manifest)
+
+
+def _parameters(manifest: Manifest, present: Sequence[str]) -> Iterator[Offer]:
+    """Those that are not written yet; required ones come first."""
+    parameters = [p for p in manifest.parameters.values() if p.name not in present]
+    for parameter in sorted(parameters, key=lambda p: not p.required):
+        detail = " ".join(word for word in (parameter.type, parameter.unit.replace("1", "")) if word)
+        yield parameter.name, _KEY, detail, parameter_text(parameter)
+
+
+def _values(scene: Scene, at: Cursor, parameter: Parameter) -> Iterator[Offer]:
+    number = at.before.replace(".", "", 1).lstrip("+-").isdigit()
+    if number and parameter.unit:
+        yield from ((unit, _UNIT, f"{at.before} {unit}", "") for unit in quantity.units_of(parameter.unit))
+        return
+    for name in _of_matrix(scene):
+        yield f"${{matrix.{name}}}", _VALUE, "each value of the matrix", ""
+    if parameter.among:
+        yield from ((name, _VALUE, parameter.among, "") for name in _named(scene, at, parameter))
+    elif parameter.type == "boolean":
+        yield from (("true", _VALUE, "", ""), ("false", _VALUE, "", ""))
+    elif parameter.choices:
+        yield from ((choice, _VALUE, "", "") for choice in parameter.choices)
+    elif len(at.steps) == 4:
+        example = parameter.default if parameter.default not in (None, []) else parameter.example
+        if example is not None and not isinstance(example, list):
+            detail = "default" if parameter.default is example else "for example"
+            yield str(written(parameter, example)), _VALUE, detail, ""
+
+
+def _of_matrix(scene: Scene) -> list[str]:
+    values = scene.test.spec.choice.values if scene.test else ()
+    here = scene.root.get(matrix.KEY) if scene.root and hasattr(scene.root, "get") else None
+    names = getattr(here, "entries", {})
+    return list(dict.fromkeys([*names, *(name for name, _ in values)]))
+
+
+def _named(scene: Scene, at: Cursor, parameter: Parameter) -> list[str]:
+    """The names of the map, or other file, that the service has according to its text, or else to the last check."""
+    source, _, key = parameter.among.partition(".")
+    service = scene.service(str(at.steps[0]), str(at.steps[1]))
+    argument = service.arguments.get(source) if service else None
+    path = argument.value.path if argument and argument.value else None
+    texts = [at.values.get((*at.steps[:3], source)), *(v for k, v in at.values.items() if k[3:] == (source,))]
+    for text in texts:
+        if path is None and text:
+            path = scene.path.parent / text
+    found = references.entries(_file(path), key) if path else ()
+    return [] if isinstance(found, str) else [name for name in found if name]
+
+
+def _file(path: Path) -> Path:
+    return path / _MAP if path.is_dir() else path
