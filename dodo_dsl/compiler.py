@@ -2,7 +2,7 @@
 
 import functools
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,8 +10,8 @@ from dodo_dsl import package_data
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
-from dodo_dsl.check import check
-from dodo_dsl.check.resolve import ResolvedTest, resolve
+from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.unchanged import Findings, Surroundings, check_again
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.emit.output_folder import pipeline_folder
 from dodo_dsl.emit.pipeline import pipeline_problems
@@ -20,10 +20,10 @@ from dodo_dsl.plan.build import Compiled, build
 from dodo_dsl.source import Reader, read
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.deployment.rig import PORT
-from dodo_dsl.spec.load import load_spec
+from dodo_dsl.spec.load import Loaded, load_spec
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.registry import locate
+from dodo_dsl.spec.registry import Location, locate
 from dodo_dsl.spec.settings import Settings, applied
 
 UNSATISFIED = ("no-producer", "no-sample")
@@ -54,6 +54,10 @@ class Checked:
         return tuple(test.spec for test in self.tests)
 
     @property
+    def around(self) -> Surroundings:
+        return Surroundings(self.manifests, self.deployment, self.application)
+
+    @property
     def ok(self) -> bool:
         return not has_errors(self.diagnostics)
 
@@ -77,28 +81,32 @@ def load(
     start: Path | None = None,
     settings: Settings = Settings(),  # noqa: B008  (it is frozen)
     reader: Reader = read,
+    loader: Callable[[Location, Reader], Loaded] = load_spec,
+    former: Checked | None = None,
 ) -> Checked:
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
     ``application`` are compose files that replace the deployment's. ``start`` is where a deployment is looked for.
-    ``reader`` may know texts that are not saved yet.
+    ``reader`` may know texts that are not saved yet. Tests for which ``loader`` gives the specs of the ``former`` check
+    keep what it found.
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd()), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
     once = functools.lru_cache(maxsize=_MOST_READ)(reader)
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
-    loaded = [load_spec(location, once) for location in locations]
+    loaded = [loader(location, once) for location in locations]
     found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
     source = None
     if files := application or deployment.application:
         source, problems = read_application(files, access(deployment), deployment.sandbox, reader)
         found.extend(problems)
     specs = [applied(spec, settings) for instances, _ in loaded for spec in instances]
-    tests = tuple(resolve(specs, manifests, deployment, source))
-    corners = resolve((applied(c, settings) for s in specs for c in s.corners), manifests, deployment, source)
-    by_rules = check(tests, manifests, deployment, source, corners)
-    found.extend(itertools.chain.from_iterable(by_rules.values()))
-    return Checked(deployment, manifests, tests, tuple(ordered(found)), settings, source, tuple(empty), by_rules)
+    before = Findings(former.around, former.tests, former.by_rules) if former else None
+    corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
+    again = check_again(specs, corners, Surroundings(manifests, deployment, source), before)
+    found.extend(itertools.chain.from_iterable(again.by_rules.values()))
+    diagnostics, by_rules = tuple(ordered(found)), again.by_rules
+    return Checked(deployment, manifests, again.tests, diagnostics, settings, source, tuple(empty), by_rules)
 
 
 def access(deployment: Deployment) -> Access:

@@ -1,7 +1,6 @@
 """Completion: the keys, services, parameters, values and units that may stand at the cursor."""
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from lsprotocol import types
 
@@ -10,10 +9,12 @@ from dodo_dsl.lsp import schema_keys
 from dodo_dsl.lsp.hover import parameter_text, service_text
 from dodo_dsl.lsp.incomplete import Cursor, cursor
 from dodo_dsl.lsp.scene import USES, WITH, Scene
+from dodo_dsl.lsp.tree import below
+from dodo_dsl.source import Mapping
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.instances import matrix
 from dodo_dsl.spec.deployment.rig import EMULATED
 from dodo_dsl.spec.editor_schema import is_offered, written
+from dodo_dsl.spec.instances import matrix
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import LAYERS
 
@@ -25,7 +26,6 @@ _KEY, _SERVICE, _VALUE, _UNIT = (
 )
 Offer = tuple[str, types.CompletionItemKind, str, str]
 """A word, what it is, what stands beside it, and its documentation as Markdown."""
-_MAP = "map.json"
 TRIGGERS = [" ", ":", "{", "[", ",", "$", ".", "/"]
 
 
@@ -34,11 +34,11 @@ def completion(scene: Scene, position: types.Position) -> types.CompletionList:
     items = []
     if at is not None:
         place = types.Range(scene.lines.position(at.start), position)
-        items = [_item(offer, place, at) for offer in _offers(scene, at)]
+        items = [_item(number, offer, place) for number, offer in enumerate(_offers(scene, at))]
     return types.CompletionList(is_incomplete=False, items=items)
 
 
-def _item(offer: Offer, place: types.Range, at: Cursor) -> types.CompletionItem:
+def _item(number: int, offer: Offer, place: types.Range) -> types.CompletionItem:
     word, kind, detail, documentation = offer
     text = f"{word}: " if kind == _KEY else word
     return types.CompletionItem(
@@ -46,6 +46,7 @@ def _item(offer: Offer, place: types.Range, at: Cursor) -> types.CompletionItem:
         kind=kind,
         detail=detail or None,
         documentation=types.MarkupContent(types.MarkupKind.Markdown, documentation) if documentation else None,
+        sort_text=f"{number:03}",
         filter_text=word,
         text_edit=types.TextEdit(place, text),
     )
@@ -115,24 +116,20 @@ def _values(scene: Scene, at: Cursor, parameter: Parameter) -> Iterator[Offer]:
 
 def _of_matrix(scene: Scene) -> list[str]:
     values = scene.test.spec.choice.values if scene.test else ()
-    here = scene.root.get(matrix.KEY) if scene.root and hasattr(scene.root, "get") else None
-    names = getattr(here, "entries", {})
+    written_here = below(scene.root, matrix.KEY)
+    names = written_here.entries if isinstance(written_here, Mapping) else {}
     return list(dict.fromkeys([*names, *(name for name, _ in values)]))
 
 
 def _named(scene: Scene, at: Cursor, parameter: Parameter) -> list[str]:
     """The names of the map, or other file, that the service has according to its text, or else to the last check."""
     source, _, key = parameter.among.partition(".")
+    here = at.values.get((*at.steps[:3], source)), *(text for key, text in at.values.items() if key[3:] == (source,))
     service = scene.service(str(at.steps[0]), str(at.steps[1]))
     argument = service.arguments.get(source) if service else None
-    path = argument.value.path if argument and argument.value else None
-    texts = [at.values.get((*at.steps[:3], source)), *(v for k, v in at.values.items() if k[3:] == (source,))]
-    for text in texts:
-        if path is None and text:
-            path = scene.path.parent / text
-    found = references.entries(_file(path), key) if path else ()
+    checked = argument.value.path if argument and argument.value else None
+    path = next((scene.path.parent / text for text in here if text), checked)
+    if path is None:
+        return []
+    found = references.entries(path / references.MAP if path.is_dir() else path, key)
     return [] if isinstance(found, str) else [name for name in found if name]
-
-
-def _file(path: Path) -> Path:
-    return path / _MAP if path.is_dir() else path

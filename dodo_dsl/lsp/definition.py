@@ -6,6 +6,7 @@ from pathlib import Path
 from lsprotocol import types
 from pygls.workspace import PositionCodec
 
+from dodo_dsl.check.rules.references import MAP
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.lsp.documents import saved_text, uri_of
 from dodo_dsl.lsp.positions import Lines
@@ -15,7 +16,6 @@ from dodo_dsl.source import Mapping, path_of, read
 from dodo_dsl.spec import extends
 
 _FILES = ("application", "messages")
-_MAP = "map.json"
 
 
 def definition(scene: Scene, position: types.Position, codec: PositionCodec) -> types.Location | None:
@@ -50,7 +50,7 @@ def _spans(scene: Scene, place: Place) -> Iterator[Span]:
 
 def _begin(path: Path | None) -> Iterator[Span]:
     """The begin of a file, or of the map in a folder."""
-    target = path / _MAP if path and path.is_dir() else path
+    target = path / MAP if path and path.is_dir() else path
     if target and target.is_file():
         yield Span(str(target), length=0)
 

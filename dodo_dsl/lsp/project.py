@@ -8,7 +8,7 @@ from dodo_dsl.check import context
 from dodo_dsl.check.rules import references
 from dodo_dsl.compiler import Checked, load, plan, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.lsp.texts import Texts
+from dodo_dsl.lsp.texts import LoadedSpecs, Texts
 from dodo_dsl.spec.deployment.deployment import FILE_NAME, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import load_manifests
 from dodo_dsl.spec.registry import SUFFIX
@@ -35,31 +35,43 @@ def is_ours(path: Path) -> bool:
     return path.name == FILE_NAME or path.name.endswith(SUFFIX)
 
 
-def projects(files: Iterable[Path], texts: Texts) -> list[Project]:
-    """The projects of tests and deployments that are open, checked."""
-    groups: dict[Path, list[Path]] = {}
-    for file in sorted(files):
-        deployment = find_deployment(file.parent)
-        groups.setdefault(deployment or file, []).append(file)
-    return [_project(key, group, texts) for key, group in groups.items()]
+class Projects:
+    """The projects of the open tests and deployments; what a change cannot affect is not checked again."""
 
+    def __init__(self, texts: Texts | None = None) -> None:
+        self._texts = texts or Texts()
+        self._loader = LoadedSpecs()
+        self._former: dict[Path, Checked] = {}
+        self._is_outdated = False
 
-def _project(key: Path, files: list[Path], texts: Texts) -> Project:
-    specs = [file for file in files if file.name.endswith(SUFFIX)]
-    paths = specs
-    if key.name == FILE_NAME:
-        registry = load_deployment(key, texts)[0].registry
-        outside = [file for file in specs if not any(file.is_relative_to(folder) for folder in registry)]
-        paths = [*registry, *outside] if outside else []
-    checked = load(paths, start=key.parent, reader=texts)
-    return Project(key.parent, without_unsatisfied(checked, specs))
+    def forget(self) -> None:
+        """Anything may have changed: manifests, maps, messages. The next check looks at all of it."""
+        self._is_outdated = True
 
+    def check(self, shown: Mapping[Path, str]) -> list[Project]:
+        """The projects, checked with the texts that are shown, by resolved path."""
+        if self._is_outdated:
+            self._is_outdated = False
+            self._loader, self._former = LoadedSpecs(), {}
+            for cache in (load_manifests, references.entries, context.known_messages):
+                cache.cache_clear()
+        self._texts.show(shown)
+        groups: dict[Path, list[Path]] = {}
+        for file in sorted(filter(is_ours, shown)):
+            groups.setdefault(find_deployment(file.parent) or file, []).append(file)
+        return [self._project(key, files) for key, files in groups.items()]
 
-def forget() -> None:
-    """Files other than tests may have changed: manifests, maps, messages."""
-    load_manifests.cache_clear()
-    references.entries.cache_clear()
-    context.known_messages.cache_clear()
+    def _project(self, key: Path, files: list[Path]) -> Project:
+        specs = [file for file in files if file.name.endswith(SUFFIX)]
+        paths = specs
+        if key.name == FILE_NAME:
+            registry = load_deployment(key, self._texts)[0].registry
+            outside = [file for file in specs if not any(file.is_relative_to(folder) for folder in registry)]
+            paths = [*registry, *outside] if outside else []
+        former = self._former.get(key)
+        checked = load(paths, start=key.parent, reader=self._texts, loader=self._loader, former=former)
+        self._former[key] = checked
+        return Project(key.parent, without_unsatisfied(checked, specs))
 
 
 def by_file(found: Iterable[Diagnostic]) -> Mapping[Path, list[Diagnostic]]:

@@ -15,9 +15,8 @@ from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.lsp.documents import Document, opened, path_of, saved_text, uri_of
 from dodo_dsl.lsp.positions import Lines
-from dodo_dsl.lsp.project import Project, by_file, forget, is_ours, projects
+from dodo_dsl.lsp.project import Project, Projects, by_file, is_ours
 from dodo_dsl.lsp.scene import Scene, scene
-from dodo_dsl.lsp.texts import Texts
 from dodo_dsl.terminal import printable
 
 PAUSE_S = 0.05
@@ -33,7 +32,7 @@ class DodoServer(LanguageServer):
     def __init__(self) -> None:
         super().__init__("dodo", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
         self.projects: Sequence[Project] = ()
-        self._texts = Texts()
+        self._checker = Projects()
         self._timer: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
         self._stale = asyncio.Event()
@@ -60,7 +59,7 @@ class DodoServer(LanguageServer):
     def changed(self, *, elsewhere: bool = False) -> None:
         """Begins a check soon; ``elsewhere`` where other files than tests may have changed."""
         if elsewhere:
-            forget()
+            self._checker.forget()
         if self._timer:
             self._timer.cancel()
         self._timer = asyncio.get_running_loop().call_later(PAUSE_S, self._begin)
@@ -83,7 +82,7 @@ class DodoServer(LanguageServer):
     async def _check_once(self) -> None:
         """Checks each test, and plans all tests together if nothing changes for a while."""
         documents = opened(self.workspace)
-        self.projects = await asyncio.to_thread(self._checked, documents)
+        self.projects = await asyncio.to_thread(self._checker.check, {p: d.text for p, d in documents.items()})
         found = [problem for project in self.projects for problem in project.checked.diagnostics]
         self._publish(documents, found)
         with contextlib.suppress(TimeoutError):
@@ -92,10 +91,6 @@ class DodoServer(LanguageServer):
             planned = await asyncio.to_thread(_planned, self.projects)
             if planned and not self._stale.is_set():
                 self._publish(documents, [*found, *planned])
-
-    def _checked(self, documents: Mapping[Path, Document]) -> list[Project]:
-        self._texts.show({path: document.text for path, document in documents.items()})
-        return projects((path for path in documents if is_ours(path)), self._texts)
 
     def _publish(self, documents: Mapping[Path, Document], found: Iterable[Diagnostic]) -> None:
         """Shows the problems of each file, and clears files and open documents without any."""

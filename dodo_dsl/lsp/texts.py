@@ -1,10 +1,12 @@
-"""What the editor shows, in place of what the files hold."""
+"""What the editor shows, in place of what the files hold, and the specs that this makes."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.source import Node, parse_bytes, read
+from dodo_dsl.source import Node, Reader, parse_bytes, read
+from dodo_dsl.spec.load import Loaded, load_spec
+from dodo_dsl.spec.registry import Location
 
 Parsed = tuple[Node | None, list[Diagnostic]]
 
@@ -30,6 +32,26 @@ class Texts:
             known = version, read(path) if text is None else parse_text(text, path)
             self._parsed[path] = known
         return known[1]
+
+
+class LoadedSpecs:
+    """The specs of files, loaded again only when a file that they were made of has changed."""
+
+    def __init__(self) -> None:
+        self._known: dict[Location, tuple[list[tuple[Path, Parsed]], Loaded]] = {}
+
+    def __call__(self, location: Location, reader: Reader) -> Loaded:
+        known = self._known.get(location)
+        if known and all(reader(path) is parsed for path, parsed in known[0]):
+            return known[1]
+        made_of: list[tuple[Path, Parsed]] = []
+
+        def recorded(path: Path) -> Parsed:
+            made_of.append((path, reader(path)))
+            return made_of[-1][1]
+
+        self._known[location] = made_of, load_spec(location, recorded)
+        return self._known[location][1]
 
 
 def parse_text(text: str, path: Path) -> Parsed:

@@ -12,8 +12,11 @@ from dodo_dsl.spec.model import LAYERS, Spec, spec_of
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.schema import validate
 
+Loaded = tuple[list[Spec], list[Diagnostic]]
+"""The instances of a file, and its problems."""
 
-def load_spec(location: Location, reader: Reader = read) -> tuple[list[Spec], list[Diagnostic]]:
+
+def load_spec(location: Location, reader: Reader = read) -> Loaded:
     """The instances of a file, as far as it can be read, and its problems."""
     node, found = reader(location.path)
     if node is None:

@@ -101,6 +101,11 @@ def test_completion_replaces_what_is_written(opened: Editor, repository: Reposit
     assert "Elevation of the light" in item["documentation"]["value"]
 
 
+def test_what_is_required_comes_first(opened: Editor, repository: Repository) -> None:
+    found = offers(opened, repository, SPEC.replace("map-path: ../maps/straight", "|"))
+    assert min(found.values(), key=lambda item: item["sortText"])["label"] == "map-path"
+
+
 def test_completion_offers_the_names_of_the_matrix(opened: Editor, repository: Repository) -> None:
     opened.change(repository.spec, MATRIX)
     assert "${matrix.light}" in offers(opened, repository, MATRIX.replace("freq: 10 Hz", "exposure: ${mat|"))

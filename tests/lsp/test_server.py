@@ -141,7 +141,7 @@ def test_an_internal_error_is_a_message_of_the_log(monkeypatch: pytest.MonkeyPat
     def fail(*_: object) -> None:
         raise RuntimeError("out of luck")
 
-    monkeypatch.setattr(server, "projects", fail)
+    monkeypatch.setattr(server.Projects, "check", fail)
     written = io.BytesIO()
 
     async def check() -> None:

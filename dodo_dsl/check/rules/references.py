@@ -15,7 +15,8 @@ from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 
-_MAP = "map.json"
+MAP = "map.json"
+"""The map in its folder."""
 _MAX_BYTES = 20 << 20
 _ATTEMPT = re.compile(r"\$\{(matrix|vary)")
 """A placeholder that nothing has replaced, which another rule reports."""
@@ -52,7 +53,7 @@ def _file(argument: Argument) -> Path | None:
     path = argument.value.path if argument.value else None
     if path is None:
         return None
-    return path / _MAP if path.is_dir() else path
+    return path / MAP if path.is_dir() else path
 
 
 def _names(file: Path, key: str) -> tuple[str, ...] | str:
