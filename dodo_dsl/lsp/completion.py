@@ -26,7 +26,7 @@ _KEY, _SERVICE, _VALUE, _UNIT = (
 )
 Offer = tuple[str, types.CompletionItemKind, str, str]
 """A word, what it is, what stands beside it, and its documentation as Markdown."""
-TRIGGERS = [" ", ":", "{", "[", ",", "$", ".", "/"]
+TRIGGERS = [" ", "{", "[", ",", "$", ".", "/"]
 
 
 def completion(scene: Scene, position: types.Position) -> types.CompletionList:

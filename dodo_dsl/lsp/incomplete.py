@@ -60,6 +60,8 @@ def cursor(text: str, offset: int) -> Cursor | None:
     match = _WORD.search(head)
     word = match[0] if match else ""
     start = len(head) - len(word)
+    if head[:start].endswith(":"):
+        return None  # a value begins after a space
     for ending in ("", ": "):
         if found := _read(head[:start] + _MARK + ending, word, start):
             return _with_rest(found, head[:start], text[offset:])

@@ -51,8 +51,8 @@ def _changes(server: DodoServer) -> None:
         server.changed(elsewhere=True)
 
     @server.feature(types.INITIALIZED)
-    async def _initialized(_: types.InitializedParams) -> None:
-        await _watch(server)
+    def _initialized(_: types.InitializedParams) -> None:
+        _watch(server)
 
 
 def _requests(server: DodoServer) -> None:
@@ -85,7 +85,7 @@ def _answer(server: DodoServer, params: Any, work: Callable[[Scene], _Answer]) -
         return None
 
 
-async def _watch(server: DodoServer) -> None:
+def _watch(server: DodoServer) -> None:
     """Asks the editor to say when files change on disk, where it can."""
     workspace = server.client_capabilities.workspace
     watching = workspace.did_change_watched_files if workspace else None
@@ -93,4 +93,4 @@ async def _watch(server: DodoServer) -> None:
         return
     options = types.DidChangeWatchedFilesRegistrationOptions([types.FileSystemWatcher(_WATCHED)])
     wanted = types.Registration("dodo-files", types.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
-    await server.client_register_capability_async(types.RegistrationParams([wanted]))
+    server.client_register_capability(types.RegistrationParams([wanted]))

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,8 @@ class Editor:
         self._arrived: queue.Queue[Message | None] = queue.Queue()
         self._ids = itertools.count(1)
         self._versions = itertools.count(1)
-        threading.Thread(target=self._listen, daemon=True).start()
+        self.listener = threading.Thread(target=self._listen, daemon=True)
+        self.listener.start()
 
     def _listen(self) -> None:
         assert self.process.stdout
@@ -118,8 +119,8 @@ def editor(folder: Path, encodings: list[str] | None = None) -> Iterator[Editor]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     process = subprocess.Popen(command, cwd=folder, env=environment, **pipes)
+    one = Editor(process)
     try:
-        one = Editor(process)
         general = {"positionEncodings": encodings} if encodings else {}
         capabilities = {"general": general, "workspace": {"didChangeWatchedFiles": {"dynamicRegistration": True}}}
         params = {"processId": None, "rootUri": folder.as_uri(), "capabilities": capabilities}
@@ -128,4 +129,8 @@ def editor(folder: Path, encodings: list[str] | None = None) -> Iterator[Editor]
         yield one
     finally:
         process.kill()
-        process.communicate()
+        process.wait()
+        one.listener.join(PATIENCE_S)
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            with suppress(BrokenPipeError):
+                pipe.close()  # type: ignore[union-attr]

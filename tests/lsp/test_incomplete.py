@@ -37,6 +37,10 @@ def test_it_is_found(text: str, steps: Steps, is_key: bool, word: str) -> None:
     assert text[found.start : offset] == word
 
 
+def test_there_is_no_value_directly_behind_a_colon() -> None:
+    assert cursor(f"{HEAD} {{uses:", len(HEAD) + 7) is None
+
+
 def test_it_knows_what_stands_before() -> None:
     found = cursor(f"{HEAD} {{uses: a, with: {{x: 1 m, y: 2 ", len(HEAD) + 33)
     assert found

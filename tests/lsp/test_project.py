@@ -5,7 +5,7 @@ from pathlib import Path
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.lsp.project import Projects
 from dodo_dsl.lsp.texts import Texts
-from tests.lsp.conftest import DEPLOYMENT, LONGER, SPEC, Repository
+from tests.lsp.conftest import COMPOSE, DEPLOYMENT, LONGER, SPEC, Repository
 
 SPECS = (
     SPEC,
@@ -33,6 +33,20 @@ def test_what_is_not_checked_again_has_not_changed(repository: Repository) -> No
     for state in states:
         shown = dict(zip((repository.spec, repository.longer, repository.deployment), state, strict=True))
         assert found(again, shown) == found(Projects(texts), shown), state
+
+
+def test_the_application_counts_as_it_is_shown(repository: Repository) -> None:
+    """Problems of the compose file itself, and those that show only in the plan of all tests."""
+    compose = repository.folder / "docker-compose.yml"
+    projects = Projects()
+    (broken,) = projects.check({repository.spec: SPEC, compose: COMPOSE.replace("services:", "service:")})
+    assert {Path(d.span.file) for d in broken.checked.diagnostics} == {compose}
+    (taken,) = projects.check({repository.spec: SPEC, compose: COMPOSE.replace("steering:", "camera:")})
+    assert taken.checked.ok
+    assert {d.rule for d in taken.planned()} == {"service-taken"}
+    (fine,) = projects.check({repository.spec: SPEC, compose: COMPOSE})
+    assert fine.checked.ok
+    assert fine.planned() == []
 
 
 def test_a_change_checks_again_only_what_it_can_affect(repository: Repository) -> None:

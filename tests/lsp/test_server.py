@@ -12,7 +12,7 @@ import pytest
 from dodo_dsl.cli.main import main
 from dodo_dsl.lsp import listeners, server
 from tests.lsp.conftest import LONGER, SPEC, Repository
-from tests.lsp.editor import Editor, Message, editor
+from tests.lsp.editor import PATIENCE_S, Editor, Message, editor
 
 BROKEN = {
     "unit": SPEC.replace("10 Hz", "10"),
@@ -134,6 +134,15 @@ def test_a_client_may_count_in_code_points_and_leave(repository: Repository) -> 
         assert places == [{"line": 10, "character": text.splitlines()[10].index("frequ")}]
         assert one.leave() == 0
         assert one.process.stderr
+        assert one.process.stderr.read() == b""
+
+
+def test_the_server_ends_with_the_editor(repository: Repository) -> None:
+    with editor(repository.folder) as one:
+        assert one.process.stdin
+        assert one.process.stderr
+        one.process.stdin.close()
+        assert one.process.wait(PATIENCE_S) == 0
         assert one.process.stderr.read() == b""
 
 
