@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dodo_dsl.spec.goals import Goal
+
 Result = Literal["passed", "failed", "error"]
 
 
@@ -111,3 +113,4 @@ class Outcome:
     description: str = ""
     machine: MachineLoad | None = None
     response: Response | None = None
+    goals: tuple[Goal, ...] = ()

@@ -9,6 +9,7 @@ from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.rules import (
     clocks,
+    goals,
     layers,
     levels,
     limits,
@@ -37,6 +38,7 @@ RULES: tuple[Rule, ...] = (
     messages.check,
     references.check,
     limits.check,
+    goals.check,
     producers.check,
     variables.check,
 )

@@ -92,6 +92,9 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
         for direction, names in (("in", ports.inputs), ("out", ports.outputs)):
             if names:
                 lines.append(f"{title} {direction}: {', '.join(names)}")
+    if manifest.checks:
+        checks = (f"{check} ({unit})" if unit else check for check, unit in manifest.checks.items())
+        lines.append(f"checks: {', '.join(checks)}")
     if manifest.example is not None:
         lines.append(f"standalone: {shlex.join([*manifest.process, '--cid=128', *manifest.example])}")
     stdout.writelines(f"{printable(line)}\n" for line in lines)

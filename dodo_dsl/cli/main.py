@@ -32,6 +32,7 @@ COMMANDS = {
     "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),
     "report": Subcommand("report", "draw reports again, join them into one, and show what changed"),
     "judge": Subcommand("judge.command", "judge the recording of a test again, also by other limits"),
+    "rank": Subcommand("rank.command", "rank applications by the goals of their tests"),
     "stats": Subcommand("stats.command", "show how many services the tests share"),
     "rec": Subcommand("rec.command", "inspect, cut and export recordings"),
     "lsp": Subcommand("lsp", "check and complete tests in an editor while they are written"),

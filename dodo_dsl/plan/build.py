@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.senders import senders, truth_delay_s, withheld_truth
 from dodo_dsl.diagnostics import Diagnostic, Span
@@ -165,6 +166,7 @@ class _Builder:
             "isolation",
             "record",
             "response",
+            "goals",
         ):
             if key in spec.spans:
                 self._place(key, spec.span(key))
@@ -195,6 +197,7 @@ class _Builder:
             senders=senders(self.test),
             truth=(truth := withheld_truth(self.test)),
             truth_delay_s=truth_delay_s(self.test) if truth else 0.0,
+            goals=resolved_goals(self.test).goals,
             source_map=self.places,
         )
 

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.spec import model as spec_model
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.goals import Goal
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0
@@ -108,6 +109,7 @@ class Plan:
 
     ``lockstep`` is None in real time, ``rig`` empty below level hil; ``messages`` are ODVD files of the deployment,
     relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
+    ``goals`` score a passed test and never change its outcome.
     ``truth`` are messages by which evaluators judge; in real time they come to the bus ``truth_delay_s`` late.
     """
 
@@ -133,6 +135,7 @@ class Plan:
     senders: tuple[str, ...] = ()
     truth: tuple[str, ...] = ()
     truth_delay_s: float = 0.0
+    goals: tuple[Goal, ...] = ()
     source_map: dict[str, Place] = field(default_factory=dict)
 
     @property

@@ -21,6 +21,7 @@ from dodo_dsl.plan.model import (
     is_device,
 )
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.goals import Goal, is_goal
 from dodo_dsl.spec.instances.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS
 from dodo_dsl.spec.settings import Settings
@@ -61,6 +62,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
             raw["lockstep"]["wall_timeout_s"] = settings.wall_timeout_s
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
         raw |= {key: tuple(raw[key]) for key in ("messages", "senders", "truth")}
+        raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
         plan = Plan(**raw)
         problem = _problem(plan)
@@ -87,6 +89,7 @@ def _problem(plan: Plan) -> str:
         "messages": all(_is_inside(path) for path in plan.messages),
         "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in (*plan.senders, *plan.truth)),
         "truth_delay_s": isinstance(plan.truth_delay_s, int | float) and 0 <= plan.truth_delay_s <= 86_400,
+        "goal": all(isinstance(goal.check, str) and is_goal(goal) for goal in plan.goals),
         "service name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "service layer": all(s.layer in LAYERS for s in plan.services),
         "flag": all(_is_flag(flag) for s in plan.services for flag in s.flags),

@@ -9,6 +9,7 @@ from typing import Any
 from dodo_dsl import package_data
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, Outcome, Response, Wait
+from dodo_dsl.spec.goals import Goal
 
 FILE_NAME = "results.json"
 VERSION = 1
@@ -89,7 +90,8 @@ def _validate(document: Any) -> None:
 def _outcome(test: dict[str, Any]) -> Outcome:
     values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in test.items()}
     response = Response(**test["response"]) if test.get("response") else None
-    return Outcome(**{**values, "machine": _load(test.get("machine")), "response": response})
+    goals = tuple(Goal(**goal) for goal in test.get("goals", ()))
+    return Outcome(**{**values, "machine": _load(test.get("machine")), "response": response, "goals": goals})
 
 
 def _load(machine: dict[str, Any] | None) -> MachineLoad | None:

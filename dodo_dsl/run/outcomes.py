@@ -55,6 +55,7 @@ def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
         seed=plan.seed,
         clock=plan.clock,
         backend=backend,
+        goals=plan.goals,
     )
 
 

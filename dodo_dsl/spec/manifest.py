@@ -53,7 +53,8 @@ class Ports:
 class Manifest:
     """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None.
 
-    A test gives at least one parameter of each group in ``one_of``.
+    A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
+    by patterns of their names, empty where it does not tell.
     """
 
     folder: Path
@@ -68,6 +69,7 @@ class Manifest:
     devices: tuple[str, ...] = ()
     example: tuple[str, ...] | None = None
     one_of: tuple[tuple[str, ...], ...] = ()
+    checks: dict[str, str] = field(default_factory=dict)
 
 
 def _ports(raw: dict[str, list[str]] | None) -> Ports:
@@ -111,6 +113,7 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
         devices=tuple(raw.get("devices") or ()),
         example=tuple(raw["example"]) if "example" in raw else None,
         one_of=tuple(tuple(names) for names in raw.get("one-of", ())),
+        checks=raw.get("checks") or {},
     )
     return manifest, found
 

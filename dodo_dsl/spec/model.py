@@ -18,7 +18,7 @@ LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
 LEVELS = ("sil", "dil", "hil")
 KINDS = ("perception", "open-loop", "closed-loop")
-_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "application")
+_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "application", "goals")
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
 
@@ -41,7 +41,7 @@ class Spec:
     ``isolation`` is None where the spec leaves it to the rig, ``frames_hz`` is 0 where no frames are recorded.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
-    ``variables`` are those that the application gets from the test.
+    ``variables`` are those that the application gets from the test, ``goals`` the soft ones by the names of checks.
     ``is_whole`` is False where services could not be read, so that missing producers are not reported.
     ``ranges`` are those of ``vary``, ``template`` is the instance before their values were filled in, and ``corners``
     are the same instance at the ends of the ranges, which are checked but never run.
@@ -64,6 +64,7 @@ class Spec:
     copies_times: bool = False
     uses: tuple[Use, ...] = ()
     variables: dict[str, Entry] = field(default_factory=dict)
+    goals: dict[str, Entry] = field(default_factory=dict)
     choice: Choice = field(default_factory=Choice)
     spans: dict[str, Span] = field(default_factory=dict)
     is_whole: bool = True
@@ -152,6 +153,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         copies_times=_part(response, "sample-times") is not None,
         uses=uses,
         variables=_variables(node.get("application")),
+        goals=dict(goals.entries) if isinstance(goals := node.get("goals"), Mapping) else {},
         choice=choice,
         spans={key: entry.value.span for key, entry in node.entries.items()},
         is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),

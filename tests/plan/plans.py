@@ -5,6 +5,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from dodo_dsl.plan.model import Application, ApplicationService, Flag, Lockstep, Place, Plan, PlannedService
+from dodo_dsl.spec.goals import Goal
 
 BASE = Plan(
     name="drive[light=dark]",
@@ -98,6 +99,9 @@ plans = st.builds(
     application=_applications,
     lockstep=st.none() | st.builds(Lockstep, st.integers(1, 1000), st.floats(0.1, 86_400)),
     rig=_texts,
+    goals=st.lists(st.builds(Goal, _texts, st.floats(0, 1), st.floats(2, 3), st.floats(0.001, 9)), max_size=2).map(
+        tuple
+    ),
     messages=st.lists(_inside, max_size=2).map(tuple),
     source_map=st.dictionaries(
         _texts, st.builds(Place, _texts, st.integers(1, 1 << 20), st.integers(1, 1 << 20)), max_size=2

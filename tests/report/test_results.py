@@ -11,6 +11,7 @@ from dodo_dsl.report import results
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport
 from dodo_dsl.report.report_folder import forget, write_summaries
+from dodo_dsl.spec.goals import Goal
 from tests.report.test_report_folder import OUTCOME
 
 
@@ -30,6 +31,7 @@ STRANGE = [
     {"more": 1},
     {"machine": 3},
     {"machine": {}},
+    {"goals": [{"check": "time"}]},
 ]
 
 
@@ -67,6 +69,12 @@ def test_numbers_of_any_size_can_be_drawn(tmp_path: Path, number: str) -> None:
     (tmp_path / "results.json").write_text(results.to_json([OUTCOME]).replace('"cid": 130', f'"cid": {number}'))
     with pytest.raises(results.ResultsError):
         results.load(tmp_path / "results.json")
+
+
+def test_goals_are_kept(tmp_path: Path) -> None:
+    outcome = replace(OUTCOME, goals=(Goal("time-to-goal", 20.0, 5.0, 2.0), Goal("gates", 0.0, 3.0)))
+    (tmp_path / "results.json").write_text(results.to_json([outcome]))
+    assert results.load(tmp_path / "results.json") == [outcome]
 
 
 def test_results_that_cannot_be_read_stop_no_run(tmp_path: Path) -> None:

@@ -1,0 +1,74 @@
+"""Scores and their order, and the interval against SciPy's two-sample confidence interval."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from dodo_dsl.cli.rank.score import rank, run_score
+from dodo_dsl.outcome import Outcome, Result
+from dodo_dsl.spec.goals import Goal
+
+BASE = Outcome("t", "t", "t.dodo.yml", "sil", "closed-loop", "passed", "so", 130, 0, "lockstep", "process")
+GOALS = (Goal("time", 20.0, 10.0, 3.0), Goal("margin", 0.0, 0.25))
+
+
+def run(time: float | None, margin: float = 0.25, outcome: Result = "passed", name: str = "t") -> Outcome:
+    checks = tuple({"name": n, "value": v, "ok": True} for n, v in (("time", time), ("margin", margin)))
+    return replace(BASE, name=name, outcome=outcome, checks=checks, goals=GOALS)
+
+
+def order(**teams: list[Outcome]) -> list[tuple[int, str]]:
+    return [(each.place, each.team.name) for each in rank(teams)]
+
+
+def test_a_run_scores_the_weighted_mean_of_its_goals() -> None:
+    assert run_score(run(15.0, 0.25)) == pytest.approx((3 * 0.5 + 1) / 4)
+    assert run_score(run(None, 0.125)) == pytest.approx(0.5 / 4)
+    assert run_score(run(10.0, outcome="failed")) == 0.0
+    assert run_score(BASE) == 1.0
+    twice = replace(run(15.0), checks=(*run(15.0).checks, {"name": "time", "value": 18.0, "ok": True}))
+    assert run_score(twice) == pytest.approx((3 * 0.2 + 1) / 4)
+
+
+def test_failures_are_below_everything() -> None:
+    slow, quick, hit = run(20.0, 0.0), run(10.0), run(10.0, outcome="failed")
+    assert order(quick=[quick], slow=[slow]) == [(1, "quick"), (2, "slow")]
+    assert order(often=[hit, hit, quick], once=[quick, quick, hit], slow=[slow, slow]) == [
+        (1, "slow"), (2, "once"), (3, "often"),
+    ]  # fmt: skip
+    assert order(b=[quick], a=[quick], c=[slow]) == [(1, "a"), (1, "b"), (3, "c")]
+
+
+def test_a_test_without_an_answer_counts_as_failed() -> None:
+    other, broken = run(20.0, name="other"), run(None, outcome="error", name="other")
+    assert order(part=[run(10.0)], whole=[run(20.0), other]) == [(1, "whole"), (2, "part")]
+    assert order(part=[run(10.0), broken], whole=[run(20.0), other]) == [(1, "whole"), (2, "part")]
+    (ranked,) = rank({"lucky": [broken, other]})
+    assert (ranked.team.failure_rate, ranked.team.tests["other"].errors) == (0.0, 1)
+
+
+def test_repeated_runs_are_of_one_test() -> None:
+    (ranked,) = rank({"a": [run(10.0, name="t[x=1]"), run(20.0, name="t[x=1][run=2]"), run(10.0, name="t[x=2]")]})
+    assert {name: len(test.scores) for name, test in ranked.team.tests.items()} == {"t[x=1]": 2, "t[x=2]": 1}
+    assert ranked.team.interval is None
+
+
+def test_the_interval_of_one_test_is_students() -> None:
+    (ranked,) = rank({"a": [run(time) for time in (14.0, 15.0, 15.5, 13.0)]})
+    scores = ranked.team.tests["t"].scores
+    expected = stats.t.interval(0.95, 3, np.mean(scores), stats.sem(scores))
+    assert ranked.team.interval == pytest.approx(expected)
+    (same,) = rank({"a": [run(14.0), run(14.0)]})
+    assert same.team.interval == (same.team.score, same.team.score)
+
+
+def test_the_interval_of_two_tests_is_welchs() -> None:
+    """Of a difference and of a sum it is as wide."""
+    first, second = (14.0, 15.0, 15.5, 14.5), (12.0, 13.0, 14.0, 12.5)
+    (ranked,) = rank({"a": [*(run(time) for time in first), *(run(time, name="u") for time in second)]})
+    scores = [test.scores for test in ranked.team.tests.values()]
+    welch = stats.ttest_ind(*scores, equal_var=False)
+    wide = stats.t.ppf(0.975, np.floor(welch.df)) * np.hypot(*(stats.sem(each) for each in scores)) / 2
+    assert ranked.team.interval == pytest.approx((ranked.team.score - wide, ranked.team.score + wide))

@@ -1,0 +1,48 @@
+"""Manifests name the checks of their evaluators, with their units: what goals may name."""
+
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import yaml
+
+from services.base import Check
+from services.collision.measures import DriveMeasures
+from services.collision.requests import Requests
+from services.continuous_signal.measures import SignalLimits, SignalMeasures
+from services.object_detection.counts import Counts, CountsByClass
+from services.object_detection.score import DetectionLimits, Score
+
+SERVICES = Path(__file__).parents[2] / "services"
+
+
+def patterns(service: str) -> dict[str, str]:
+    found: dict[str, str] = yaml.safe_load((SERVICES / service / "service.yml").read_text())["checks"]
+    return found
+
+
+def compare(service: str, checks: Iterable[Check]) -> None:
+    """Each check is of one pattern, with its unit, and each pattern is of a check."""
+    units = patterns(service)
+    used = set()
+    for check in checks:
+        (pattern,) = (pattern for pattern in units if fnmatchcase(check.name, pattern))
+        assert units[pattern] == check.unit, check.name
+        used.add(pattern)
+    assert used == set(units)
+
+
+def test_collision() -> None:
+    measures = DriveMeasures()
+    drive = (measures.goal_check(1.0), measures.wall_check(0.0), measures.gate_check(0, 1), *measures.drive_checks())
+    compare("collision", (*drive, *Requests(max_silence=2.0).checks()))
+
+
+def test_continuous_signal() -> None:
+    limits = SignalLimits(band=1.0, lag=1.0, repeats=3, gap=1)
+    compare("continuous_signal", (*SignalMeasures(0, 0, 0, ()).checks(limits), Check("late", 0)))
+
+
+def test_object_detection() -> None:
+    score = Score(CountsByClass({"yellow": Counts(1)}))
+    compare("object_detection", score.checks(DetectionLimits()))
