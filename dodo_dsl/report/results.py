@@ -9,7 +9,7 @@ from typing import Any
 from dodo_dsl import package_data
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, Outcome, Response, Wait
-from dodo_dsl.spec.goals import Goal
+from dodo_dsl.spec.goals import Goal, is_goal
 
 FILE_NAME = "results.json"
 VERSION = 1
@@ -91,6 +91,8 @@ def _outcome(test: dict[str, Any]) -> Outcome:
     values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in test.items()}
     response = Response(**test["response"]) if test.get("response") else None
     goals = tuple(Goal(**goal) for goal in test.get("goals", ()))
+    if not all(map(is_goal, goals)):
+        raise ValueError("a goal whose numbers make no score")
     return Outcome(**{**values, "machine": _load(test.get("machine")), "response": response, "goals": goals})
 
 

@@ -1,6 +1,7 @@
 """``results.json`` is read only when it is one."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +33,9 @@ STRANGE = [
     {"machine": 3},
     {"machine": {}},
     {"goals": [{"check": "time"}]},
+    {"goals": [{"check": "time", "zero": 1, "one": 1, "weight": 1}]},
+    {"goals": [{"check": "time", "zero": math.nan, "one": 1, "weight": 1}]},
+    {"goals": [{"check": "time", "zero": 0, "one": 1, "weight": 1e308}]},
 ]
 
 
