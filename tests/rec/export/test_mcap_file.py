@@ -31,11 +31,11 @@ OWN = ("/camera/", "/picture/", "/tf", "/log")
 
 
 def read(path: Path) -> dict[str, list[tuple[Any, Any]]]:
-    """The messages of each topic, as records and decoded."""
+    """The messages of each topic in the order of the file, as records and decoded."""
     found = defaultdict(list)
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        for _, channel, record, decoded in reader.iter_decoded_messages():
+        for _, channel, record, decoded in reader.iter_decoded_messages(log_time_order=False):
             found[channel.topic].append((record, decoded))
         summary = reader.get_summary()
     assert summary is not None and summary.statistics is not None
