@@ -9,12 +9,10 @@ from dodo_dsl.lsp import schema_keys
 from dodo_dsl.lsp.hover import parameter_text, service_text
 from dodo_dsl.lsp.incomplete import Cursor, cursor
 from dodo_dsl.lsp.scene import USES, WITH, Scene
-from dodo_dsl.lsp.tree import below
-from dodo_dsl.source import Mapping
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.deployment.rig import EMULATED
 from dodo_dsl.spec.editor_schema import is_offered, written
-from dodo_dsl.spec.instances import matrix
+from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import LAYERS
 
@@ -99,8 +97,8 @@ def _values(scene: Scene, at: Cursor, parameter: Parameter) -> Iterator[Offer]:
     if number and parameter.unit:
         yield from ((unit, _UNIT, f"{at.before} {unit}", "") for unit in quantity.units_of(parameter.unit))
         return
-    for name in _of_matrix(scene):
-        yield f"${{matrix.{name}}}", _VALUE, "each value of the matrix", ""
+    for name in _placeholders(scene, at):
+        yield f"${{{name}}}", _VALUE, "each value of the matrix" if name.startswith("matrix.") else "the range", ""
     if parameter.among:
         yield from ((name, _VALUE, parameter.among, "") for name in _named(scene, at, parameter))
     elif parameter.type == "boolean":
@@ -114,11 +112,13 @@ def _values(scene: Scene, at: Cursor, parameter: Parameter) -> Iterator[Offer]:
             yield str(written(parameter, example)), _VALUE, detail, ""
 
 
-def _of_matrix(scene: Scene) -> list[str]:
-    values = scene.test.spec.choice.values if scene.test else ()
-    written_here = below(scene.root, matrix.KEY)
-    names = written_here.entries if isinstance(written_here, Mapping) else {}
-    return list(dict.fromkeys([*names, *(name for name, _ in values)]))
+def _placeholders(scene: Scene, at: Cursor) -> list[str]:
+    """``matrix.light``, ``vary.speed``: those of the document before the cursor, and those of the extended test."""
+    found = [f"{steps[0]}.{steps[1]}" for steps in at.values if steps[0] in (matrix.KEY, vary.KEY) and len(steps) > 1]
+    if spec := scene.test.spec if scene.test else None:
+        found += [f"{matrix.KEY}.{name}" for name, _ in spec.choice.values]
+        found += [f"{vary.KEY}.{one.name}" for one in spec.ranges]
+    return list(dict.fromkeys(found))
 
 
 def _named(scene: Scene, at: Cursor, parameter: Parameter) -> list[str]:

@@ -14,6 +14,9 @@ SPECS = (
     SPEC.replace("  pose:", "  place:"),
     SPEC.replace("[left, right]", "[left"),
     SPEC.replace("environment:", "matrix: {max: [1 s, 70 s]}\nenvironment:").replace("40 s", "${matrix.max}"),
+    SPEC.replace("environment:", "vary: {max: {from: 9 s, to: 70 s, nominal: 20 s}}\nenvironment:").replace(
+        "40 s", "${vary.max}"
+    ),
 )
 LONGERS = (LONGER, LONGER.replace("sil-longer", "sil-my-straight"), LONGER.replace("max-time", "max-tiem"), "")
 DEPLOYMENTS = (DEPLOYMENT, DEPLOYMENT.replace("registry", "registri"), "dodo: 1\nregistry: [tests]\ncids: 128-128\n")

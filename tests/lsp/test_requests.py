@@ -8,7 +8,7 @@ import pytest
 from tests.lsp.conftest import LONGER, SPEC, Repository
 from tests.lsp.editor import ROOT, Editor
 
-MATRIX = SPEC.replace("environment:", "matrix: {light: [normal, dark]}\nenvironment:", 1)
+MATRIX = SPEC.replace("environment:", "matrix: {light: [normal, dark]}\nvary: {exp: {from: 1, to: 2}}\nenvironment:", 1)
 
 
 def position(text: str, word: str) -> tuple[int, int]:
@@ -106,9 +106,10 @@ def test_what_is_required_comes_first(opened: Editor, repository: Repository) ->
     assert min(found.values(), key=lambda item: item["sortText"])["label"] == "map-path"
 
 
-def test_completion_offers_the_names_of_the_matrix(opened: Editor, repository: Repository) -> None:
+def test_completion_offers_placeholders(opened: Editor, repository: Repository) -> None:
     opened.change(repository.spec, MATRIX)
-    assert "${matrix.light}" in offers(opened, repository, MATRIX.replace("freq: 10 Hz", "exposure: ${mat|"))
+    found = offers(opened, repository, MATRIX.replace("freq: 10 Hz", "exposure: ${|"))
+    assert {"${matrix.light}", "${vary.exp}"} <= found.keys()
 
 
 def target(editor: Editor, path: Path, text: str, word: str) -> tuple[Path, int] | None:
