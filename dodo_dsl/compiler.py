@@ -10,17 +10,19 @@ from dodo_dsl import package_data
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
-from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.resolve import ResolvedTest, resolve
 from dodo_dsl.check.unchanged import Findings, Surroundings, check_again
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.emit.output_folder import pipeline_folder
 from dodo_dsl.emit.pipeline import pipeline_problems
 from dodo_dsl.emit.render import File, render_pipeline
 from dodo_dsl.plan.build import Compiled, build
-from dodo_dsl.source import Reader, read
+from dodo_dsl.source import Reader, Scalar, read
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.deployment.rig import PORT
-from dodo_dsl.spec.load import Loaded, load_spec
+from dodo_dsl.spec.instances.matrix import Choice
+from dodo_dsl.spec.instances.vary import Values
+from dodo_dsl.spec.load import Loaded, load_spec, varied
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location, locate
@@ -107,6 +109,14 @@ def load(
     found.extend(itertools.chain.from_iterable(again.by_rules.values()))
     diagnostics, by_rules = tuple(ordered(found)), again.by_rules
     return Checked(deployment, manifests, again.tests, diagnostics, settings, source, tuple(empty), by_rules)
+
+
+def at_values(checked: Checked, spec: Spec, values: Mapping[str, Values]) -> Checked:
+    """The tests that an instance with ranges is at other values, each under its own name, such as ``run-7``."""
+    names = {name: Choice((*spec.choice.values, ("run", Scalar(spec.span("name"), name, name)))) for name in values}
+    specs = (applied(varied(spec, values[name], choice), checked.settings) for name, choice in names.items())
+    tests = tuple(resolve(specs, checked.manifests, checked.deployment, checked.application))
+    return replace(checked, tests=tests, diagnostics=())
 
 
 def access(deployment: Deployment) -> Access:

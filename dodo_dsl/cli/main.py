@@ -27,6 +27,7 @@ class Subcommand(NamedTuple):
 COMMANDS = {
     "compile": Subcommand("compile", "check tests and write their compose files and child pipeline"),
     "run": Subcommand("run.command", "run tests and judge the application"),
+    "search": Subcommand("search.command", "look for the conditions under which the application fails a test"),
     "list": Subcommand("list", "list the tests and services"),
     "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
     "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),

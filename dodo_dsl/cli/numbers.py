@@ -5,6 +5,8 @@ import math
 
 from dodo_dsl.opendlv import numbers
 
+_MOST_SECONDS = 864_000.0
+
 
 def finite(text: str) -> float:
     """A finite number."""
@@ -21,4 +23,41 @@ def patience(text: str) -> float:
     """Seconds, 0 or more."""
     if (value := finite(text)) < 0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds, expected 0 or more")
+    return value
+
+
+def seed(text: str) -> int:
+    """A seed of 32 bits."""
+    value = numbers.whole(text) if numbers.is_whole(text) else -1
+    if not 0 <= value < 1 << 32:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 to 4294967295")
+    return value
+
+
+def seconds(text: str) -> float:
+    """A duration, at most ten days."""
+    try:
+        value = numbers.number(text.removesuffix("s"))
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= _MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds above 0 and at most {_MOST_SECONDS:g}")
+    return value
+
+
+def minutes(text: str) -> float:
+    """A duration in minutes, at most ten days."""
+    value = finite(text)
+    if not 0.0 < value <= _MOST_SECONDS / 60:
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not a time in minutes above 0 and at most {_MOST_SECONDS / 60:g}"
+        )
+    return value
+
+
+def positive(text: str) -> int:
+    """A whole number of at least 1."""
+    value = numbers.whole(text) if numbers.is_whole(text) else 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return value

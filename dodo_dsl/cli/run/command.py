@@ -10,6 +10,7 @@ from typing import TextIO, cast
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit, of_outcomes
+from dodo_dsl.cli.numbers import positive, seconds, seed
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
@@ -17,7 +18,6 @@ from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.loading import Loading, loading
 from dodo_dsl.cli.run.profile import COMMAND, FILE_NAME, Profile, ProfiledProgress
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
-from dodo_dsl.opendlv.numbers import is_whole, number, whole
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
@@ -44,9 +44,6 @@ exit codes: 0 all passed, 1 some failed, 2 wrong usage or spec, 3 some ended in 
 """
 
 
-_MOST_SECONDS = 864_000.0
-
-
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
     parser.add_argument(
@@ -56,47 +53,23 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--backend", choices=("process", "docker"), help="default: process, if the application allows it"
     )
     parser.add_argument(
-        "-j", "--jobs", type=_positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
+        "-j", "--jobs", type=positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
     )
     parser.add_argument("--clock", choices=("realtime", "lockstep"), help="replaces the specs' clock")
-    parser.add_argument("--wall-timeout", type=_seconds, metavar="S", help="maximum wall time of a test in lockstep")
+    parser.add_argument("--wall-timeout", type=seconds, metavar="S", help="maximum wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="replaces the specs' isolation")
     parser.add_argument(
         "--report", type=Path, default=REPORT, metavar="DIR", help="folder of the report (default: dodo-report)"
     )
-    parser.add_argument("--seed", type=_seed, metavar="N", help="replaces the specs' seed")
-    parser.add_argument("--repeat", type=_positive, default=1, metavar="N", help="run every test N times")
+    parser.add_argument("--seed", type=seed, metavar="N", help="replaces the specs' seed")
+    parser.add_argument("--repeat", type=positive, default=1, metavar="N", help="run every test N times")
     parser.add_argument("--fail-fast", action="store_true", help="start no further test after one that did not pass")
-    parser.add_argument("--retry-errors", type=_positive, nargs="?", const=1, default=0, metavar="N",
+    parser.add_argument("--retry-errors", type=positive, nargs="?", const=1, default=0, metavar="N",
                         help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
     parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="folder of a compiled test")
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
     parser.add_argument("--profile", action="store_true", help="show where the time went, and write DIR/profile.json")
     selection.add_application(parser)
-
-
-def _seed(text: str) -> int:
-    number = whole(text) if is_whole(text) else -1
-    if not 0 <= number < 1 << 32:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 to 4294967295")
-    return number
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = number(text.removesuffix("s"))
-    except ValueError:
-        seconds = 0.0
-    if not 0.0 < seconds <= _MOST_SECONDS:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds above 0 and at most {_MOST_SECONDS:g}")
-    return seconds
-
-
-def _positive(text: str) -> int:
-    number = whole(text) if is_whole(text) else 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
-    return number
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

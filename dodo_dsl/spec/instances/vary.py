@@ -33,18 +33,18 @@ class Range:
         """``0.3 to 2``, or ``plain, wood``"""
         return (", " if self.is_list else " to ").join(end.text for end in self.ends)
 
-    def number(self, value: Scalar) -> Decimal:
+    def number(self, text: str) -> Decimal:
         """A value of a range of numbers, in its unit."""
-        return _number(value, self.unit)
+        return _number(text, self.unit)
 
 
-def _number(value: Scalar, unit: str) -> Decimal:
+def _number(text: str, unit: str) -> Decimal:
     """Raises QuantityError for what is not a number in the unit, or without one."""
     if unit:
-        return quantity.convert(value.text, unit)
-    if quantity.written_unit(value.text) != "":
-        raise quantity.QuantityError(f"'{value.text[:60]}' is not a number without a unit")
-    return Decimal(value.text.strip())
+        return quantity.convert(text, unit)
+    if quantity.written_unit(text) != "":
+        raise quantity.QuantityError(f"'{text[:60]}' is not a number without a unit")
+    return Decimal(text.strip())
 
 
 def nominal(ranges: tuple[Range, ...]) -> Values:
@@ -119,7 +119,7 @@ def _of_numbers(middle: Scalar, low: Scalar, high: Scalar, unit: str) -> Iterato
     numbers = {}
     for key, scalar in (("from", low), ("to", high), ("nominal", middle)):
         try:
-            numbers[key] = _number(scalar, unit)
+            numbers[key] = _number(scalar.text, unit)
         except quantity.QuantityError as error:
             yield Diagnostic(scalar.span, "wrong-unit", f"'{key}': {error}", error.hint)
     if len(numbers) < 3:

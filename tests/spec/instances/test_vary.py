@@ -34,8 +34,8 @@ def test_ranges_in_order() -> None:
         ("start", "cm", False, "-8 cm to 0.1 m"),
         ("map", "", True, "a, b, c"),
     ]
-    assert [start.number(end) for end in start.ends] == [Decimal(-8), Decimal(10)]
-    assert light.number(light.nominal) == 1
+    assert [start.number(end.text) for end in start.ends] == [Decimal(-8), Decimal(10)]
+    assert light.number(light.nominal.text) == 1
 
 
 @pytest.mark.parametrize("text", ["a: 1", "vary: 3", "vary: {}", "vary: {a: 3}", "vary: {a: {nominal: [1]}}"])

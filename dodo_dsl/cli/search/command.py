@@ -1,0 +1,129 @@
+"""dodo search: look for the conditions under which the application fails a test."""
+
+import argparse
+import asyncio
+import importlib.util
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO, cast
+
+from dodo_dsl import atomic
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.numbers import minutes, positive, seed
+from dodo_dsl.cli.report import REPORT
+from dodo_dsl.cli.run.forecast import expectation
+from dodo_dsl.cli.run.loading import Loading, loading
+from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
+from dodo_dsl.cli.search.drives import Drives, Interrupted, Kept
+from dodo_dsl.cli.search.progress import SearchProgress
+from dodo_dsl.cli.search.study import Study, study_of
+from dodo_dsl.cli.search.text import lines
+from dodo_dsl.run.backends import Processes
+from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.search.findings import Findings, document, find
+from dodo_dsl.search.space import nominal, sweep, texts
+from dodo_dsl.search.store import Store, opened
+from dodo_dsl.spec.instances.vary import Values
+from dodo_dsl.terminal import json_text
+
+EXAMPLES = """examples:
+  dodo search sil-my-drive                 100 drives within the test's ranges
+  dodo search sil-my-drive --runs 1000 -j 4
+  dodo search sil-my-drive --minutes 30    as many drives as fit into half an hour
+
+The same command again goes on where an earlier one was interrupted, or with more drives.
+
+exit codes: 0 no drive failed, 1 some failed, 2 wrong usage or spec, 3 none could be judged, 130 interrupted
+"""
+
+FILE_NAME = "search.json"
+_RUNS = 100
+_MOST_RUNS = 1 << 20
+_NEEDED = "scipy"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("test", metavar="TEST", help="name or path of a test in lockstep with ranges, 'vary'")
+    parser.add_argument(
+        "--runs", type=positive, metavar="N", help=f"drives of the sweep (default: {_RUNS}, unless --minutes is given)"
+    )
+    parser.add_argument("--minutes", type=minutes, metavar="M", help="begin no further drives after that time")
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of the sweep (default: 0)")
+    parser.add_argument(
+        "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
+    )
+    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the spec's isolation")
+    parser.add_argument(
+        "--report", type=Path, default=REPORT, metavar="DIR",
+        help="the search is kept in DIR/search/TEST (default: dodo-report)"
+    )  # fmt: skip
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if importlib.util.find_spec(_NEEDED) is None:
+        raise UsageError(f"this needs {_NEEDED}: pip install 'dodo-dsl[search]'")
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, stop_like_interrupt)
+    more_descriptors()
+    stdout = cast(TextIO, UninterruptedStream(stdout))
+    reap_folders()
+    options.backend = "process"
+    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
+        study = study_of(options, folder.path, stdout)
+        report = options.report.resolve() / "search" / study.test.spec.slug
+        with opened(report, study.key) as store:
+            findings, interrupted = _search(options, study, store, folder.path, report, load, stdout)
+    with undisturbed():
+        atomic.write_text(report / FILE_NAME, json_text(document(findings)))
+    stdout.writelines(f"{line}\n" for line in lines(findings))
+    stdout.write(f"search: {options.report / 'search' / study.test.spec.slug / FILE_NAME}\n")
+    if interrupted:
+        stdout.write("interrupted: the same command goes on from here\n")
+        return Exit.INTERRUPTED
+    return Exit.ERROR if not findings.judged else Exit.PROBLEMS if findings.failed else Exit.OK
+
+
+def _search(
+    options: argparse.Namespace, study: Study, store: Store, work: Path, report: Path, load: Loading, stdout: TextIO
+) -> tuple[Findings, bool]:
+    """What was found, and whether an interrupt ended it."""
+    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
+    runs = min(options.runs or (_MOST_RUNS if options.minutes else _RUNS), _MOST_RUNS)
+    candidates = sweep(study.space, runs, options.seed)
+    deployment = study.checked.deployment
+    backends = Kept(Processes(deployment.cids, options.isolation, (load.descriptor,), [deployment.root], load.take))
+    order = schedule(options.jobs, expectation(backends.name))
+    with _shown(stdout, runs + 1 if options.runs or not deadline else None, deadline) as progress:
+        drives = Drives(study.checked, study.test.spec, store, backends, order, progress, work, report, deadline)
+        interrupted = asyncio.run(_sweep(drives, backends, study, candidates))
+    at_nominal = store.get(texts(nominal(study.space)))
+    swept = drives.known(candidates)
+    return find(study.test.spec.title, options.seed, study.space, at_nominal, swept), interrupted
+
+
+async def _sweep(drives: Drives, backends: Kept, study: Study, candidates: list[Values]) -> bool:
+    """Drives the nominal values and all candidates; whether that was interrupted."""
+    try:
+        await drives.drive([nominal(study.space)], 0)
+        await drives.drive(candidates, 1)
+    except Interrupted:
+        return True
+    finally:
+        backends.end()
+    return False
+
+
+@contextmanager
+def _shown(stream: TextIO, total: int | None, deadline: float | None) -> Iterator[SearchProgress]:
+    progress = SearchProgress(stream, total, deadline)
+    try:
+        yield progress
+    finally:
+        progress.close()

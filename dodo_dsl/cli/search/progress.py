@@ -1,0 +1,88 @@
+"""Live progress of a search: drives, failures, the worst margin and the time to go."""
+
+import time
+from collections.abc import Callable
+from typing import Any, Self, TextIO
+
+from dodo_dsl.cli.run.progress import about, count
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.search.store import Drive
+from dodo_dsl.terminal import printable, unescaped
+
+
+class SearchProgress:
+    """Shows each drive in a line, or in one that moves on a terminal; ``take`` makes a drive of each outcome.
+
+    ``total`` drives are wanted; without it the search ends by time, at ``deadline`` of the monotonic clock.
+    """
+
+    def __init__(self, stream: TextIO, total: int | None, deadline: float | None) -> None:
+        self._stream, self._total, self._deadline = stream, total, deadline
+        self._start = time.monotonic()
+        self._done = self._driven = self._failed = 0
+        self._worst: float | None = None
+        self._status = _status(stream) if stream.isatty() else None
+        self.take: Callable[[Outcome], Drive | None] = lambda _: None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Goes on with the next round."""
+
+    def close(self) -> None:
+        if self._status is not None:
+            self._status.stop()
+        self._stream.flush()
+
+    def note(self, text: str) -> None:
+        self._stream.write(f"{printable(text)}\n")
+        self._stream.flush()
+
+    def phase(self, slug: str, text: str) -> None:
+        """Phases of single drives are not shown."""
+
+    def rest(self, seconds: float, tests: int) -> None:
+        """The rest of a round is not shown."""
+
+    def done(self, outcome: Outcome) -> None:
+        drive = self.take(outcome)
+        if drive is not None:
+            self._driven += 1
+            self.count(drive)
+            self._show(drive)
+
+    def count(self, drive: Drive) -> None:
+        """Counts a drive, also one of an earlier command."""
+        self._done += 1
+        self._failed += drive.outcome == "failed"
+        if drive.margin is not None:
+            self._worst = drive.margin if self._worst is None else min(self._worst, drive.margin)
+
+    def _show(self, drive: Drive) -> None:
+        of = f" of {self._total}" if self._total else ""
+        worst = "" if self._worst is None else f", worst margin {self._worst:.3f}"
+        line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}, {about(self._left())} to go"
+        if self._status is not None:
+            self._status.update(line)
+        else:
+            now = time.monotonic() - self._start
+            shown = "" if drive.margin is None else f", margin {drive.margin:.3f}"
+            self.note(f"[{now:6.1f} s] {drive.outcome}{shown}; {line}")
+
+    def _left(self) -> float:
+        now = time.monotonic()
+        by_time = None if self._deadline is None else max(self._deadline - now, 0.0)
+        if self._total is None:
+            return by_time or 0.0
+        by_number = (now - self._start) / max(self._driven, 1) * max(self._total - self._done, 0)
+        return by_number if by_time is None else min(by_number, by_time)
+
+
+def _status(stream: TextIO) -> Any:
+    from rich.console import Console
+    from rich.status import Status
+
+    status = Status("starting", console=Console(file=unescaped(stream)))
+    status.start()
+    return status

@@ -1,0 +1,141 @@
+"""What the drives of a search say: how often the test fails, by which conditions, and at worst."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from dodo_dsl.search.space import Space
+from dodo_dsl.search.store import Drive
+
+VERSION = 1
+CONFIDENCE = 0.95
+_NUMBER = re.compile(r"[-+]?\d+(\.\d+)?")
+
+
+@dataclass(frozen=True)
+class Influence:
+    """How much a range matters: Spearman's rank correlation of its value with the margin, in [-1, 1].
+
+    For a list of values it is the correlation ratio of the margins' ranks, in [0, 1].
+    """
+
+    name: str
+    correlation: float
+    values: str
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Drives that ended for the same reason but for its numbers; ``worst`` has the least margin."""
+
+    kind: str
+    drives: int
+    worst: Drive
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Of a sweep; ``rate`` is the share of ``judged`` drives that failed, with the ends of its interval.
+
+    ``errors`` are drives without an answer, which are left out, and ``left_out`` has their reasons. ``worst`` is None
+    where no drive was judged.
+    """
+
+    test: str
+    seed: int
+    nominal: Drive | None
+    judged: int
+    failed: int
+    errors: int
+    rate: float | None
+    low: float
+    high: float
+    influences: tuple[Influence, ...]
+    worst: Drive | None
+    failures: tuple[Failure, ...]
+    left_out: tuple[Failure, ...]
+
+
+def kind_of(reason: str) -> str:
+    """A reason without its numbers."""
+    return _NUMBER.sub("#", reason)
+
+
+def find(test: str, seed: int, space: Space, nominal: Drive | None, drives: Sequence[Drive]) -> Findings:
+    judged = [drive for drive in drives if drive.outcome != "error"]
+    failed = [drive for drive in judged if drive.outcome == "failed"]
+    low, high = interval(len(failed), len(judged))
+    return Findings(
+        test,
+        seed,
+        nominal,
+        len(judged),
+        len(failed),
+        len(drives) - len(judged),
+        len(failed) / len(judged) if judged else None,
+        low,
+        high,
+        tuple(sorted(_influences(space, judged), key=lambda one: -abs(one.correlation))),
+        min(judged, key=_margin, default=None),
+        tuple(_failures(failed)),
+        tuple(_failures([drive for drive in drives if drive.outcome == "error"])),
+    )
+
+
+def interval(failed: int, judged: int) -> tuple[float, float]:
+    """Clopper and Pearson's interval of a rate."""
+    if not judged:
+        return 0.0, 1.0
+    from scipy.stats import binomtest
+
+    found = binomtest(failed, judged).proportion_ci(CONFIDENCE, "exact")
+    return float(found.low), float(found.high)
+
+
+def _margin(drive: Drive) -> float:
+    return -1.0 if drive.margin is None else drive.margin
+
+
+def _failures(failed: Sequence[Drive]) -> list[Failure]:
+    kinds: dict[str, list[Drive]] = {}
+    for drive in failed:
+        kinds.setdefault(kind_of(drive.reason), []).append(drive)
+    found = [Failure(kind, len(group), min(group, key=_margin)) for kind, group in kinds.items()]
+    return sorted(found, key=lambda failure: -failure.drives)
+
+
+def _influences(space: Space, judged: Sequence[Drive]) -> list[Influence]:
+    margins = [_margin(drive) for drive in judged]
+    if len(set(margins)) < 2:
+        return [Influence(one.name, 0.0, one.text) for one in space.ranges]
+    from scipy.stats import rankdata, spearmanr
+
+    ranks = rankdata(margins)
+    found = []
+    for one in space.ranges:
+        texts = [drive.values[one.name] for drive in judged]
+        if len(set(texts)) < 2:
+            strength = 0.0
+        elif one.is_list:
+            strength = _correlation_ratio(texts, list(map(float, ranks)))
+        else:
+            numbers = [float(one.number(text)) for text in texts]
+            strength = float(spearmanr(numbers, margins).statistic)
+        found.append(Influence(one.name, strength, one.text))
+    return found
+
+
+def _correlation_ratio(groups: Sequence[str], ranks: Sequence[float]) -> float:
+    mean = sum(ranks) / len(ranks)
+    total = sum((rank - mean) ** 2 for rank in ranks)
+    between = 0.0
+    for group in set(groups):
+        own = [rank for rank, of in zip(ranks, groups, strict=True) if of == group]
+        between += len(own) * (sum(own) / len(own) - mean) ** 2
+    return float((between / total) ** 0.5)
+
+
+def document(findings: Findings) -> dict[str, Any]:
+    """The contents of ``search.json``."""
+    return {"dodo": "search", "version": VERSION, "confidence": CONFIDENCE, **asdict(findings)}

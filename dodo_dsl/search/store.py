@@ -1,0 +1,87 @@
+"""The drives of a search in a SQLite file, by their values: none is driven twice, whatever ends the command."""
+
+import contextlib
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+FILE_NAME = "search.sqlite"
+_TABLES = """
+create table if not exists study (key text not null);
+create table if not exists drives (
+    point text primary key, number integer not null, outcome text not null, margin real, reason text not null
+);
+"""
+
+
+class OtherSearch(Exception):
+    """The file holds what cannot be continued."""
+
+    usage = True
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What became of a test at some values; ``number`` counts drives in the order in which they were asked for.
+
+    ``margin`` is the least of its checks, from -1 to 1, negative where it failed; None for an error.
+    """
+
+    number: int
+    values: Mapping[str, str]
+    outcome: str
+    margin: float | None
+    reason: str
+
+
+class Store:
+    """The drives of one study: the same test, ranges and seed. Raises OtherSearch for those of another."""
+
+    def __init__(self, folder: Path, key: str) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._path = folder / FILE_NAME
+        try:
+            self._connection = sqlite3.connect(self._path)
+            self._connection.executescript(_TABLES)
+            found = self._connection.execute("select key from study").fetchone()
+        except sqlite3.Error as error:
+            raise OtherSearch(f"'{self._path}' cannot be used: {error}") from error
+        if found is None:
+            with self._connection:
+                self._connection.execute("insert into study values (?)", (key,))
+        elif found[0] != key:
+            raise OtherSearch(
+                f"'{self._path}' is of another test, application, range or seed: name another folder with --report, "
+                "or remove it"
+            )
+
+    def add(self, drive: Drive) -> None:
+        with self._connection:
+            self._connection.execute(
+                "insert or ignore into drives values (?, ?, ?, ?, ?)",
+                (_point(drive.values), drive.number, drive.outcome, drive.margin, drive.reason),
+            )
+
+    def get(self, values: Mapping[str, str]) -> Drive | None:
+        columns = "number, outcome, margin, reason"
+        found = self._connection.execute(f"select {columns} from drives where point = ?", (_point(values),))  # noqa: S608
+        row = found.fetchone()
+        return Drive(row[0], dict(values), *row[1:]) if row else None
+
+    def close(self) -> None:
+        self._connection.close()
+
+
+@contextlib.contextmanager
+def opened(folder: Path, key: str) -> Iterator[Store]:
+    store = Store(folder, key)
+    try:
+        yield store
+    finally:
+        store.close()
+
+
+def _point(values: Mapping[str, str]) -> str:
+    return json.dumps(dict(sorted(values.items())), ensure_ascii=False)

@@ -1,0 +1,199 @@
+"""``dodo search`` with drives whose end follows from their values."""
+
+import asyncio
+import importlib.util
+import json
+import os
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.cli.main import main
+from dodo_dsl.cli.search import command
+from dodo_dsl.margins import with_margin
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
+from tests.check import examples
+from tests.run import scripted
+from tests.run.scripted import Events, ScriptedBackend, ScriptedBackends
+
+SPEC = """\
+vary:
+  start: {from: -8 cm, to: 8 cm, nominal: 0 cm}
+  clutter: {from: 0, to: 100, nominal: 0}
+environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, clutter: "${vary.clutter}"}}}
+action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {x: "${vary.start}"}}}
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=111
+    x-dodo: {in: [], out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}
+    x-dodo-process: [python, driver.py]
+"""
+LIMIT = 0.05
+"""Drives that begin further to the right fail."""
+BROKEN = -0.06
+"""Those that begin further to the left end in error."""
+
+
+def start_of(plan: Plan) -> float:
+    pose = next(service for service in plan.services if service.name == "pose")
+    return float(next(flag.value for flag in pose.flags if flag.name == "x"))
+
+
+def stages(plan: Plan) -> dict[str, Events]:
+    start = start_of(plan)
+    ready = {
+        layer: [(0.0, Ready(service.name)) for service in plan.layer(layer)]
+        for layer in ("environment", "action", "evaluation")
+    }
+    if start < BROKEN:
+        return {**ready, "begin": [(0.0, Exited("track", 1))]}
+    ok = start <= LIMIT
+    check = with_margin({"name": "start", "value": start, "limit": {"max": LIMIT}, "unit": "m", "ok": ok})
+    reason = "it drove" if ok else f"hit wall right after {start:.3f} m"
+    return {**ready, "begin": [(0.0, VerdictEvent("track", ok, reason, (check,))), (0.0, Exited("track", 0))]}
+
+
+@dataclass
+class Search:
+    """``dodo search`` in a folder of its own; Ctrl-C comes when drive number ``ends_at`` begins."""
+
+    ends_at: int | None = None
+    driven: list[str] = field(default_factory=list)
+    report: str = ""
+
+    def backend(self, plan: Plan, attempt: int) -> ScriptedBackend:
+        self.driven.append(plan.slug)
+        Path(self.report, "search", "example", "drives", plan.slug).mkdir(parents=True, exist_ok=True)
+        if len(self.driven) == self.ends_at:
+            os.kill(os.getpid(), signal.SIGINT)
+        return ScriptedBackend(plan, stages(plan))
+
+    def __call__(self, *words: str, report: str = "report") -> tuple[int, str]:
+        self.driven.clear()
+        self.report = report
+        stdout, stderr = StringIO(), StringIO()
+        code = main(["search", "--isolation", "host", "--report", report, *words], stdout, stderr)
+        assert "Traceback" not in stdout.getvalue() + stderr.getvalue()
+        return code, stdout.getvalue() + stderr.getvalue()
+
+
+def result(report: str = "report") -> dict[str, Any]:
+    return dict(json.loads(Path(report, "search", "example", "search.json").read_text()))
+
+
+@pytest.fixture
+def search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Search]:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    monkeypatch.setenv("DODO_HISTORY", str(tmp_path / "history.jsonl"))
+    examples.write(SPEC, tmp_path)
+    made = Search()
+    monkeypatch.setattr(asyncio, "run", scripted.run)
+    monkeypatch.setattr(command, "Processes", lambda *_: ScriptedBackends(made.backend))
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    yield made
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def test_the_result_is_that_of_the_values_driven(search: Search) -> None:
+    code, out = search("example", "--runs", "32")
+    found = result()
+    assert code == 1
+    assert (found["judged"] + found["errors"], found["nominal"]["outcome"]) == (32, "passed")
+    assert found["rate"] == found["failed"] / found["judged"]
+    assert found["low"] < 3 / 14 < found["high"]
+    assert found["errors"] in range(2, 7)
+    assert [(one["name"], abs(one["correlation"]) > 0.9) for one in found["influences"]] == [
+        ("start", True),
+        ("clutter", False),
+    ]
+    assert found["worst"]["margin"] < 0
+    (failure,) = found["failures"]
+    assert failure["kind"] == "hit wall right after # m"
+    assert f"{found['failed']} of {found['judged']} drives failed" in out
+    drives = {path.name for path in Path("report/search/example/drives").iterdir()}
+    assert len(drives) == found["failed"] + found["errors"]
+    assert not list(Path("report").glob("**/*--run-0"))
+
+
+def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
+    search("example", "--runs", "16")
+    twice = {slug for slug in search.driven if search.driven.count(slug) == 2}
+    assert len(twice) == result()["errors"] > 0
+    assert len(search.driven) == 17 + len(twice)
+
+
+def test_an_interrupted_search_goes_on_to_the_same_result(search: Search) -> None:
+    search("example", "--runs", "16", "-j", "1", report="whole")
+    whole = set(search.driven)
+    search.ends_at = 7
+    code, out = search("example", "--runs", "16", "-j", "1")
+    assert code == 130
+    assert "the same command goes on" in out
+    before = set(search.driven)
+    search.ends_at = None
+    assert search("example", "--runs", "16", "-j", "1")[0] == 1
+    assert result() == result("whole")
+    assert before | set(search.driven) == whole
+    assert len(before & set(search.driven)) <= 1
+
+
+def test_more_runs_continue_the_sweep(search: Search) -> None:
+    search("example", "--runs", "4")
+    search("example", "--runs", "9")
+    assert len(set(search.driven)) == 5
+    search("example", "--runs", "9", report="whole")
+    assert result() == result("whole")
+
+
+def test_another_seed_is_another_search(search: Search) -> None:
+    search("example", "--runs", "1")
+    code, out = search("example", "--runs", "1", "--seed", "1")
+    assert (code, search.driven) == (2, [])
+    assert "is of another test, application, range or seed" in out
+
+
+def test_whole_numbers_where_a_parameter_needs_them(search: Search) -> None:
+    search("example", "--runs", "8")
+    assert result()["worst"]["values"]["clutter"].isdecimal()
+
+
+@pytest.mark.parametrize(
+    ("more", "words", "said"),
+    [
+        ("", ("base",), "base has no ranges to search"),
+        ("", ("nothing",), "there is no test 'nothing'"),
+        ("matrix: {rate: [1 Hz, 2 Hz]}\nrecord: {frames: '${matrix.rate}'}\n", ("example",), "means 2 tests"),
+        ("", ("example", "--runs", "0"), "'0' is not a whole number of at least 1"),
+        ("", ("example", "--minutes", "-1"), "'-1' is not a time in minutes"),
+    ],
+)
+def test_what_cannot_be_searched(
+    search: Search, capsys: pytest.CaptureFixture[str], more: str, words: tuple[str, ...], said: str
+) -> None:
+    path = Path(examples.EXAMPLE)
+    path.write_text(path.read_text() + more)
+    code, out = search(*words)
+    assert (code, search.driven) == (2, [])
+    assert said in out + capsys.readouterr().err
+
+
+def test_containers_are_refused(search: Search) -> None:
+    compose = Path("docker-compose.yml")
+    compose.write_text(compose.read_text().replace("    x-dodo-process: [python, driver.py]\n", ""))
+    code, out = search("example")
+    assert (code, "'x-dodo-process'" in out) == (2, True)
+
+
+def test_what_to_install_is_said(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    assert search("example") == (2, "dodo search: this needs scipy: pip install 'dodo-dsl[search]'\n")

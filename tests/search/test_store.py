@@ -1,0 +1,37 @@
+"""Drives in a file."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.search.store import FILE_NAME, Drive, OtherSearch, opened
+
+DRIVE = Drive(3, {"x": "1 m", "m": "ä"}, "failed", -0.1, "hit wall")
+
+
+def test_drives_stay(tmp_path: Path) -> None:
+    with opened(tmp_path / "new", "key") as store:
+        assert store.get(DRIVE.values) is None
+        store.add(DRIVE)
+    with opened(tmp_path / "new", "key") as store:
+        assert store.get({"m": "ä", "x": "1 m"}) == DRIVE
+
+
+def test_the_first_drive_at_some_values_stays(tmp_path: Path) -> None:
+    with opened(tmp_path, "key") as store:
+        store.add(DRIVE)
+        store.add(Drive(4, DRIVE.values, "passed", 1.0, ""))
+        assert store.get(DRIVE.values) == DRIVE
+
+
+def test_another_study_is_refused(tmp_path: Path) -> None:
+    with opened(tmp_path, "key"):
+        pass
+    with pytest.raises(OtherSearch, match="is of another test"), opened(tmp_path, "other"):
+        pass
+
+
+def test_a_file_that_is_no_store(tmp_path: Path) -> None:
+    (tmp_path / FILE_NAME).write_text("no database, but long enough to be read as one" * 100)
+    with pytest.raises(OtherSearch, match="cannot be used: file is not a database"), opened(tmp_path, "key"):
+        pass
