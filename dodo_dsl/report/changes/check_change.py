@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from dodo_dsl.margins import with_margin
+from dodo_dsl.outcome import SLOW_ANSWERS
 
 Direction = Literal["worse", "better", "different", "unchanged"]
 """``different`` is a change of a value that has no limit, or whose limits say nothing of the direction."""
@@ -59,6 +60,8 @@ def with_margins(check: Mapping[str, Any]) -> Mapping[str, Any]:
 def _direction(before: Mapping[str, Any], after: Mapping[str, Any]) -> Direction:
     if bool(before["ok"]) != bool(after["ok"]):
         return "better" if after["ok"] else "worse"
+    if after["name"] == SLOW_ANSWERS:
+        return "unchanged"  # it differs from run to run
     is_same_unit = (before.get("unit") or "") == (after.get("unit") or "")
     is_same_limit = (before.get("limit") or {}) == (after.get("limit") or {})
     if is_same_unit and is_same_limit and _shown(before["value"]) == _shown(after["value"]):

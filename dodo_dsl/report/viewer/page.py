@@ -20,7 +20,9 @@ VERSION = 1
 
 
 def write_shared(report: Path) -> None:
-    """What all pages of a report use; raises OSError."""
+    """What all pages of a report use; raises OSError. Nothing is written through a symlink."""
+    if (report / SHARED).is_symlink():
+        (report / SHARED).unlink()
     for source in sorted(_sources().iterdir()):
         if source.name != PAGE:
             atomic.write_bytes(report / SHARED / source.name, source.read_bytes())

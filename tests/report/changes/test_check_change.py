@@ -39,6 +39,8 @@ CASES = [
         {**check(1.5, max=2), "margin": 0.4, "margin_share": 0.2},
         "better",
     ),
+    ({**check(1, max=5), "name": "slow-answers"}, {**check(4, max=5), "name": "slow-answers"}, "unchanged"),
+    ({**check(1, max=5), "name": "slow-answers"}, {**check(6, max=5), "name": "slow-answers"}, "worse"),
     ({**check(1, max=2), "margin": None, "margin_share": None}, check(1.5, max=2), "different"),
 ]
 

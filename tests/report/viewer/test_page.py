@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from dodo_dsl.report.viewer import page
+from dodo_dsl.report.viewer.names import SHARED
 from tests.report.viewer import drives, failures
 from tests.report.viewer.drives import GOLDEN, ROOT
 
@@ -29,3 +31,12 @@ def test_a_page_is_cheap_to_write(tmp_path: Path) -> None:
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
     assert (tmp_path / "report" / "test-0" / "drive.js").read_bytes() == before
+
+
+def test_shared_files_are_written_through_no_symlink(tmp_path: Path) -> None:
+    (tmp_path / "others").mkdir()
+    (tmp_path / "report").mkdir()
+    (tmp_path / "report" / SHARED).symlink_to(tmp_path / "others")
+    page.write_shared(tmp_path / "report")
+    assert list((tmp_path / "others").iterdir()) == []
+    assert (tmp_path / "report" / SHARED / "main.js").is_file()
