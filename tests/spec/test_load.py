@@ -83,3 +83,14 @@ def test_a_test_that_extends_another_changes_its_ranges(tmp_path: Path) -> None:
     assert problems == []
     assert values(spec) == ("2 cm", "70 deg", 90.0)
     assert [one.text for one in spec.ranges] == ["-8 cm to 8 cm", "60 s, 90 s, 2 min"]
+
+
+def test_ranges_that_an_extending_test_does_not_use_are_the_concern_of_the_other(tmp_path: Path) -> None:
+    loaded(tmp_path, TEXT)
+    path = tmp_path / "own.dodo.yml"
+    without = "dodo: 1\nname: own\nextends: example.dodo.yml\nmatrix:\naction: {pose: {with: {x: 0 m, yaw: 70 deg}}}\n"
+    path.write_text(without)
+    (spec,), problems = load_spec(Location(path, tmp_path))
+    assert (problems, "start" in {one.name for one in spec.ranges}) == ([], True)
+    path.write_text(f"{without}vary: {{far: {{from: 1, to: 2, nominal: 1}}}}\n")
+    assert [found.rule for found in load_spec(Location(path, tmp_path))[1]] == ["vary-unused"]

@@ -131,12 +131,12 @@ def _of_numbers(middle: Scalar, low: Scalar, high: Scalar, unit: str) -> Iterato
 
 
 def problems(node: Mapping) -> Iterator[Diagnostic]:
-    """Placeholders of unknown ranges, and ranges without placeholders."""
+    """Placeholders of unknown ranges, and ranges without placeholders, unless they come from an extended test."""
     entry = node.entries.get(KEY)
     ranges = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
     yield from PLACEHOLDERS.unknown(node, ranges, "vary-unknown")
     used = PLACEHOLDERS.used(node)
     for name, one in ranges.items():
-        if name not in used:
+        if name not in used and one.key.file == node.span.file:
             message = f"nothing uses ${{vary.{name}}}, so a search would vary nothing by it"
             yield Diagnostic(one.key, "vary-unused", message, severity="warning")
