@@ -147,6 +147,7 @@ def _stage(path: Path) -> Iterator[Path]:
 
 
 def _beside(path: Path) -> Path:
+    path = path if path.name else path.resolve()
     return path.with_name(f".{path.name[:_MOST_NAME]}.{secrets.token_hex(8)}{path.suffix[:_MOST_NAME]}")
 
 

@@ -54,7 +54,7 @@ def _drawn(reports: Sequence[GivenReport], out: Path | None, stdout: TextIO) -> 
     if out is None:
         report, *others = reports
         if others:
-            raise UsageError(f"{len(reports)} reports, expected one, or with -o a folder into which they are joined")
+            raise UsageError(f"{len(reports)} reports are given; name the folder to join them into with -o")
         if not report.is_whole:
             raise UsageError(f"'{report.file}' is not called {results.FILE_NAME}; name a folder for the report with -o")
         return report.folder, report.outcomes

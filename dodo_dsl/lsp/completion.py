@@ -56,7 +56,12 @@ def _offers(scene: Scene, at: Cursor) -> Iterator[Offer]:
     if layered and len(at.steps) > 2 and at.steps[2] == WITH:
         if manifest and at.is_key and len(at.steps) == 3:
             yield from _parameters(manifest, at.keys)
-        elif manifest and not at.is_key and (parameter := manifest.parameters.get(str(at.steps[3]))):
+        elif (
+            manifest
+            and not at.is_key
+            and len(at.steps) > 3
+            and (parameter := manifest.parameters.get(str(at.steps[3])))
+        ):
             yield from _values(scene, at, parameter)
     elif layered and at.steps[2:] == (USES,):
         yield from _services(scene, str(at.steps[0]))

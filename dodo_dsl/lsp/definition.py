@@ -31,7 +31,7 @@ def _spans(scene: Scene, place: Place) -> Iterator[Span]:
     """Where what stands at a place is defined."""
     steps = place.steps
     if scene.schema == "deployment":
-        if steps[0] in _FILES and not place.is_key:
+        if steps and steps[0] in _FILES and not place.is_key:
             yield from _begin(path_of(scene.path.parent, place.text))
     elif steps == (extends.KEY,):
         yield from _begin(path_of(scene.path.parent, place.text))

@@ -45,6 +45,8 @@ def opened(workspace: Workspace) -> dict[Path, Document]:
 def saved_text(path: Path) -> str:
     """The text of a file that is not open, as far as positions need it."""
     try:
+        if not path.is_file():  # a FIFO would never end
+            return ""
         with path.open("rb") as stream:
             return stream.read(MAX_BYTES).decode("utf-8", "replace")
     except OSError:

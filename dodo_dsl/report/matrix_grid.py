@@ -12,6 +12,9 @@ from dodo_dsl.report.changes.check_change import with_margins
 
 _CHOICE = re.compile(r"(?P<before>.*)\[(?P<choice>[^\[\]]+)\]")
 _NEXT = re.compile(r",(?=[a-z][a-z0-9-]*=)")
+_LONGEST_NAME = 1000
+_MOST_GAPS = 4
+"""Cells an outcome, of which a part may be empty where not all instances ran."""
 _REPETITIONS = ("run", "report")
 """Dimensions whose first value is not written: ``--repeat`` and joined reports."""
 
@@ -58,7 +61,7 @@ def decisive_value(outcome: Outcome) -> str:
 def _parted(name: str) -> tuple[str, dict[str, str]]:
     """``test[light=dark,speed=2][run=2]`` in its name and choices."""
     parts: list[str] = []
-    while match := _CHOICE.fullmatch(name):
+    while len(name) <= _LONGEST_NAME and (match := _CHOICE.fullmatch(name)):
         parts[:0] = _NEXT.split(match["choice"])
         name = match["before"]
     return name, dict(part.partition("=")[::2] for part in parts)
@@ -75,5 +78,7 @@ def _grid(name: str, instances: Sequence[tuple[dict[str, str], Outcome]]) -> Ite
     cells: dict[tuple[str, ...], dict[str, list[Outcome]]] = defaultdict(lambda: defaultdict(list))
     for choice, outcome in full:
         cells[tuple(choice[key] for key in others)][choice.get(column, "")].append(outcome)
-    rows = [GridRow(values, [row[value] for value in columns]) for values, row in cells.items()]
-    yield MatrixGrid(name, others, column, columns or ["outcome"], rows)
+    if len(cells) * len(columns) > _MOST_GAPS * len(full):
+        return  # no matrix, which has every combination
+    rows = [GridRow(values, [row.get(value, []) for value in columns]) for values, row in cells.items()]
+    yield MatrixGrid(name, others, column, columns if column else ["outcome"], rows)

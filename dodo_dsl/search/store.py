@@ -58,7 +58,7 @@ class Store:
             )
 
     def add(self, drive: Drive) -> None:
-        with self._connection:
+        with self._told(), self._connection:
             self._connection.execute(
                 "insert or ignore into drives values (?, ?, ?, ?, ?)",
                 (_point(drive.values), drive.number, drive.outcome, drive.margin, drive.reason),
@@ -66,9 +66,18 @@ class Store:
 
     def get(self, values: Mapping[str, str]) -> Drive | None:
         columns = "number, outcome, margin, reason"
-        found = self._connection.execute(f"select {columns} from drives where point = ?", (_point(values),))  # noqa: S608
-        row = found.fetchone()
+        with self._told():
+            found = self._connection.execute(f"select {columns} from drives where point = ?", (_point(values),))  # noqa: S608
+            row = found.fetchone()
         return Drive(row[0], dict(values), *row[1:]) if row else None
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        """A full disk, or a file that others lock, is an error of the file."""
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise OtherSearch(f"'{self._path}' cannot be used: {error}") from error
 
     def close(self) -> None:
         self._connection.close()

@@ -32,18 +32,23 @@ def test_two_parameters_are_rows_and_columns() -> None:
 
 def test_one_parameter_is_a_column_of_rows() -> None:
     rows = [("dark", ["a[light=dark]"]), ("day", ["a[light=day]"])]
-    assert shown("a[light=dark]", "a[light=day]") == [("a", ["light"], "", [""], rows)]
+    assert shown("a[light=dark]", "a[light=day]") == [("a", ["light"], "", ["outcome"], rows)]
 
 
 def test_repetitions_are_a_parameter_whose_first_value_is_not_written() -> None:
     rows = [("1", ["a[x=1]"], ["a[x=1][run=2]"]), ("2", ["a[x=2]"], [])]
     assert shown("a[x=1]", "a[x=2]", "a[x=1][run=2]") == [("a", ["x"], "run", ["1", "2"], rows)]
-    assert shown("a", "a[report=2]") == [("a", ["report"], "", [""], [("1", ["a"]), ("2", ["a[report=2]"])])]
+    assert shown("a", "a[report=2]") == [("a", ["report"], "", ["outcome"], [("1", ["a"]), ("2", ["a[report=2]"])])]
 
 
 def test_values_with_commas_and_instances_of_one_name() -> None:
     rows = [("p,q", ["a[x=p,q,y=1]", "a[x=p,q,y=1]"])]
     assert shown("a[x=p,q,y=1]", "a[x=p,q,y=1]") == [("a", ["x"], "y", ["1"], rows)]
+
+
+def test_names_of_strangers_make_no_huge_grid() -> None:
+    assert shown(*(f"a[x={i},y={i}]" for i in range(1000))) == []
+    assert shown(*(f"{'[a=b]' * 100_000}[x={i}]" for i in range(2))) == []
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Drives in a file."""
 
+import contextlib
+import sqlite3
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,17 @@ def test_another_study_is_refused(tmp_path: Path) -> None:
         pass
     with pytest.raises(OtherSearch, match="is of another test"), opened(tmp_path, "other"):
         pass
+
+
+def test_a_file_that_others_lock_is_an_error_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    connect = sqlite3.connect
+    monkeypatch.setattr(sqlite3, "connect", lambda path: connect(path, timeout=0))
+    with opened(tmp_path, "key") as store, contextlib.closing(connect(tmp_path / FILE_NAME)) as other:
+        other.execute("begin exclusive")
+        with pytest.raises(OtherSearch, match="cannot be used: database is locked"):
+            store.add(DRIVE)
+        with pytest.raises(OtherSearch, match="cannot be used: database is locked"):
+            store.get(DRIVE.values)
 
 
 def test_a_file_that_is_no_store(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from dodo_dsl.spec.goals import Goal
 
 LEVEL = 0.95
 """Of the intervals."""
-_REPETITION = re.compile(r"\[run=\d+\]\Z")
+_REPETITION = re.compile(r"(?:\[(?:run|report)=\d+\])+\Z")
 _DIGITS = 12
 
 

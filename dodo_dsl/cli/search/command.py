@@ -45,6 +45,8 @@ exit codes: 0 no drive failed, 1 some failed, 2 wrong usage or spec, 3 none coul
 FILE_NAME = "search.json"
 _RUNS = 100
 _MOST_RUNS = 1 << 20
+_MOST_BY_TIME = 1 << 14
+"""Drives of a search that only its time ends: more than four hours at one a second."""
 _NEEDED = "scipy"
 
 
@@ -87,20 +89,24 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if interrupted:
         stdout.write("interrupted: the same command goes on from here\n")
         return Exit.INTERRUPTED
-    return Exit.ERROR if not findings.judged else Exit.PROBLEMS if findings.failed else Exit.OK
+    if not findings.judged:
+        return Exit.ERROR
+    fails_at_nominal = findings.nominal is not None and findings.nominal.outcome == "failed"
+    return Exit.PROBLEMS if findings.failed or fails_at_nominal else Exit.OK
 
 
 def _search(
     options: argparse.Namespace, study: Study, store: Store, work: Path, report: Path, load: Loading, stdout: TextIO
 ) -> tuple[Findings, bool]:
     """What was found, and whether an interrupt ended it."""
-    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
-    runs = min(options.runs or (_MOST_RUNS if options.minutes else _RUNS), _MOST_RUNS)
+    runs = min(options.runs or (_MOST_BY_TIME if options.minutes else _RUNS), _MOST_RUNS)
     candidates = sweep(study.space, runs, options.seed)
     deployment = study.checked.deployment
     backends = Kept(Processes(deployment.cids, options.isolation, (load.descriptor,), [deployment.root], load.take))
     order = schedule(options.jobs, expectation(backends.name))
-    with _shown(stdout, runs + 1 if options.runs or not deadline else None, deadline) as progress:
+    different = len({tuple(texts(values).items()) for values in (nominal(study.space), *candidates)})
+    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
+    with _shown(stdout, different if options.runs or not deadline else None, deadline) as progress:
         drives = Drives(study.checked, study.test.spec, store, backends, order, progress, work, report, deadline)
         interrupted = asyncio.run(_sweep(drives, backends, study, candidates))
     at_nominal = store.get(texts(nominal(study.space)))

@@ -26,7 +26,7 @@ from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.spec.model import Spec
 
 _ROUND = 8
-"""Drives a core in a round, so that cores hardly wait for its last one."""
+"""Drives a core in a round, so that cores hardly wait for its last one; one where time ends the search."""
 RETRIES = 1
 """A drive that ended in error is driven once more, and left out when it does so again."""
 
@@ -97,7 +97,7 @@ class Drives:
             elif key not in seen:
                 numbers[number] = values
             seen.add(key)
-        size = _ROUND * max(1, int(self.order.capacity))
+        size = max(1, int(self.order.capacity)) * (_ROUND if self.deadline is None else 1)
         missing = list(numbers.items())
         for start in range(0, len(missing), size):
             if self.is_over:

@@ -16,12 +16,14 @@ from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.run.runner import default_backend
 from dodo_dsl.search.space import Space, space_of
+from dodo_dsl.spec.instances import vary
+from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.settings import Settings
 
 
 @dataclass(frozen=True)
 class Study:
-    """``key`` names what all drives of a search have in common: test, application, ranges and seed."""
+    """``key`` names what all drives of a search have in common: test with its files, application, ranges and seed."""
 
     checked: Checked
     test: ResolvedTest
@@ -48,7 +50,17 @@ def study_of(options: argparse.Namespace, work: Path, stdout: TextIO) -> Study:
         raise UsageError("a search starts the application as processes: give each of its services 'x-dodo-process'")
     space = space_of(tests[0])
     texts = [file.text for file in render_plan(plan)]
+    texts += _digests(checked, tests[0].spec, work)
     return Study(checked, tests[0], space, _key(texts, space, options.seed))
+
+
+def _digests(checked: Checked, spec: Spec, work: Path) -> list[str]:
+    """What the files of the test hold, as maps and recordings, also those at the ends of its ranges."""
+    nominal = vary.nominal(spec.ranges)
+    ends = {str(n): {**nominal, **corner} for n, corner in enumerate(vary.corners(spec.ranges))}
+    made = compiler.plan(compiler.at_values(checked, spec, ends), work / "ends")
+    files = sorted({copy for copies in made.compiled.copies.values() for copy in copies})
+    return [f"{file.target} {hashlib.sha256(file.source.read_bytes()).hexdigest()}" for file in files]
 
 
 def _refuse(word: str, tests: tuple[ResolvedTest, ...]) -> None:

@@ -8,6 +8,7 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.stats import reuse, thesis
 from dodo_dsl.compiler import load
+from dodo_dsl.diagnostics import format_text
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.terminal import json_text, printable
 
@@ -31,7 +32,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    tests = _services(load([]).specs)
+    checked = load([])
+    stderr.write(format_text([found for found in checked.diagnostics if found.severity == "error"]))
+    tests = _services(checked.specs)
     if not tests:
         raise UsageError("the registry has no test that uses a service")
     stdout.write(as_json(tests) if options.json else as_text(tests))
@@ -39,9 +42,11 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 
 def _services(specs: Sequence[Spec]) -> dict[str, tuple[str, ...]]:
-    """The services of each test by its name, in the order of names."""
-    named = {spec.location.stem: tuple(dict.fromkeys(use.uses.text for use in spec.uses)) for spec in specs}
-    return {name: named[name] for name in sorted(named) if named[name]}
+    """The services of each test by its name, those of all its instances, in the order of names."""
+    named: dict[str, dict[str, None]] = {}
+    for spec in specs:
+        named.setdefault(spec.location.stem, {}).update(dict.fromkeys(use.uses.text for use in spec.uses))
+    return {name: tuple(named[name]) for name in sorted(named) if named[name]}
 
 
 def as_text(tests: Mapping[str, Sequence[str]]) -> str:

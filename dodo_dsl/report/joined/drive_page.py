@@ -23,7 +23,10 @@ def copy_page(source: Path, target: Path, outcome: Outcome, room: Room) -> bool:
         return False
     document = _document(source / DATA)
     document["test"] = {**document["test"], "name": shown(outcome.name), "slug": shown(outcome.slug)}
-    text = script(document)
+    try:
+        text = script(document)
+    except (ValueError, RecursionError):  # numbers such as 1e999
+        raise NotCopied("it is not the data of a drive") from None
     if len(text) > room.left:
         raise NotCopied("the report would become too large")
     room.left -= len(text)

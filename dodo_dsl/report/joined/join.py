@@ -25,7 +25,7 @@ def join(reports: Sequence[GivenReport], out: Path) -> tuple[list[Outcome], list
     tests = list(distinct(reports))
     outcomes = [test.outcome for test in tests]
     earlier = _earlier(out, reports, [outcome.slug for outcome in outcomes])
-    with (atomic.new_folder if earlier is None else atomic.files_into)(out) as stage:
+    with (atomic.files_into if out.exists() else atomic.new_folder)(out) as stage:
         sentences = [*_renamed(tests), *_copied(tests, stage)]
         (stage / results.FILE_NAME).write_text(results.to_json(outcomes), encoding="utf-8")
         if earlier is not None:
@@ -47,6 +47,9 @@ def _earlier(out: Path, reports: Sequence[GivenReport], slugs: Sequence[str]) ->
         earlier = {outcome.slug for outcome in results.load(out / results.FILE_NAME)}
     except results.ResultsError:
         raise _not_replaceable(out, "neither a new or empty folder nor a report of DoDo") from None
+    for path in (out / SHARED, *(out / slug for slug in earlier)):
+        if path.exists() and not path.is_dir():
+            raise _not_replaceable(path, "not a folder of a report")
     for path in (out / SHARED, *(out / slug for slug in slugs if slug not in earlier)):
         if path.is_symlink():
             raise _not_replaceable(path, "a symlink, which no output follows")

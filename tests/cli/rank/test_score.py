@@ -55,6 +55,12 @@ def test_repeated_runs_are_of_one_test() -> None:
     assert ranked.team.interval is None
 
 
+def test_runs_of_joined_reports_are_of_one_test() -> None:
+    names = ("t", "t[report=2]", "t[run=2][report=2]")
+    (ranked,) = rank({"a": [run(10.0, name=name) for name in names]})
+    assert {name: len(test.scores) for name, test in ranked.team.tests.items()} == {"t": 3}
+
+
 def test_the_interval_of_one_test_is_students() -> None:
     (ranked,) = rank({"a": [run(time) for time in (14.0, 15.0, 15.5, 13.0)]})
     scores = ranked.team.tests["t"].scores

@@ -15,6 +15,7 @@ import pytest
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.search import command
+from dodo_dsl.cli.search.drives import Drives
 from dodo_dsl.margins import with_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
@@ -160,6 +161,32 @@ def test_another_seed_is_another_search(search: Search) -> None:
     code, out = search("example", "--runs", "1", "--seed", "1")
     assert (code, search.driven) == (2, [])
     assert "is of another test, application, range or seed" in out
+
+
+def test_another_map_is_another_search(search: Search) -> None:
+    search("example", "--runs", "1")
+    search("example", "--runs", "1")
+    assert search.driven == []
+    (map_file,) = Path.cwd().glob("**/plain/map.json")
+    map_file.write_text(f"{map_file.read_text()} ")
+    assert search("example", "--runs", "1")[0] == 2
+
+
+def test_a_search_by_time_begins_no_drive_after_it(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Drives, "is_over", property(lambda _: len(search.driven) >= 5))
+    code, _ = search("example", "--minutes", "60", "-j", "1")
+    assert (code in (0, 1), len(search.driven)) == (True, 5)
+    assert result()["nominal"]["outcome"] == "passed"
+    assert result()["judged"] + result()["errors"] == len(set(search.driven)) - 1
+
+
+def test_the_drive_at_the_nominal_values_decides_too(search: Search) -> None:
+    examples.write(
+        SPEC.replace("from: -8 cm, to: 8 cm, nominal: 0 cm", "from: -5 cm, to: 5.5 cm, nominal: 5.5 cm"), Path()
+    )
+    code, out = search("example", "--runs", "1")
+    assert result()["failed"] == 0
+    assert (code, "at the nominal values: failed" in out) == (1, True)
 
 
 def test_whole_numbers_where_a_parameter_needs_them(search: Search) -> None:

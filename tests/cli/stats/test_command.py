@@ -38,6 +38,18 @@ def test_json_has_both_orders(monkeypatch: pytest.MonkeyPatch) -> None:
     assert document["thesis"]["averaged"]["fit"]["b"] == pytest.approx(0.503, abs=5e-4)
 
 
+def test_what_cannot_be_read_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\n")
+    for name, text in (("a", "action: {pose: {uses: integrator}}"), ("b", "action: [")):
+        (tmp_path / "tests" / name).mkdir(parents=True)
+        (tmp_path / "tests" / name / f"{name}.dodo.yml").write_text(f"dodo: 1\nname: {name}\n{text}\n")
+    monkeypatch.chdir(tmp_path)
+    code, text = stats("reuse")
+    assert code == 0
+    assert "1 tests, 1 services" in text
+    assert "tests/b/b.dodo.yml:" in text
+
+
 def test_without_tests_there_is_nothing_to_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\n")
     (tmp_path / "tests").mkdir()

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 from html import unescape
 from pathlib import Path
 
@@ -94,6 +95,9 @@ def test_nothing_else_is_replaced(tmp_path: Path, jobs: tuple[Path, Path]) -> No
     (loop / "_viewer").rmdir()
     (loop / "_viewer").symlink_to(tmp_path / "full")
     (tmp_path / "file").write_text("mine")
+    joined(tmp_path / "blocked", jobs[0])
+    shutil.rmtree(tmp_path / "blocked" / "a")
+    (tmp_path / "blocked" / "a").write_text("mine")
     before = tree(tmp_path)
     for out, why in (
         (full, "neither a new or empty folder nor a report"),
@@ -101,11 +105,23 @@ def test_nothing_else_is_replaced(tmp_path: Path, jobs: tuple[Path, Path]) -> No
         (report, "not of the report in"),
         (link, "a symlink"),
         (loop, "a symlink"),
+        (tmp_path / "blocked", "not a folder of a report"),
         (jobs[1], "it holds a report that is to be joined"),
     ):
         with pytest.raises(atomic.NotReplaceable, match=why):
             joined(out, jobs[1])
     assert tree(tmp_path) == before
+
+
+def test_the_working_folder_becomes_the_report(
+    tmp_path: Path, jobs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path / "out")
+    for _ in range(2):
+        joined(Path(), *jobs)
+        assert (tmp_path / "out" / "results.json").is_file()
+        assert sorted(path.name for path in tmp_path.iterdir() if path.name.startswith(".")) == []
 
 
 @pytest.mark.parametrize("slug", ["..", "../x", "a/b", "/tmp/x", "", "A", "_viewer", "a" * 241])
@@ -159,6 +175,7 @@ NO_DATA = [
     "var dodoTest = alert(1);\n",
     "var dodoTest = {}; alert(1);\n",
     "var dodoTest = NaN;\n",
+    drive(PASSED).replace('"version":1', '"version":1,"x":1e999'),
     "var dodoTest = " + "[" * 100_000 + ";\n",
     drive(PASSED) + "alert(1);\n",
     drive(PASSED).replace('"version":1', '"version":2'),

@@ -1,6 +1,7 @@
 """A headless Chromium, spoken to over a pipe in the DevTools protocol; one for all pages of a test session."""
 
 import base64
+import contextlib
 import itertools
 import json
 import os
@@ -20,7 +21,17 @@ from numpy.typing import NDArray
 
 PROGRAM = shutil.which("chromium")
 _PATIENCE = 30.0
+_NAVIGATED = (
+    "Inspected target navigated",
+    "Execution context was destroyed",
+    "Cannot find context",
+    "Promise was collected",
+)
 KEYS = {"ArrowLeft": 37, "ArrowRight": 39, "Home": 36, "End": 35, " ": 32, "d": 68}
+
+
+class Navigated(Exception):
+    """The page went to another address while it was asked something."""
 
 
 class Chromium:
@@ -51,6 +62,8 @@ class Chromium:
             data = data[os.write(self._commands, data) :]
         for answer in self._messages():
             if answer.get("id") == number:
+                if answer.get("error", {}).get("message", "").startswith(_NAVIGATED):
+                    raise Navigated(answer)
                 assert "error" not in answer, answer
                 return answer["result"]
             self.events.append(answer)
@@ -116,11 +129,14 @@ class Page:
         self.wait("location.href !== 'about:blank' && document.readyState === 'complete'")
 
     def wait(self, condition: str) -> None:
-        """Until a condition holds, which two pictures on the screen may pass for."""
+        """Until a condition holds, which two pictures on the screen may pass for, also on the page that comes next."""
         until = time.monotonic() + _PATIENCE
         frames = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
-        while not self.value(f"{frames}.then(() => Boolean({condition}))"):
-            assert time.monotonic() < until, condition
+        holds = False
+        while not holds:
+            with contextlib.suppress(Navigated):
+                holds = bool(self.value(f"{frames}.then(() => Boolean({condition}))"))
+            assert holds or time.monotonic() < until, condition
 
     def value(self, expression: str) -> Any:
         """What an expression is, also a promised one."""
