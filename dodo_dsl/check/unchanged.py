@@ -1,4 +1,4 @@
-"""Checks again only what a change can affect: for whoever checks after every key."""
+"""Checks again only what a change can affect, for editors that check after every keystroke."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -61,7 +61,7 @@ def is_folder(path: Path) -> bool:
 
 
 def opened(path: Path) -> io.FileIO:
-    """A regular file to read; raises NotCopied for a symlink, whatever else is no file, and what cannot be opened."""
+    """A regular file to read; raises NotCopied for anything else, symlinks included."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     except OSError as error:
@@ -69,7 +69,7 @@ def opened(path: Path) -> io.FileIO:
     if stat.S_ISREG(os.fstat(descriptor).st_mode):
         return io.FileIO(descriptor, "rb")
     os.close(descriptor)
-    raise NotCopied("it is no file")
+    raise NotCopied("it is not a regular file")
 
 
 def _copy_folder(source: Path, target: Path, room: Room) -> Iterator[str]:

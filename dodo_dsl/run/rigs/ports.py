@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"[0-9]{1,3}")
 def known_ports(plan: Plan) -> list[str]:
     """The ports of the test's rig, of its deployment's others, and of those that the machine's operator names.
 
-    Raises MachineError: where the operator's file cannot be read, nobody knows which ports to keep.
+    Raises MachineError: without the operator's file, which names the ports, it is unknown which ones to protect.
     """
     found = [service.port for service in plan.services if service.port]
     return list(dict.fromkeys([*found, *plan.application.access.ports, *_of_operator()]))

@@ -1,4 +1,4 @@
-"""Reports of several jobs become one, whoever wrote them, and nothing else is touched."""
+"""Joins reports of several jobs, also of strangers, and changes no other file."""
 
 import json
 import os
@@ -153,7 +153,7 @@ def test_no_symlink_is_followed_and_no_other_file_is_taken(tmp_path: Path) -> No
     sentences = joined(out, folder)
     assert [sentence.removeprefix(f"{folder}/") for sentence in sentences] == [
         "a/test.rec is left out: it is a symlink",
-        "a/logs/fifo.log is left out: it is no file",
+        "a/logs/fifo.log is left out: it is not a regular file",
         "a/logs/key.log is left out: it is a symlink",
         "a/drive.js is left out with its page: it is a symlink",
         "b is left out: it is a symlink",
