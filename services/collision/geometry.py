@@ -59,7 +59,7 @@ def swept(start: VehiclePose, end: VehiclePose, box: VehicleBox) -> shapely.Geom
     parts = max(1, math.ceil(abs(change) / TURN))
     shares = [index / parts for index in range(parts + 1)]
     rings = [corners(between(start, end, share), box) for share in shares]
-    hulls = [shapely.MultiPoint(a + b).convex_hull for a, b in pairwise(rings)]
+    hulls = [shapely.convex_hull(shapely.linestrings(a + b)) for a, b in pairwise(rings)]
     return hulls[0] if parts == 1 else shapely.union_all(hulls)
 
 

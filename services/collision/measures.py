@@ -32,6 +32,11 @@ class DriveMeasures:
         """The time to the goal; null, and not ok, when it was not reached."""
         return Check("time-to-goal", self.time_to_goal, {"max": max_time}, "s", self.time_to_goal is not None)
 
+    @staticmethod
+    def rest_check(rest: float) -> Check:
+        """The way left to the goal in m; it says how far a drive that failed came, and decides nothing."""
+        return Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0)
+
     def wall_check(self, limit: float) -> Check:
         """The margin, at least its limit; a limit of zero has to be *exceeded*, as a wall touched is a wall hit."""
         margin = self.wall_margin

@@ -1,18 +1,21 @@
 """The evaluator of a closed loop: gates and goal are to be reached in time, and no wall touched before."""
 
 import math
+from collections.abc import Iterator
 from typing import Literal
 
 import shapely
 
-from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.collision.gates import Gates
 from services.collision.geometry import VehicleBox, VehiclePose, between, outline, swept
 from services.collision.measures import DriveMeasures
 from services.collision.requests import Requests
-from services.collision.track import Track, fault_of_start, nearest, place, touched
+from services.collision.track import Track, fault_of_start, length_through, nearest, place, touched
 
 PERIOD = 10_000  # us
+_CLOSE = 1e-3
+"""A wall farther away than this, in m, is not touched."""
 
 
 class TrackEvaluator(Evaluator):
@@ -73,7 +76,8 @@ class TrackEvaluator(Evaluator):
     def _judge(self, start: tuple[int, VehiclePose], time: int, pose: VehiclePose) -> None:
         area, when = swept(start[1], pose, self.box), f"after {self.elapsed(time):.2f} s"
         self._measures.move(start, (time, pose))
-        wall, (margin, near) = touched(self.track.walls, area), self._approach(area)
+        margin, near = self._approach(area)
+        wall = touched(self.track.walls, area) if margin < _CLOSE else None
         goal = self._reached(start[1], pose, area)
         if wall is not None:
             self.verdict = self._verdict("failed", f"hit wall {wall} {when} {place(pose)}", obstacle=wall)
@@ -140,6 +144,15 @@ class TrackEvaluator(Evaluator):
         early = f"; {next(iter(self.track.goal))} does not count before the gates" if self._early else ""
         return f"crossed {self._gates.crossed} of {len(self._gates)} gates {within}: {away} {name}, the next{early}"
 
+    def _rest(self) -> Iterator[Check]:
+        """How far it is from the newest pose to the goal, by straight lines from gate to gate."""
+        if self._measures.time_to_goal is not None:
+            yield self._measures.rest_check(0.0)
+        elif self._last is not None:
+            left = [lines for _, lines in self.track.gates[self._gates.crossed :]]
+            area = outline(self._last[1], self.box)
+            yield self._measures.rest_check(length_through(area, [*left, *self.track.goal.values()]))
+
     def _moment(self, prefix: str = "") -> dict[str, float | str | None]:
         """Time (s) and place (m) of the newest pose."""
         if self._last is None:
@@ -151,7 +164,7 @@ class TrackEvaluator(Evaluator):
         self, outcome: Literal["passed", "failed"], reason: str, silent: bool = False, obstacle: str | None = None
     ) -> Verdict:
         track, measures = self.track, self._measures
-        goal = (measures.goal_check(track.max_time),) if track.goal or track.gates else ()
+        goal = (measures.goal_check(track.max_time), *self._rest()) if track.goal or track.gates else ()
         gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
         walls = (measures.wall_check(track.min_margin),) if track.walls else ()
         drive = measures.drive_checks(track.max_speed)

@@ -1,7 +1,8 @@
 """The track by which a vehicle is judged: the obstacles of a map by their purpose."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import shapely
 
@@ -35,6 +36,11 @@ def touched(obstacles: Obstacles, area: shapely.Geometry) -> str | None:
 def nearest(obstacles: Obstacles, area: shapely.Geometry) -> tuple[float, str] | None:
     """The smallest distance of an area to an obstacle (m), and the obstacle's name; None without obstacles."""
     return min(((float(shapely.distance(lines, area)), name) for name, lines in obstacles.items()), default=None)
+
+
+def length_through(area: shapely.Geometry, lines: Sequence[shapely.Geometry]) -> float:
+    """The least way (m) from an area to the first line, from there to the next, and so on, each taken by itself."""
+    return sum(float(shapely.distance(start, end)) for start, end in pairwise([area, *lines]))
 
 
 def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:

@@ -1,5 +1,6 @@
 """How a body moves, from its last two frames, so that a picture can show what passes while the shutter is open."""
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -13,8 +14,9 @@ FASTEST = 50.0
 """A body that is faster, in m/s, was put elsewhere and did not move."""
 TYPICAL_DEPTH = 0.3
 """The distance, in m, by which the blur's length in the picture is estimated."""
-FINEST = 2.0
-MOST = 12
+FINEST, APART = 3.0, 6.0
+"""Pixels of blur that cannot be told from none, and between two pictures at most."""
+MOST = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,10 @@ class CameraMotion:
         return CameraPose(self.pose.position + self.velocity * seconds, turn @ self.pose.rotation)
 
     def steps(self, camera: Pinhole, shutter: float) -> int:
-        """How many pictures the blur of ``shutter`` seconds takes, so that they lie about 2 pixels apart."""
+        """How many pictures the blur of ``shutter`` seconds takes: an odd number, one of the middle of it."""
         across = float(np.linalg.norm(self.velocity)) / TYPICAL_DEPTH + float(np.linalg.norm(self.spin))
-        return int(min(MOST, max(1, -(-across * camera.focal * shutter // FINEST))))
+        more = math.ceil((across * camera.focal * shutter - FINEST) / (2 * APART))
+        return min(MOST, 1 + 2 * max(more, 0))
 
 
 def still(pose: CameraPose) -> CameraMotion:

@@ -78,9 +78,11 @@ class SceneTruth:
         if self._lens:
             corners, share = _cut(self._lens.shown(corners - 0.5) + 0.5, self._lens.camera)
             inside *= share
-        visible = min(seen / max(_alone(pieces, labels), 1) * inside, 1.0)
         (left, top), (wide, high) = corners.min(axis=0).tolist(), np.ptp(corners, axis=0).tolist()
-        if visible < self._limits.visible or high < self._limits.height or wide <= 0.0:
+        if high < self._limits.height or wide <= 0.0:
+            return None
+        visible = min(seen / max(_alone(pieces, labels), 1) * inside, 1.0)
+        if visible < self._limits.visible:
             return None
         return TrueBox(body, name, left, top, wide, high, visible)
 

@@ -1,5 +1,7 @@
 """Triangles that share a plane and an edge joined to convex polygons: fewer pieces to fill."""
 
+import math
+
 import numpy as np
 
 from services.virtual_camera.camera import Array
@@ -21,14 +23,22 @@ def triangle_normals(vertices: Array, triangles: Indices) -> Array:
 
 
 def _convex(vertices: Array, loop: Loop, normal: Array) -> Loop | None:
-    """The loop without corners on straight edges; None when it is not convex."""
-    points = vertices[loop]
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    turns = np.cross(before, after) @ normal
-    straight = _STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    if (turns < -straight).any():
-        return None
-    return [corner for corner, turn, limit in zip(loop, turns, straight, strict=True) if turn > limit]
+    """The loop without corners on straight edges; None when it is not convex. In plain numbers, as it has few."""
+    points, (nx, ny, nz) = vertices[loop].tolist(), normal.tolist()
+    kept = []
+    for corner, last, point, following in zip(
+        loop, [points[-1], *points], points, [*points[1:], points[0]], strict=False
+    ):
+        (ax, ay, az), (bx, by, bz) = (
+            [q - p for p, q in zip(*ends, strict=True)] for ends in ((last, point), (point, following))
+        )
+        turn = (ay * bz - az * by) * nx + (az * bx - ax * bz) * ny + (ax * by - ay * bx) * nz
+        straight = _STRAIGHT * math.hypot(ax, ay, az) * math.hypot(bx, by, bz)
+        if turn < -straight:
+            return None
+        if turn > straight:
+            kept.append(corner)
+    return kept
 
 
 def _turned(loop: Loop, first: int) -> Loop:

@@ -1,7 +1,5 @@
 """Pictures of a scene from anywhere, drawn with OpenCV and numpy."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import numpy.typing as npt
 
@@ -26,6 +24,8 @@ class Renderer:
         self.scene = scene
         self._tree = Tree(list(scene.faces))
         self.bodies = Bodies(scene.models, self._tree, scene.light, scene.faces)
+        self._latest: tuple[bytes, list[Face | Drawn]] = b"", []
+        """What was drawn last, from back to front, and the pose that it was drawn from."""
 
     def render(self, pose: CameraPose, out: Image | None = None) -> Image:
         """What a camera sees: (height, width, 4) in the order B, G, R, A.
@@ -58,10 +58,13 @@ class Renderer:
                     fill_fixed(image, points, (item[0],))
         return image, bodies
 
-    def _back_to_front(self, view: View) -> Iterator[Face | Drawn]:
-        regions = self.bodies.pieces(view)
-        for item in self._tree.back_to_front(view.position):
-            if isinstance(item, Face):
-                yield item
-            else:
-                yield from regions.get(item, ())
+    def _back_to_front(self, view: View) -> list[Face | Drawn]:
+        """All that may be seen; true boxes are looked for where a picture was drawn, so that it is kept until then."""
+        pose = view.position.tobytes() + view.axes.tobytes()
+        if pose != self._latest[0]:
+            regions = self.bodies.pieces(view)
+            items: list[Face | Drawn] = []
+            for item in self._tree.back_to_front(view.position):
+                items.extend([item] if isinstance(item, Face) else regions.get(item, ()))
+            self._latest = pose, items
+        return self._latest[1]

@@ -13,7 +13,7 @@ from services.virtual_camera.draw.faces import Covering, Face, TextureMap, box_f
 from services.virtual_camera.draw.light import Light
 from services.virtual_camera.draw.lines import line_faces, pick
 from services.virtual_camera.draw.raster import Colour
-from services.virtual_camera.draw.shape import make_shape
+from services.virtual_camera.draw.shape import Shape, make_shape
 from services.virtual_camera.map.clutter import clutter
 from services.virtual_camera.map.json_node import MapError
 from services.virtual_camera.map.map_file import BlockEntry, MapFile, ModelEntry, OverlayEntry, Vector3, read_map
@@ -70,14 +70,21 @@ class _Budget:
             raise MapError(f"{self.path}: more than {self.most} {self.what} in all")
 
 
-def _model(entry: ModelEntry, triangles: _Budget) -> Copies:
+def _model(entry: ModelEntry, triangles: _Budget, shapes: dict[Path, tuple[Shape, int]]) -> Copies:
+    """``shapes`` are those of the files that were read; several models of a map have one in different colours."""
     paint = entry.paint
     colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
     positions = np.array([instance.position for instance in entry.instances])
     turns = np.array([math.pi - instance.angle for instance in entry.instances])
-    mesh = load_obj(entry.file)
-    triangles.take(len(mesh[1]))
-    return Copies(make_shape(*mesh), colour, positions, turns, entry.name)
+    shape, count = shapes[entry.file] = shapes.get(entry.file) or _shape(entry.file)
+    triangles.take(count)
+    return Copies(shape, colour, positions, turns, entry.name)
+
+
+def _shape(file: Path) -> tuple[Shape, int]:
+    """The shape in an OBJ file, and how many triangles it is made of."""
+    mesh = load_obj(file)
+    return make_shape(*mesh), len(mesh[1])
 
 
 def _cover(entry: BlockEntry, memory: _Budget) -> Colour | Covering:
@@ -115,7 +122,8 @@ def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
     """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
     entries, options = read_map(path), options or SceneOptions()
     triangles = _Budget(entries.path, MAX_TRIANGLES, "triangles of models")
-    models = tuple(_model(entry, triangles) for entry in entries.models)
+    shapes: dict[Path, tuple[Shape, int]] = {}
+    models = tuple(_model(entry, triangles, shapes) for entry in entries.models)
     around = clutter(options.clutter, options.seed, models)
     shade = options.light.on(np.array([0.0, 0.0, 1.0]))
     return Scene(

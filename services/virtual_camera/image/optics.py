@@ -65,9 +65,9 @@ class Optics:
         total: npt.NDArray[np.uint16],
         ideal: Image,
     ) -> None:
-        """The mean of ``steps`` pictures while the shutter is open."""
+        """The mean of ``steps`` pictures while the shutter is open, the middle one drawn last, for its true boxes."""
         total.fill(0)
-        for step in range(steps):
+        for step in sorted(range(steps), key=lambda step: -abs(2 * step + 1 - steps)):
             pose = motion.after(((step + 0.5) / steps - 0.5) * self._shutter)
             renderer.render(pose.carrying(mounted), ideal)
             cv2.add(total, ideal, dst=total, dtype=cv2.CV_16U)

@@ -99,7 +99,7 @@ def _refuse_large(path: Path, data: bytes) -> None:
 
 def _parse(path: Path, data: bytes) -> tuple[Array, Indices]:
     _refuse_large(path, data)
-    import trimesh
+    from services.virtual_camera.map.mesh_library import trimesh
 
     if _RELATIVE_FACE.search(data):
         raise MapError(f"{path}: faces count vertices by negative numbers, expected positive ones")

@@ -66,6 +66,7 @@ def test_the_goal_reached_is_a_pass() -> None:
     assert (decided(it).outcome, decided(it).reason) == ("passed", "reached finish after 3.41 s")
     assert values(it) == {
         "time-to-goal": pytest.approx(3.414),
+        "to-goal": 0.0,
         "wall-margin": pytest.approx(0.07),
         "distance": pytest.approx(1 + math.hypot(1.81, 0.05) + 0.02),
         "max-speed": pytest.approx(2.5),
@@ -81,7 +82,13 @@ def test_a_wall_touched_is_a_failure() -> None:
         "hit wall left after 1.84 s at x = 0.21 m, y = 0.12 m",
     )
     assert values(it)["time-to-goal"] is None and values(it)["wall-margin"] == 0.0
-    assert oks(it) == {"time-to-goal": False, "wall-margin": False, "distance": True, "max-speed": True}
+    assert oks(it) == {
+        "time-to-goal": False,
+        "to-goal": False,
+        "wall-margin": False,
+        "distance": True,
+        "max-speed": True,
+    }
 
 
 def test_touching_is_hitting() -> None:
@@ -128,7 +135,10 @@ def test_out_of_time_says_where_and_how_far() -> None:
         "did not reach finish within 40.00 s: the vehicle is at x = 2.00 m, y = 0.05 m, 0.82 m from it",
     )
     assert values(it)["time-to-goal"] is None
-    assert oks(it) == {"time-to-goal": False, "wall-margin": True, "distance": True, "max-speed": True}
+    assert values(it)["to-goal"] == pytest.approx(0.82)
+    assert oks(it) == {
+        "time-to-goal": False, "to-goal": False, "wall-margin": True, "distance": True, "max-speed": True
+    }  # fmt: skip
 
 
 def test_a_goal_reached_too_late_is_not_reached() -> None:
@@ -214,10 +224,21 @@ def test_without_a_goal_a_silent_application_fails() -> None:
 def test_without_walls_no_margin_is_checked() -> None:
     it = judge(Track({}, LANE.goal, 2.0))
     drive(it, (0, 0, 0, 0), (1, 3, 0, 0))
-    assert list(values(it)) == ["time-to-goal", "distance", "max-speed"]
+    assert list(values(it)) == ["time-to-goal", "to-goal", "distance", "max-speed"]
 
 
 LAP = replace(LANE, gates=(("east", line(1, -0.2, 1, 0.2)), ("west", line(2, -0.2, 2, 0.2))))
+
+
+def test_the_way_left_goes_through_the_gates_that_are_left() -> None:
+    it = judge(LAP)
+    drive(it, (0, 0, 0, 0), (1, 0.5, 0, 0), (2, 0.5, 0.3, 0))
+    to_east, to_west = math.hypot(1 - 0.5 - 0.36 / 2, 0.3 - 0.16 / 2 - 0.2), 1.0
+    assert decided(it).outcome == "failed"
+    assert values(it)["to-goal"] == pytest.approx(to_east + to_west + 1.0)
+    it = judge(LAP)
+    drive(it, (0, 0, 0, 0), (1, 1.5, 0, 0), (2, 1.5, 0.3, 0))
+    assert values(it)["to-goal"] < to_east + to_west + 0.5
 
 
 def test_the_goal_counts_after_all_gates() -> None:

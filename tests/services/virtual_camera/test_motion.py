@@ -57,3 +57,10 @@ def test_the_number_of_pictures_grows_with_the_motion_to_a_limit():
     steps = [CameraMotion(pose, np.zeros(3), np.array([0, 0, spin])).steps(camera, 0.02) for spin in (0, 0.3, 1, 100)]
     assert steps == sorted(steps)
     assert (steps[0], steps[-1]) == (1, MOST)
+
+
+@pytest.mark.parametrize(("blur", "count"), [(0, 1), (3, 1), (3.1, 3), (15, 3), (15.1, 5), (27.1, 7), (1000, 7)])
+def test_the_pictures_are_an_odd_number_and_not_far_apart(blur, count):
+    camera = Pinhole(640, 480, 0.85)
+    motion = CameraMotion(CameraPose.at(0, 0, 0), np.zeros(3), np.array([0, 0, blur / camera.focal / 0.01]))
+    assert motion.steps(camera, 0.01) == count

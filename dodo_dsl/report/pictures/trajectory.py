@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.emit.output_folder import FILES
-from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.plan.model import Plan
 
 _FRAME = "opendlv.sim.Frame"
@@ -47,26 +45,28 @@ def read_drive(plan: Plan, folder: Path, recording: Path) -> Drive | None:
     return Drive(path, ground, length, width, flags.get("goal", ""))
 
 
-def _path(recording: Path) -> Iterator[tuple[float, float, float, float]]:
-    from dodo_dsl.opendlv.recordings.recording import read_envelopes  # numpy takes longer to start than the compiler
+def _path(path: Path) -> Iterator[tuple[float, float, float, float]]:
+    from dodo_dsl.opendlv.messages.codec import MessageError  # protobuf and numpy take longer to load than the compiler
+    from dodo_dsl.opendlv.messages.message_set import MessageSet
+    from dodo_dsl.opendlv.recordings.recording import Recording
 
     messages = MessageSet.standard()
     wanted, begin = messages.id(_FRAME), messages.id("dodo.TestBegin")
     start: int | None = None
-    for envelope in read_envelopes(recording):
-        if envelope.data_type == begin:
-            start = envelope.sample_time
-        if envelope.data_type != wanted:
-            continue
-        try:
-            frame: Any = messages.decode(envelope.data_type, envelope.payload)
-        except MessageError:
-            continue
-        if not all(map(math.isfinite, (frame.x, frame.y, frame.qx, frame.qy, frame.qz, frame.qw))):
-            continue
-        heading = math.atan2(2 * (frame.qw * frame.qz + frame.qx * frame.qy), 1 - 2 * (frame.qy**2 + frame.qz**2))
-        start = envelope.sample_time if start is None else start
-        yield frame.x, frame.y, heading, (envelope.sample_time - start) / 1e6
+    with Recording(path) as recording:
+        for envelope in recording.envelopes(recording.rows({wanted, begin})):
+            if envelope.data_type == begin:
+                start = envelope.sample_time
+                continue
+            try:
+                frame: Any = messages.decode(envelope.data_type, envelope.payload)
+            except MessageError:
+                continue
+            if not all(map(math.isfinite, (frame.x, frame.y, frame.qx, frame.qy, frame.qz, frame.qw))):
+                continue
+            heading = math.atan2(2 * (frame.qw * frame.qz + frame.qx * frame.qy), 1 - 2 * (frame.qy**2 + frame.qz**2))
+            start = envelope.sample_time if start is None else start
+            yield frame.x, frame.y, heading, (envelope.sample_time - start) / 1e6
 
 
 def read_ground(place: Path) -> Ground:
