@@ -2,24 +2,18 @@
 
 import asyncio
 import contextlib
-import secrets
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import leases
-from dodo_dsl.run.docker import cleanup
-from dodo_dsl.run.docker.backend import DockerBackend, other_subnets
-from dodo_dsl.run.docker.client import connect
-from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import own_module
 from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.slot import Slot, new_key
+from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.attendance import attended, is_real, refuse_hardware
 
@@ -139,56 +133,3 @@ class Processes:
         ):
             slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)
-
-
-class Containers:
-    """Containers of a Docker engine, each test a compose project of its own."""
-
-    name = "docker"
-
-    def __init__(self, subnets: Sequence[str], roots: Sequence[Path] = ()) -> None:
-        self._subnets = subnets
-        self._roots = roots
-        self._client: Any = None
-        self._pulls: Pulls | None = None
-        self._problem = ""
-
-    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        try:
-            self._client = await asyncio.to_thread(connect)
-        except BackendError as error:
-            self._problem = str(error)
-            return
-        self._pulls = Pulls(self._client)
-        reaped = await asyncio.to_thread(cleanup.reap_projects, self._client)
-        for removed in reaped.removed:
-            note(f"removed what a killed run left: {removed}")
-        for left in reaped.left:
-            note(f"what a killed run left cannot be removed: {left}")
-
-    def close(self) -> None:
-        """Does nothing: only the tests' own containers run, and each test removes them."""
-
-    @contextlib.asynccontextmanager
-    async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
-        if self._client is None or self._pulls is None:
-            raise BackendError(self._problem)
-        plan = job.plan
-        refuse_hardware(plan)
-        project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
-        lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
-        assert lease is not None, "a fresh name is free"
-        subnets = other_subnets(plan.subnet, self._subnets)
-        key = new_key()
-        backend = DockerBackend(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say, key)
-        try:
-            if plan.isolation == "network" and not is_real(plan):
-                yield backend
-            else:
-                async with (
-                    host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
-                    attended(plan, slot.cid, slot.descriptors, say, key, self._roots),
-                ):
-                    yield backend
-        finally:
-            lease.leave() if backend.left_behind else lease.release()

@@ -6,8 +6,17 @@ from typing import Protocol
 
 from services.camera.picture import CameraError, SharedPicture
 
-SILENCE = 5.0
-"""s without a picture after which a camera counts as lost."""
+SILENCE = 1.5
+"""s without a picture after which a camera that gave some counts as lost."""
+FIRST = 5.0
+"""s within which a camera has to give its first picture, as it has to be set up."""
+
+
+def longest_silence(freq: float, exposure: float) -> float:
+    """s between two pictures of a live camera at a rate in Hz, each exposed for ``exposure`` s, with a reserve."""
+    return max(SILENCE, 2 * exposure, 2 / freq)
+
+
 JOIN_PATIENCE = 2.0
 
 

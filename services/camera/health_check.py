@@ -18,7 +18,7 @@ from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.base.signals import interruptible
 from services.camera.files import FileCamera
-from services.camera.grabber import SILENCE, Grabber
+from services.camera.grabber import FIRST, Grabber
 from services.camera.picture import CameraError, SharedPicture
 from services.camera.service import open_camera
 
@@ -76,14 +76,14 @@ def take_picture(flags: Flags) -> SharedPicture:
         while time.monotonic() < end:
             first = _next(grabber, flags["source"])
         while (other := _next(grabber, flags["source"])) and np.array_equal(other.i420, first.i420):
-            if time.monotonic() - end > SILENCE:
-                raise CameraError(f"the camera {flags['source']} has shown the same picture for {SILENCE:g} s")
+            if time.monotonic() - end > FIRST:
+                raise CameraError(f"the camera {flags['source']} has shown the same picture for {FIRST:g} s")
         return other
 
 
 def _next(grabber: Grabber, name: str) -> SharedPicture:
-    if not grabber.wait(SILENCE) or (picture := grabber.take()) is None:
-        raise CameraError(f"the camera {name} gave no picture for {SILENCE:g} s")
+    if not grabber.wait(FIRST) or (picture := grabber.take()) is None:
+        raise CameraError(f"the camera {name} gave no picture for {FIRST:g} s")
     return picture
 
 

@@ -16,6 +16,8 @@ PROGRAM = "rpicam-vid"
 ALIGNED = 64
 """Rows of other widths are padded in the pipe."""
 PATIENCE = 2.0
+END_PATIENCE = 0.4
+"""s for which a program that has closed its pipe may take to end, and so to say why."""
 
 
 class RpiCamera:
@@ -89,8 +91,8 @@ class RpiCamera:
 
     def _why(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(PATIENCE)
-        self._stderr.join(PATIENCE)
+            self._process.wait(END_PATIENCE)
+        self._stderr.join(END_PATIENCE)
         words = self._stderr_end.decode("utf-8", "replace")
         return f"{PROGRAM} ended with code {self._process.returncode}" + (f": {words}" if words else "")
 

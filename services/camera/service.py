@@ -7,7 +7,7 @@ from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
 from services.base.signals import interruptible
 from services.camera.files import FileCamera
-from services.camera.grabber import SILENCE, Camera, Grabber
+from services.camera.grabber import FIRST, Camera, Grabber, longest_silence
 from services.camera.picture import CameraError, Image, SharedPicture
 from services.camera.rpicam import RpiCamera
 from services.camera.telemetry import CameraTelemetry
@@ -91,10 +91,10 @@ def build(context: Context) -> Service:
     if isinstance(camera, FileCamera):
         context.resources.callback(camera.close)
         return RigCameraService(camera, argb, i420, freq, telemetry)
-    silence = max(SILENCE, 2 * flags["exposure"])
-    grabber = Grabber(camera, flags["source"], silence)
+    silence = longest_silence(freq, flags["exposure"])
+    grabber, first = Grabber(camera, flags["source"], silence), max(FIRST, silence)
     context.resources.callback(grabber.close)
     with interruptible():
-        if not grabber.wait(silence):
-            raise CameraError(f"the camera {flags['source']} gave no picture for {silence:g} s")
+        if not grabber.wait(first):
+            raise CameraError(f"the camera {flags['source']} gave no picture for {first:g} s")
     return RigCameraService(grabber, argb, i420, freq, telemetry)

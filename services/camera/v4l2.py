@@ -13,15 +13,19 @@ from services.camera.picture import CameraError, SharedPicture, from_bgr
 MANUAL = 1
 EXPOSURE_UNIT = 1e-4
 """V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us."""
-WARNING_SHARE = 0.1
+TOLERANCE = 0.1
+"""Share by which exposure and rate may differ from what was asked for."""
 PATIENCE = 2.0
 
 
 class V4l2Camera:
-    """``read`` waits for a picture; ``notes`` are settings that the device refused."""
+    """``read`` waits for a picture; ``notes`` tell of a rate other than asked for."""
 
     def __init__(self, device: Path, width: int, height: int, freq: float, exposure: float) -> None:
-        """``freq`` in Hz, ``exposure`` in s; raises OSError for a device that is not a camera."""
+        """``freq`` in Hz, ``exposure`` in s.
+
+        Raises OSError for a device that is not a camera, ValueError for one that has no such pictures.
+        """
         if not device.exists():
             raise OSError(f"there is no camera {device}; is it plugged in?")
         if not stat.S_ISCHR(device.stat().st_mode):
@@ -41,7 +45,14 @@ class V4l2Camera:
         }
         for key, value in wanted.items():
             self._capture.set(key, value)
-        self.notes = self._differences(freq, exposure)
+        try:
+            self._compare(exposure)
+        except ValueError:
+            self._capture.release()
+            raise
+        rate = self._capture.get(cv2.CAP_PROP_FPS)
+        differs = abs(rate - freq) > TOLERANCE * freq
+        self.notes = [f"{device} refuses the rate of {freq:g} Hz and has {rate:g}"] if differs else []
 
     def read(self) -> SharedPicture:
         """The next picture, with the time at which it was complete; raises CameraError when the device is lost."""
@@ -58,16 +69,14 @@ class V4l2Camera:
             self._capture.release()
             self._busy.release()
 
-    def _differences(self, freq: float, exposure: float) -> list[str]:
-        get, notes = self._capture.get, []
+    def _compare(self, exposure: float) -> None:
+        """Reads back what was set; raises ValueError with the way out where the device has something else."""
+        get, device = self._capture.get, self._device
         size = int(get(cv2.CAP_PROP_FRAME_WIDTH)), int(get(cv2.CAP_PROP_FRAME_HEIGHT))
         if size != (self._width, self._height):
-            notes.append(f"{self._device} gives {size[0]} x {size[1]} pixels, scaled to {self._width} x {self._height}")
+            found = f"the camera {device} gives pictures of {size[0]} x {size[1]}, not {self._width} x {self._height}"
+            raise ValueError(f"{found}: set a size that 'v4l2-ctl -d {device} --list-formats-ext' lists")
         exposed = get(cv2.CAP_PROP_EXPOSURE) * EXPOSURE_UNIT
-        for what, has, wanted, unit in (
-            ("exposure", exposed, exposure, "s"),
-            ("rate", get(cv2.CAP_PROP_FPS), freq, "Hz"),
-        ):
-            if abs(has - wanted) > WARNING_SHARE * wanted:
-                notes.append(f"{self._device} refuses the {what} of {wanted:g} {unit} and has {has:g}")
-        return notes
+        if abs(exposed - exposure) > TOLERANCE * exposure:
+            found = f"the camera {device} exposes for {max(exposed, 0.0):g} s, not {exposure:g} s"
+            raise ValueError(f"{found}: set an exposure that 'v4l2-ctl -d {device} --list-ctrls' allows")

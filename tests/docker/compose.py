@@ -14,7 +14,8 @@ from dodo_dsl import __version__
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import LAYERS, Flag, Plan
 from dodo_dsl.plan.plan_json import to_json
-from dodo_dsl.run.backends import Containers, Job
+from dodo_dsl.run.backends import Job
+from dodo_dsl.run.docker.containers import Containers
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.run.desk import ROOT

@@ -124,7 +124,7 @@ def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path
     same(theirs, lockstep(tmp_path, out, "process"))
     for slug in DRIVES:
         checks = {c["name"]: c for c in theirs[slug]["checks"]}
-        assert set(checks) == {"time-to-goal", "wall-margin", "distance", "max-speed", "silence"}
+        assert set(checks) == {"time-to-goal", "to-goal", "wall-margin", "distance", "max-speed", "silence"}
         assert checks["wall-margin"]["value"] > 0.03
         assert (tmp_path / "docker" / slug / slug / "trajectory.png").is_file()
         assert "frame 1:" in (tmp_path / "docker" / slug / slug / "logs" / "application.perception.log").read_text()

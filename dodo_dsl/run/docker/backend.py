@@ -10,7 +10,6 @@ from typing import Any
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import service_protocol
 from dodo_dsl.run.docker.bus import announce_begin
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 from dodo_dsl.run.docker.client import engine_error
@@ -21,13 +20,15 @@ from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.docker.teardown import take_down, writers
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
-from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.services import service_protocol
+from dodo_dsl.run.services.service_output import ServiceOutput
 
 
 class DockerBackend:
     """One test as a compose project of its own; ``subnets`` are tried in turn until the engine accepts one."""
 
     name = "docker"
+    compose_kind: type[Compose] = Compose
 
     def __init__(
         self,
@@ -52,7 +53,7 @@ class DockerBackend:
         self._subnets = subnets
         self._say = say
         self._events: asyncio.Queue[Event] = asyncio.Queue()
-        self._compose = Compose(plan, folder, report, project, say)
+        self._compose = self.compose_kind(plan, folder, report, project, say)
         self._containers: dict[str, Any] = {}
         self._processes = ContainerProcesses({})
         self._outputs: dict[str, ServiceOutput] = {}

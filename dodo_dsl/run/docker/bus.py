@@ -4,8 +4,8 @@ import asyncio
 from typing import Any
 
 from dodo_dsl.opendlv.bus.address import group
-from dodo_dsl.run.announce import begin_frame, send_on_host
 from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.services.announce import begin_frame, send_on_host
 
 # dd makes one datagram of it: bash itself would write one a line, and a frame may hold a line feed
 _SEND = 'printf "%b" "$1" | dd bs=65507 iflag=fullblock status=none > "/dev/udp/$2/$3"'

@@ -60,6 +60,10 @@ class Compose:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         config = json.loads(out)
         self._refuse(compiled_findings(config, self._test))
+        self._take(config)
+
+    def _take(self, config: dict[str, Any]) -> None:
+        """Keeps what the engine is asked for of the test as ``docker compose config`` shows it."""
         self.services, self._volumes = config["services"], config.get("volumes") or {}
 
     @property
@@ -135,11 +139,13 @@ class Compose:
         with tempfile.TemporaryDirectory(prefix="dodo-key-") as folder:
             keys = Path(folder) / "keys.compose.json"
             given: dict[str, Any] = {
-                service.name: {"environment": {KEY_VARIABLE: key.hex()}} for service in self.plan.services
+                service.name: {"environment": {KEY_VARIABLE: key.hex()}}
+                for service in self.plan.services
+                if service.name in self.services
             }
             given.update(self._masks())
             keys.write_text(json.dumps({"services": given}), encoding="utf-8")
-            files = os.pathsep.join([*(f"{layer}.compose.yml" for layer in LAYERS), str(keys)])
+            files = os.pathsep.join([*self._files(Path(folder)), str(keys)])
             for subnet in subnets:
                 code, _, problem = await self._run(
                     "create", "--no-build", "--pull", "never", subnet=subnet, files=files
@@ -148,6 +154,10 @@ class Compose:
                     break
         if code:
             raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
+
+    def _files(self, _folder: Path) -> list[str]:
+        """The project's compose files; others than the compiled ones may be written into a private folder."""
+        return [f"{layer}.compose.yml" for layer in LAYERS]
 
     def _masks(self) -> dict[str, Any]:
         """What hides the tests from the application's services."""

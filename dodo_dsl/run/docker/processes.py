@@ -36,15 +36,16 @@ class ContainerProcesses:
             except (DockerException, OSError):
                 return {}
             pid = int(container.attrs["State"].get("Pid") or 0)
-            if pid and not self._is_of(pid, container.id):
+            if pid and not is_of(pid, container.id, self._proc):
                 return {}
             found[pid] = name
         found.pop(0, None)
         return found
 
-    def _is_of(self, pid: int, container: str) -> bool:
-        """Whether a process here is that of the container, and not one of another machine with the same number."""
-        try:
-            return container in (self._proc / str(pid) / "cgroup").read_text()
-        except OSError:
-            return False
+
+def is_of(pid: int, container: str, proc: Path = PROC) -> bool:
+    """Whether a process here is that of the container, and not one of another machine with the same number."""
+    try:
+        return container in (proc / str(pid) / "cgroup").read_text()
+    except OSError:
+        return False

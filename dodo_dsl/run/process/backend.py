@@ -9,19 +9,20 @@ from typing import Any
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run import service_protocol
-from dodo_dsl.run.announce import begin_frame
 from dodo_dsl.run.application_files import hidden_folders
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes
 from dodo_dsl.run.process.confined.confinement import confinement
+from dodo_dsl.run.process.entered import Entered
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Unstartable
-from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.services import service_protocol
+from dodo_dsl.run.services.announce import begin_frame
+from dodo_dsl.run.services.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
@@ -41,8 +42,12 @@ class ProcessBackend:
         slot: Slot,
         fork_server: ForkServer | None = None,
         is_apart: bool = True,
+        events: asyncio.Queue[Event] | None = None,
     ) -> None:
-        """``is_apart`` tells that on the host, too, the application gets a process namespace of its own."""
+        """``is_apart`` tells that on the host, too, the application gets a process namespace of its own.
+
+        ``events`` is a queue of somebody else's to report to, by default an own one.
+        """
         self.plan = plan
         self.report = report
         self.isolation = isolation
@@ -51,7 +56,7 @@ class ProcessBackend:
         self.cid = slot.cid
         self._folder = folder
         self._commands = Commands(plan, folder, report, slot)
-        self._events: asyncio.Queue[Event] = asyncio.Queue()
+        self._events: asyncio.Queue[Event] = asyncio.Queue() if events is None else events
         self._outputs: dict[str, ServiceOutput] = {}
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
@@ -60,8 +65,10 @@ class ProcessBackend:
             isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
         )
 
-    async def open(self) -> None:
-        await self._sandbox.open(self.slot, self.report)
+    async def open(self, container: int = 0) -> None:
+        """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
+        entered = Entered.with_own(container, self._folder, self.report) if container else None
+        await self._sandbox.open(self.slot, self.report, entered)
 
     def _take(self, message: dict[str, Any]) -> None:
         if "started" in message:

@@ -4,7 +4,8 @@ Loading numpy, OpenCV and the like takes most of the processor time of a short t
 of their own are forked from here; their services are forks of them in turn.
 
     runner to fork server   {"load": [module of a service of DoDo's, ...]};
-                            {"slot": name} with the sandbox's end of its channel and its log's descriptor
+                            {"slot": name, "words": [more of the sandbox's words]} with the sandbox's end of its channel
+                            and its log's descriptor
 """
 
 import contextlib
@@ -15,12 +16,12 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from dodo_dsl.run.process import sandbox
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
 
-MAX_MESSAGE = 4096
+MAX_MESSAGE = 1 << 16
 _THREADS = "OPENBLAS_NUM_THREADS"
 """By default numpy's linear algebra starts threads when it is imported."""
 LOADED = (
@@ -84,12 +85,12 @@ def serve(runner: socket.socket) -> None:
             continue
         channel, log = descriptors
         if os.fork() == 0:
-            os._exit(_sandbox(runner, channel, log, message["slot"]))
+            os._exit(_sandbox(runner, channel, log, message["slot"], message["words"]))
         os.close(channel)
         os.close(log)
 
 
-def _sandbox(runner: socket.socket, channel: int, log: int, slot: str) -> int:
+def _sandbox(runner: socket.socket, channel: int, log: int, slot: str, words: Sequence[str]) -> int:
     """The fork's whole life; its exit code."""
     runner.close()
     os.dup2(log, sys.stderr.fileno())
@@ -98,7 +99,7 @@ def _sandbox(runner: socket.socket, channel: int, log: int, slot: str) -> int:
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     os.environ[SLOT_VARIABLE] = slot
     try:
-        return sandbox.main([str(channel), "network", "--forks"])
+        return sandbox.main([str(channel), "network", "--forks", *words])
     except BaseException:  # noqa: BLE001  (it is printed as Python does)
         sys.excepthook(*sys.exc_info())
         return 1

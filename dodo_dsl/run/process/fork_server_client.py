@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from dodo_dsl.run.process.commands import package_path
 from dodo_dsl.run.process.environment import own_environment
@@ -41,9 +41,12 @@ class ForkServer:
         with contextlib.suppress(OSError):  # it has ended, which the next sandbox finds
             self._socket.send(json.dumps({"load": sorted(modules)}).encode())
 
-    def fork(self, channel: socket.socket, log: int, slot: str) -> None:
-        """Starts a sandbox at the other end of ``channel``; raises OSError when the fork server has ended."""
-        socket.send_fds(self._socket, [json.dumps({"slot": slot}).encode()], [channel.fileno(), log])
+    def fork(self, channel: socket.socket, log: int, slot: str, words: Sequence[str] = ()) -> None:
+        """Starts a sandbox at the other end of ``channel``, with more ``words``.
+
+        Raises OSError when the fork server has ended.
+        """
+        socket.send_fds(self._socket, [json.dumps({"slot": slot, "words": words}).encode()], [channel.fileno(), log])
 
     @property
     def is_alive(self) -> bool:

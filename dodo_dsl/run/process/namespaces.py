@@ -11,7 +11,7 @@ import os
 import signal
 import socket
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 _CLONE_NEWNS, _CLONE_NEWIPC, _CLONE_NEWUSER = 0x00020000, 0x08000000, 0x10000000
@@ -27,6 +27,8 @@ _AT_FDCWD, _AT_EMPTY_PATH, _AT_RECURSIVE = -100, 0x1000, 0x8000
 _OPEN_TREE_CLONE, _MOVE_MOUNT_F_EMPTY_PATH, _MOUNT_ATTR_IDMAP = 1, 4, 0x00100000
 _TMP = Path("/tmp")
 _TMP_SIZE = "size=1g,mode=1777"
+SHARED = (_TMP, Path("/dev/shm"))
+"""Where shared memories have their names."""
 
 _libc = ctypes.CDLL(None, use_errno=True)
 
@@ -85,6 +87,51 @@ def _unshare(flags: int) -> None:
     Path("/proc/self/setgroups").write_text("deny")
     Path("/proc/self/uid_map").write_text(f"{user} {user} 1")
     Path("/proc/self/gid_map").write_text(f"{group} {group} 1")
+
+
+def enter(process: int) -> dict[Path, int]:
+    """Joins the network and IPC namespaces of another process, and leaves the host's mounts and process numbers.
+
+    The next fork is process 1. Gives descriptors of the other process's ``SHARED`` folders, for ``furnish_entered``.
+    Raises OSError: only root may do so.
+    """
+    _join(process, "net", _CLONE_NEWNET)
+    _join(process, "ipc", _CLONE_NEWIPC)
+    own = os.open("/proc/self/ns/mnt", os.O_RDONLY | os.O_CLOEXEC)
+    _join(process, "mnt", _CLONE_NEWNS)
+    try:
+        flags = _OPEN_TREE_CLONE | os.O_CLOEXEC
+        trees = {path: _syscall(_OPEN_TREE, _AT_FDCWD, bytes(path), flags) for path in SHARED}
+    finally:
+        _call("setns", own, _CLONE_NEWNS)
+        os.close(own)
+    _call("unshare", _CLONE_NEWNS | _CLONE_NEWPID)
+    return trees
+
+
+def _join(process: int, kind: str, flag: int) -> None:
+    descriptor = os.open(f"/proc/{process}/ns/{kind}", os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        _call("setns", descriptor, flag)
+    finally:
+        os.close(descriptor)
+
+
+def furnish_entered(trees: Mapping[Path, int], shown: Iterable[Path]) -> None:
+    """Mounts the folders of ``enter``; to be called by the new process 1.
+
+    Of the host's ``/tmp`` only what holds ``shown`` paths stays, as an empty folder to the other process.
+    """
+    _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
+    _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
+    old = os.open(_TMP, os.O_PATH | os.O_DIRECTORY)
+    names = sorted({path.relative_to(_TMP).parts[0] for path in shown if path.is_relative_to(_TMP) and path != _TMP})
+    for path, tree in trees.items():
+        _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(path), _MOVE_MOUNT_F_EMPTY_PATH)
+        os.close(tree)
+    for name in names:
+        _bind_old(old, name)
+    os.close(old)
 
 
 def furnish() -> None:
@@ -167,11 +214,16 @@ def _private_tmp() -> None:
     folders = [entry.name for entry in os.scandir(_TMP) if entry.is_dir(follow_symlinks=False)]
     _call("mount", b"tmpfs", bytes(_TMP), b"tmpfs", _MS_NOSUID | _MS_NODEV, _TMP_SIZE.encode())
     for name in folders:
-        target = _TMP / name
-        target.mkdir()
-        with contextlib.suppress(FileNotFoundError):  # it was removed meanwhile
-            _call("mount", f"/proc/self/fd/{old}/{name}".encode(), bytes(target), None, _MS_BIND | _MS_REC, None)
+        _bind_old(old, name)
     os.close(old)
+
+
+def _bind_old(old: int, name: str) -> None:
+    """Shows a folder of the old ``/tmp`` in the new one."""
+    target = _TMP / name
+    target.mkdir(exist_ok=True)
+    with contextlib.suppress(FileNotFoundError):  # it was removed meanwhile
+        _call("mount", f"/proc/self/fd/{old}/{name}".encode(), bytes(target), None, _MS_BIND | _MS_REC, None)
 
 
 def _loopback_up() -> None:

@@ -41,6 +41,7 @@ from dodo_dsl.run.process.confined.confinement import INTERPRETER, Confinement
 from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
 from dodo_dsl.run.process.confined.places import Places
 from dodo_dsl.run.process.confined.seccomp_filter import NoSeccomp
+from dodo_dsl.run.process.entered import Entered
 
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
@@ -191,13 +192,18 @@ class Sandbox:
         self.ended = True
 
 
-def _in_namespaces(channel: socket.socket) -> None:
+def _in_namespaces(channel: socket.socket, entered: Entered | None) -> None:
     """Forks process 1 of new namespaces, which returns; this process only waits for it."""
-    namespaces.unshare()
+    trees = namespaces.enter(entered.process) if entered else {}
+    if not entered:
+        namespaces.unshare()
     child = os.fork()
     if child == 0:
         namespaces.die_with_parent(signal.SIGKILL)
-        namespaces.furnish()
+        if entered:
+            namespaces.furnish_entered(trees, entered.shown)
+        else:
+            namespaces.furnish()
         return
     channel.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -207,12 +213,15 @@ def _in_namespaces(channel: socket.socket) -> None:
 
 
 def main(argv: list[str]) -> int:
-    """``sandbox DESCRIPTOR network|host [--forks]``: serves the runner at the other end of the descriptor."""
+    """``sandbox DESCRIPTOR network|host [--forks] [--enter=JSON]``: serves the runner at the other end.
+
+    ``--enter`` is an ``Entered``.
+    """
     channel = socket.socket(fileno=int(argv[0]))
     isolation, outside, forks = argv[1], os.getpid(), "--forks" in argv
     try:
         if isolation == "network":
-            _in_namespaces(channel)
+            _in_namespaces(channel, Entered.among(argv))
         else:
             namespaces.adopt_orphans()
     except OSError as error:

@@ -14,6 +14,7 @@ from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.run.process.commands import package_path
+from dodo_dsl.run.process.entered import Entered
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkedSandbox, ForkServer, end
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
@@ -45,14 +46,19 @@ class SandboxClient:
         self._socket: socket.socket | None = None
         self._up: asyncio.Future[dict[str, Any]] | None = None
         self._closing = False
+        self._words: tuple[str, ...] = ()
 
     @property
     def pid(self) -> int | None:
         """The sandbox's process while it runs."""
         return self._process.pid if self._process is not None and self._process.poll() is None else None
 
-    async def open(self, slot: Slot, folder: Path) -> None:
-        """Starts the sandbox, which logs into ``folder`` and holds the slot's leases; raises BackendError."""
+    async def open(self, slot: Slot, folder: Path, entered: Entered | None = None) -> None:
+        """Starts the sandbox, which logs into ``folder`` and holds the slot's leases; raises BackendError.
+
+        With ``entered`` it has no network of its own, but a container's.
+        """
+        self._words = (entered.word(),) if entered else ()
         folder.mkdir(parents=True, exist_ok=True)
         answer = await self._start(slot, folder / LOG)
         if "down" in answer and self._fork_server is not None:  # it may have ended
@@ -72,7 +78,15 @@ class SandboxClient:
         with theirs, atomic.appended(log) as stderr:
             if not self._is_forked(theirs, stderr.fileno(), slot):
                 self._process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(theirs.fileno()), self._isolation],
+                    [
+                        sys.executable,
+                        "-P",
+                        "-m",
+                        "dodo_dsl.run.process.sandbox",
+                        str(theirs.fileno()),
+                        self._isolation,
+                        *self._words,
+                    ],
                     pass_fds=(theirs.fileno(), *slot.descriptors),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -88,7 +102,7 @@ class SandboxClient:
         if self._fork_server is None:
             return False
         try:
-            self._fork_server.fork(theirs, log, slot.name)
+            self._fork_server.fork(theirs, log, slot.name, self._words)
         except OSError:
             self._fork_server = None
             return False

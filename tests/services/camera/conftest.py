@@ -31,7 +31,7 @@ while mode != "silent":
     for part in (picture[:1000], picture[1000:]):
         sys.stdout.buffer.write(part)
         sys.stdout.buffer.flush()
-    if mode in ("lost", "stubborn") and count == 3:
+    if mode in ("lost", "stopped", "stubborn") and count == 3:
         if mode == "lost":
             sys.stderr.write("ERROR: *** Device timeout detected ***\\n")
             sys.exit(1)

@@ -60,7 +60,7 @@ def test_a_live_camera_is_checked_when_it_has_settled(monkeypatch: pytest.Monkey
     if mode in ("dark", "frozen"):
         monkeypatch.setattr(health_check, "SETTLED", 0.1)
     if mode == "frozen":
-        monkeypatch.setattr(health_check, "SILENCE", 2.0)
+        monkeypatch.setattr(health_check, "FIRST", 2.0)
     monkeypatch.setenv("FAKE_MODE", mode)
     assert words in check("rpicam", ok=not words).get("reason", "")
 

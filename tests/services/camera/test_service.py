@@ -84,6 +84,17 @@ def test_a_camera_that_is_lost_ends_it_with_a_sentence(
 
 
 @pytest.mark.realtime
+def test_a_camera_that_stops_ends_it_with_a_sentence(
+    tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAKE_MODE", "stopped")
+    process = launch("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, '{"dodo": "ready"}' in out) == (1, True)
+    assert "the camera rpicam gave no picture for 1.5 s" in err and "Traceback" not in err
+
+
+@pytest.mark.realtime
 def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
     tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,83 @@
+"""Tests in containers; apart from the other backends, as its libraries take long to load."""
+
+import asyncio
+import contextlib
+import secrets
+from collections.abc import AsyncIterator, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run import leases
+from dodo_dsl.run.backends import Job, Say
+from dodo_dsl.run.docker import cleanup
+from dodo_dsl.run.docker.backend import DockerBackend, other_subnets
+from dodo_dsl.run.docker.camera_source import refuse_rpicam
+from dodo_dsl.run.docker.client import connect
+from dodo_dsl.run.docker.pulls import Pulls
+from dodo_dsl.run.process import host_isolation
+from dodo_dsl.run.process.slot import new_key
+from dodo_dsl.run.protocol import Backend, BackendError
+from dodo_dsl.run.rigs.attendance import attended, is_real, refuse_hardware
+
+_Kind = TypeVar("_Kind", bound=DockerBackend)
+
+
+class Containers:
+    """Containers of a Docker engine, each test a compose project of its own."""
+
+    name = "docker"
+
+    def __init__(self, subnets: Sequence[str], roots: Sequence[Path] = ()) -> None:
+        self._subnets = subnets
+        self._roots = roots
+        self._client: Any = None
+        self._pulls: Pulls | None = None
+        self._problem = ""
+
+    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
+        try:
+            self._client = await asyncio.to_thread(connect)
+        except BackendError as error:
+            self._problem = str(error)
+            return
+        self._pulls = Pulls(self._client)
+        reaped = await asyncio.to_thread(cleanup.reap_projects, self._client)
+        for removed in reaped.removed:
+            note(f"removed what a killed run left: {removed}")
+        for left in reaped.left:
+            note(f"what a killed run left cannot be removed: {left}")
+
+    def close(self) -> None:
+        """Does nothing: only the tests' own containers run, and each test removes them."""
+
+    @contextlib.asynccontextmanager
+    async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
+        plan, key = job.plan, new_key()
+        refuse_rpicam(plan)
+        with self.project(DockerBackend, job, say, key) as backend:
+            if plan.isolation == "network" and not is_real(plan):
+                yield backend
+            else:
+                async with (
+                    host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
+                    attended(plan, slot.cid, slot.descriptors, say, key, self._roots),
+                ):
+                    yield backend
+
+    @contextlib.contextmanager
+    def project(self, kind: type[_Kind], job: Job, say: Say, key: bytes) -> Iterator[_Kind]:
+        """A backend of a kind with a project of its own, and the project's lease; raises BackendError."""
+        if self._client is None or self._pulls is None:
+            raise BackendError(self._problem)
+        plan = job.plan
+        refuse_hardware(plan)
+        project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
+        lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
+        assert lease is not None, "a fresh name is free"
+        subnets = other_subnets(plan.subnet, self._subnets)
+        backend = kind(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say, key)
+        try:
+            yield backend
+        finally:
+            lease.leave() if backend.left_behind else lease.release()

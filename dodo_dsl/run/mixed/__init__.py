@@ -1,0 +1,1 @@
+"""The mixed backend: the application in containers, DoDo's services beside it as local processes."""

@@ -1,0 +1,1 @@
+"""What the runner and services of DoDo say to each other."""

@@ -1,0 +1,78 @@
+"""The application in containers of a real engine, DoDo's services beside it as processes of this machine."""
+
+import asyncio
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run.backends import Job
+from dodo_dsl.run.docker.containers import Containers
+from dodo_dsl.run.mixed.backends import Mixed
+from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.schedule import schedule
+from tests.docker.compose import SUBNETS, Crate
+from tests.docker.test_faults import HUNGRY, KINDS
+from tests.faults import Book
+from tests.run.desk import ROOT
+from tests.run.process.test_faults import FAULTS
+
+TEST = "sil-closed-straight"
+SCRIPTED = ("neighbour", "killed", "service-killed", "no-verdict")
+
+pytestmark = [
+    pytest.mark.engine,
+    pytest.mark.usefixtures("images"),
+    pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container"),
+]
+
+
+def separate(job: Job, scripts: Path) -> Job:
+    """The same with the application in a file of its own, as compiled; its scripts are where those of processes are."""
+    path = job.folder / "environment.compose.yml"
+    content = json.loads(path.read_text())
+    after = {"sandbox": {"condition": "service_started"}, "judge": {"condition": "service_healthy"}}
+    app = {**content["services"].pop("app"), "ipc": "service:sandbox", "depends_on": after}
+    path.write_text(json.dumps(content))
+    text = json.dumps({"services": {"app": app}}).replace("/scripts", str(scripts))
+    (job.folder / "application.compose.yml").write_text(text)
+    (job.folder / ".env").write_text("COMPOSE_FILE=environment.compose.yml:application.compose.yml\n")
+    return job
+
+
+def test_faults_beside_processes_of_dodo(crate: Crate, book: Book) -> None:
+    jobs = [crate.job(slug, f.judge, f.application, f.environment) for slug in SCRIPTED for f in [FAULTS[slug]]]
+    jobs.append(crate.job("hungry", application=HUNGRY, mem_limit="64m", memswap_limit="64m"))
+    jobs = [separate(job, crate.bench.folder) for job in jobs]
+    runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(len(jobs), lambda job: 1.0), Policy())
+    outcomes = {o.slug.removeprefix(f"{crate.mark}-"): o for o in asyncio.run(runner.run(jobs))}
+    assert outcomes["neighbour"].outcome == "passed", outcomes["neighbour"].reason
+    assert "memory video0.argb" in crate.log("neighbour")
+    for slug in {*outcomes} - {"neighbour"}:
+        name, outcome, sentence = KINDS[slug]
+        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)
+        book.record(name, "mixed", outcomes[slug].outcome, outcomes[slug].reason)
+
+
+def test_default_without_images_of_dodo(tmp_path: Path) -> None:
+    """A drive in lockstep in a deployment whose images are nowhere, and whose application is only an image."""
+    for name in (TEST, "maps"):
+        shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name)
+    shutil.copytree(ROOT / "examples" / "kiwi", tmp_path / "kiwi")
+    compose = tmp_path / "kiwi" / "docker-compose.yml"
+    lines = compose.read_text().splitlines()
+    compose.write_text("\n".join(line for line in lines if "x-dodo-process" not in line))
+    (tmp_path / "dodo.yml").write_text(
+        "dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\nimages: {prefix: 127.0.0.1:9/none}\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(tmp_path / "leases")}
+    subprocess.run([sys.executable, "-m", "dodo_dsl", "run", TEST], cwd=tmp_path, env=environment, check=True)
+    report = tmp_path / "dodo-report"
+    (test,) = json.loads((report / "results.json").read_text())["tests"]
+    assert (test["backend"], test["outcome"], test["clock"]) == ("mixed", "passed", "lockstep")
+    assert "frame 1:" in (report / TEST / "logs" / "application.perception.log").read_text()
+    assert (report / TEST / "test.rec").stat().st_size > 10_000

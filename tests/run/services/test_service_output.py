@@ -1,0 +1,121 @@
+"""A service's output: complete in its log, its last lines in memory, its lines to a callback."""
+
+import asyncio
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.run.services import service_output
+from dodo_dsl.run.services.service_output import ServiceOutput
+
+
+class Read:
+    """What an Output made of the chunks that a service wrote."""
+
+    def __init__(self, folder: Path, chunks: Sequence[bytes], is_hung: bool = False) -> None:
+        self.lines: list[bytes] = []
+        self.log_path = folder / "logs" / "app.log"
+        asyncio.run(self._read(chunks, is_hung))
+        self.log = self.log_path.read_bytes()
+
+    async def _read(self, chunks: Sequence[bytes], is_hung: bool) -> None:
+        output = ServiceOutput(self.log_path, self._take)
+        writer = os.dup(output.writer)
+        output.release_writer()
+        for chunk in chunks:
+            rest = memoryview(chunk)
+            while rest:
+                rest = rest[os.write(writer, rest[:4096]) :]
+                await asyncio.sleep(0)
+        if is_hung:
+            output.close()
+            assert output.done.is_set()
+        os.close(writer)
+        await asyncio.wait_for(output.done.wait(), 10)
+        output.close()
+        self.tail = output.tail()
+
+    def _take(self, line: bytes) -> bool:
+        self.lines.append(line)
+        return line.startswith(b"{")
+
+
+def expected_lines(data: bytes) -> list[bytes]:
+    return [line for line in data.split(b"\n") if line.strip()]
+
+
+@given(st.lists(st.binary(max_size=40) | st.sampled_from([b"\n", b"a\n", b'{"dodo": "ready"}\n']), max_size=20))
+def test_lines_do_not_depend_on_how_they_were_written(chunks: list[bytes]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        read = Read(Path(folder), chunks)
+    data = b"".join(chunks)
+    assert (read.log, read.lines) == (data, expected_lines(data))
+    log_lines = [line for line in read.lines if not line.startswith(b"{")]
+    assert read.tail == [line.decode("utf-8", "replace") for line in log_lines[-8:]]
+
+
+def test_a_long_line_is_in_the_log_and_its_begin_in_the_tail(tmp_path: Path) -> None:
+    """Longer than a line of the protocol may be, so that it is not one."""
+    long = b"x" * 200_000
+    read = Read(tmp_path, [b"before\n", long, b"\nafter\n", b"end"])
+    assert read.log == b"before\n" + long + b"\nafter\nend"
+    assert read.lines == [b"before", b"after", b"end"]
+    assert read.tail == ["before", "x" * 300, "after", "end"]
+
+
+def test_bytes_that_are_not_utf_8_are_replaced_in_the_tail(tmp_path: Path) -> None:
+    read = Read(tmp_path, [b"caf\xe9\n"])
+    assert (read.log, read.tail) == (b"caf\xe9\n", ["caf\N{REPLACEMENT CHARACTER}"])
+
+
+def test_lines_count_beyond_the_limit_of_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(service_output, "_MAX_LOG", 1 << 20)
+    lines = b"".join(b"%07d\n" % n for n in range(200_000))
+    read = Read(tmp_path, [lines, b'{"dodo": "verdict"}\n'])
+    assert read.lines[-1] == b'{"dodo": "verdict"}'
+    assert len(read.lines) == 200_001
+    assert len(read.log) < (1 << 20) + 100
+    assert read.log.endswith(b"\n... dodo: the log ends here, at 1 MiB\n")
+
+
+def test_a_service_that_keeps_its_output_open_is_not_waited_for(tmp_path: Path) -> None:
+    read = Read(tmp_path, [b"a\n", b"b"], is_hung=True)
+    assert (read.lines, read.log) == ([b"a", b"b"], b"a\nb")
+
+
+def test_a_log_that_cannot_be_written_is_said_in_the_tail(small_disk: Path) -> None:
+    with pytest.raises(OSError, match="No space left"):
+        (small_disk / "rest").write_bytes(bytes(100_000))
+    lines: list[bytes] = []
+
+    async def scene() -> list[str]:
+        output = ServiceOutput(small_disk / "app.log", lambda line: lines.append(line) is not None)
+        os.write(output.writer, b"a\nb\n")
+        output.release_writer()
+        await asyncio.wait_for(output.done.wait(), 10)
+        return output.tail()
+
+    assert asyncio.run(scene())[-1] == "... dodo: the log cannot be written: No space left on device"
+    assert lines == [b"a", b"b"]
+
+
+def test_handing_over_stops_reading_and_keeps_pipe_and_log(tmp_path: Path) -> None:
+    lines: list[bytes] = []
+
+    async def scene() -> tuple[bytes, str]:
+        output = ServiceOutput(tmp_path / "app.log", lambda line: lines.append(line) is not None)
+        reader, log = output.hand_over()
+        os.write(output.writer, b"later\n")
+        await asyncio.sleep(0)
+        os.write(log, b"by another\n")
+        data = os.read(reader, 100)
+        output.release_writer()
+        output.close()
+        return data, (tmp_path / "app.log").read_text()
+
+    assert (asyncio.run(scene()), lines) == ((b"later\n", "by another\n"), [])

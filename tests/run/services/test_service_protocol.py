@@ -1,0 +1,235 @@
+"""Lines for the runner are taken only when they are well-formed and a report can show them."""
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dodo_dsl.margins import with_margin
+from dodo_dsl.outcome import Response
+from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.run.protocol import (
+    Foreign,
+    InputEnded,
+    Late,
+    Malformed,
+    Noted,
+    Overrun,
+    Ready,
+    Responded,
+    Stopped,
+    Time,
+    VerdictEvent,
+)
+from dodo_dsl.run.services.service_protocol import read_line
+
+CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
+JUDGED = {**CHECK, "margin": 0.5, "margin_share": 0.2}
+
+
+def line(**changes: object) -> bytes:
+    return json.dumps({"dodo": "verdict", "outcome": "passed", "reason": "done", "checks": [CHECK], **changes}).encode()
+
+
+def test_a_complete_verdict_is_taken_from_an_evaluator() -> None:
+    assert read_line("track", True, line()) == VerdictEvent("track", True, "done", (JUDGED,))
+    assert read_line("track", True, line(outcome="failed")) == VerdictEvent("track", False, "done", (JUDGED,))
+    assert read_line("track", False, line()) is None
+    assert read_line("camera", False, b'{"dodo": "ready"}\n') == Ready("camera")
+
+
+def test_losses_are_taken_from_every_service() -> None:
+    assert read_line("recorder", False, b'{"dodo": "lost", "messages": 12}\n') == Overrun("recorder", 12)
+    for count in (b"0", b"-1", b"true", b"1.5", b'"12"', b"null", b"1" * 30):
+        assert read_line("track", True, b'{"dodo": "lost", "messages": ' + count + b"}") is None
+
+
+def test_what_the_application_must_not_send_is_taken_from_every_service() -> None:
+    assert read_line("pose", False, b'{"dodo": "foreign", "reason": "so"}') == Foreign("so")
+    assert read_line("pose", False, b'{"dodo": "foreign", "reason": ""}') is None
+
+
+def test_lateness_is_taken_from_every_service() -> None:
+    text = b'{"dodo": "late", "updates": 12, "late": 3, "worst_s": 0.25}\n'
+    assert read_line("camera", False, text) == Late("camera", 12, 3, 0.25)
+    for change in ({"late": 13}, {"late": 0}, {"updates": "12"}, {"worst_s": -1}, {"worst_s": None}, {"late": 1.5}):
+        assert read_line("camera", False, json.dumps({**json.loads(text), **change}).encode()) is None
+
+
+def test_notes_and_the_end_of_the_input_are_taken_from_every_service() -> None:
+    assert read_line("camera", False, b'{"dodo": "end-of-input"}\n') == InputEnded("camera")
+    assert read_line("pose", False, b'{"dodo": "note", "text": "so"}') == Noted("service 'pose': so")
+    for text in (b'""', b"3", b"null", b'"' + b"x" * 3000 + b'"', b'"\\ud800"'):
+        assert read_line("pose", False, b'{"dodo": "note", "text": ' + text + b"}") is None
+
+
+def test_a_verdict_may_carry_the_data_of_its_decision() -> None:
+    evidence = {"time": 5.2, "obstacle": "left", "x": None, "sample-time": 1_700_000_005_200_000}
+    event = read_line("track", True, line(evidence=evidence))
+    assert event == VerdictEvent("track", True, "done", (JUDGED,), evidence)
+    assert isinstance(event, VerdictEvent)
+    assert event.as_json() == {"evaluator": "track", "outcome": "passed", "reason": "done", "evidence": evidence}
+
+
+MALFORMED = {
+    "evidence list": (line(evidence=[1]), "its evidence is not an object of at most 20 values"),
+    "much evidence": (
+        line(evidence={f"a{n}": n for n in range(21)}),
+        "its evidence is not an object of at most 20 values",
+    ),
+    "evidence key": (line(evidence={"No": 1}), 'its evidence has a key "No", expected lower-case words with hyphens'),
+    "long evidence key": (
+        line(evidence={"a" * 41: 1}),
+        f'its evidence has a key "{"a" * 41}", expected lower-case words with hyphens',
+    ),
+    "evidence object": (
+        line(evidence={"x": {}}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "evidence true": (
+        line(evidence={"x": True}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "infinite evidence": (
+        line(evidence={"x": float("inf")}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "long evidence": (
+        line(evidence={"x": "a" * 201}),
+        "'x' of its evidence is neither a finite number nor a short string nor null",
+    ),
+    "no evidence": (line(evidence=None), "its evidence is not an object of at most 20 values"),
+    "no value": (line(checks=[{k: v for k, v in CHECK.items() if k != "value"}]), "check 'time' has no key 'value'"),
+    "no unit": (line(checks=[{k: v for k, v in CHECK.items() if k != "unit"}]), "check 'time' has no key 'unit'"),
+    "no limit": (line(checks=[{k: v for k, v in CHECK.items() if k != "limit"}]), "check 'time' has no key 'limit'"),
+    "no name": (line(checks=[{"value": 1}]), "a check has no name"),
+    "no checks": (line(checks=None), "its checks are not a list"),
+    "unknown key": (line(checks=[{**CHECK, "more": 1}]), "check 'time' has an unknown key 'more'"),
+    "infinite": (line(checks=[{**CHECK, "value": float("inf")}]), "the value of check 'time' is not a finite number"),
+    "huge": (line(checks=[{**CHECK, "value": int("1" * 400)}]), "the value of check 'time' is not a finite number"),
+    "unit": (line(checks=[{**CHECK, "unit": 3}]), "the unit of check 'time' is not a string"),
+    "ok": (line(checks=[{**CHECK, "ok": 1}]), "check 'time': 'ok' is neither true nor false"),
+    "limit": (
+        line(checks=[{**CHECK, "limit": {"most": 1}}]),
+        "the limit of check 'time' is not an object of numbers 'min' and 'max'",
+    ),
+    "surrogate": (line(reason="\ud800"), "its reason is not a string of 1 to 2000 characters of UTF-8"),
+    "empty reason": (line(reason=""), "its reason is not a string of 1 to 2000 characters of UTF-8"),
+    "long reason": (line(reason="x" * 5000), "its reason is not a string of 1 to 2000 characters of UTF-8"),
+    "outcome": (line(outcome="maybe"), 'its outcome is "maybe", expected passed or failed'),
+    "deep": (b'{"dodo": "verdict", "checks": ' + b"[" * 30_000, "its JSON cannot be read"),
+    "unfinished": (line()[:-5], "its JSON cannot be read"),
+}
+
+
+@pytest.mark.parametrize("case", MALFORMED)
+def test_other_verdicts_are_malformed(case: str) -> None:
+    text, problem = MALFORMED[case]
+    assert read_line("track", True, text) == Malformed("track", problem)
+    assert read_line("camera", False, text) is None
+
+
+RESPONSE = {
+    "answers": 3,
+    "period_s": 0.1,
+    "median_s": 0.01,
+    "p95_s": 0.02,
+    "worst_s": 0.03,
+    "processor_median_s": None,
+    "processor_p95_s": None,
+    "processor_worst_s": None,
+    "slow": 0,
+    "over": 1,
+    "processor": "",
+}
+
+
+def response(**changes: object) -> str:
+    return json.dumps({"dodo": "response", **RESPONSE, **changes})
+
+
+CLOCKED = {
+    response(): Responded(Response(**RESPONSE)),  # type: ignore[arg-type]
+    response(answers=0): None,
+    response(over=4): None,
+    response(slow=-1): None,
+    response(median_s=None): None,
+    response(worst_s=-1): None,
+    response(p95_s="0.1"): None,
+    response(processor=7): Responded(Response(**RESPONSE)),  # type: ignore[arg-type]
+    '{"dodo": "time", "s": 1.5}': Time(1.5, False),
+    '{"dodo": "time", "s": 2, "last": true}': Time(2.0, True),
+    '{"dodo": "time", "s": 2, "last": 1}': Time(2.0, False),
+    '{"dodo": "time", "s": null}': None,
+    '{"dodo": "time"}': None,
+    '{"dodo": "unanswered", "reason": "no answer"}': Stopped("unanswered", "no answer"),
+    '{"dodo": "stuck", "reason": "x"}': Stopped("stuck", "x"),
+    '{"dodo": "timedout", "reason": ""}': Stopped("timedout", ""),
+    '{"dodo": "stuck", "reason": 3}': None,
+    '{"dodo": "stuck"}': None,
+    '{"dodo": ["stuck"], "reason": "x"}': None,
+}
+
+
+@pytest.mark.parametrize("text", CLOCKED)
+def test_only_the_clock_reports_time(text: str) -> None:
+    assert read_line(CLOCK, False, text.encode()) == CLOCKED[text]
+    assert read_line("track", True, text.encode()) is None
+
+
+@pytest.mark.parametrize(
+    "text", [b"", b"ready", b"{}", b'{"dodo": 3}', b'["dodo"]', b'  {"ready": "dodo"}', b'{"dodo"']
+)
+def test_other_lines_are_log(text: bytes) -> None:
+    assert read_line("track", True, text) is None
+
+
+NAMES = st.text(st.characters(blacklist_categories=("Cs",)), min_size=1, max_size=20)
+FINITE = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**9), 10**9)
+CHECKS = st.fixed_dictionaries(
+    {
+        "name": NAMES,
+        "value": st.none() | FINITE,
+        "limit": st.dictionaries(st.sampled_from(["min", "max"]), FINITE),
+        "unit": st.just("") | NAMES,
+        "ok": st.booleans(),
+    }
+)
+
+
+@settings(max_examples=50)
+@given(st.booleans(), NAMES, st.lists(CHECKS, max_size=4), st.booleans())
+def test_every_well_formed_verdict_is_taken(
+    passed: bool, reason: str, checks: list[dict[str, Any]], ascii_: bool
+) -> None:
+    document = {"dodo": "verdict", "outcome": "passed" if passed else "failed", "reason": reason, "checks": checks}
+    text = json.dumps(document, ensure_ascii=ascii_).encode()
+    expected = VerdictEvent("track", passed, reason, tuple(map(with_margin, checks)))
+    assert read_line("track", True, b" " + text + b"\r\n") == expected
+
+
+@given(st.binary(max_size=200) | st.text(max_size=100).map(lambda t: ('{"dodo": ' + t).encode("utf-8", "replace")))
+def test_any_line_is_read(raw: bytes) -> None:
+    for is_evaluator in (True, False):
+        read_line(CLOCK, is_evaluator, raw)
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from([*CHECK, "min", "max"]), inner, max_size=6)
+    ),
+    max_leaves=8,
+)
+KINDS = st.sampled_from(["verdict", "ready", "lost", "time", "stuck"]) | VALUES
+
+
+@given(
+    st.fixed_dictionaries(
+        {"dodo": KINDS}, optional=dict.fromkeys(("outcome", "reason", "checks", "messages", "s"), VALUES)
+    )
+)
+def test_any_message_is_read(message: dict[str, Any]) -> None:
+    read_line(CLOCK, True, json.dumps(message).encode())
