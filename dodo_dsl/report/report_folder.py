@@ -4,26 +4,28 @@ import contextlib
 import os
 import platform
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.plan.recorder_service import RECORDING, SNAPSHOT
-from dodo_dsl.report import html, junit, metrics, results
+from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING, SNAPSHOT
+from dodo_dsl.report import check_history, html, junit, links, metrics, results
 from dodo_dsl.report.changes import markdown
 from dodo_dsl.report.changes.comparison import Comparison
-from dodo_dsl.report.duration_plot import Times
-from dodo_dsl.report.duration_plot import draw as draw_times
-from dodo_dsl.report.trajectory import read_drive
+from dodo_dsl.report.pictures.duration_plot import Times
+from dodo_dsl.report.pictures.duration_plot import draw as draw_times
+from dodo_dsl.report.pictures.trajectory import read_drive
 from dodo_dsl.report.viewer import names as viewer
 from dodo_dsl.spec.instances.matrix import SLUG
 from dodo_dsl.spec.registry import SUFFIX
 
 TRAJECTORY = "trajectory.png"
 TIMES = "times.svg"
+OF_MACHINE = (TIMES, check_history.FILE_NAME)
+"""Of earlier runs on one machine."""
 ATTEMPTS = "attempts"
 SANDBOX_LOG = "sandbox.log"
 _LONGEST_PATH = 1000
@@ -37,19 +39,19 @@ class Drawable:
     folder: Path
 
 
-def forget(folder: Path, slugs: Sequence[str]) -> int:
-    """Removes the reports of an earlier run, and those of ``slugs``; other files stay.
+def forget(folder: Path, slugs: Sequence[str], others: Collection[str] = ()) -> int:
+    """Removes the reports of an earlier run but for its tests ``others``, and those of ``slugs``; other files stay.
 
-    Returns how many tests of the earlier run are not among ``slugs``.
+    Returns how many tests of the earlier run are among neither.
     """
     try:
         earlier = [outcome.slug for outcome in results.load(folder / results.FILE_NAME)]
     except results.ResultsError:
         earlier = []
-    for slug in {*slugs, *earlier}:
+    for slug in {*slugs, *earlier} - {*others}:
         if SLUG.fullmatch(slug):
             _forget_test(folder / slug)
-    return len({*earlier} - {*slugs})
+    return len({*earlier} - {*slugs} - {*others})
 
 
 def _forget_test(place: Path) -> None:
@@ -59,7 +61,7 @@ def _forget_test(place: Path) -> None:
     for name in (viewer.LOGS, ATTEMPTS):
         with contextlib.suppress(OSError):
             (place / name).unlink() if (place / name).is_symlink() else shutil.rmtree(place / name)
-    for name in (RECORDING, TRAJECTORY, SNAPSHOT, SANDBOX_LOG, *viewer.FILES):
+    for name in (RECORDING, PICTURES_FILE, TRAJECTORY, SNAPSHOT, SANDBOX_LOG, *viewer.FILES):
         (place / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # there is none, or it holds what others put there
         place.rmdir()
@@ -70,10 +72,12 @@ def write_report(
     outcomes: Sequence[Outcome],
     tests: Mapping[str, Drawable],
     times: Mapping[str, Sequence[Times]] | None = None,
+    past: check_history.Past | None = None,
 ) -> list[str]:
     """Writes the results first, draws each drive, and returns sentences on what could not be drawn.
 
-    ``times`` are those of all runs of these tests on this machine; they are drawn as well.
+    ``times`` are those of all runs of these tests on this machine, ``past`` what their checks measured in the latest;
+    they are drawn as well.
     """
     outcomes = [results.writable(outcome) for outcome in outcomes]
     folder.mkdir(parents=True, exist_ok=True)
@@ -85,7 +89,10 @@ def write_report(
                 _draw(folder / outcome.slug, outcome, tests[outcome.slug])
             except Exception as error:  # noqa: BLE001  (the data comes from services, and no plot may cost a verdict)
                 problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
-    (folder / TIMES).unlink(missing_ok=True)
+    for name in OF_MACHINE:
+        (folder / name).unlink(missing_ok=True)
+    if past:
+        check_history.write(folder, past)
     if times:
         try:
             atomic.write_text(folder / TIMES, draw_times(times, platform.node() or "this machine"))
@@ -94,7 +101,7 @@ def write_report(
     write_summaries(folder, outcomes)  # first, as the pages take the most room
     problems += _write_pages(folder, outcomes, tests)
     if tests:
-        _write_index(folder, outcomes)
+        _write_linked(folder, outcomes)
     return problems
 
 
@@ -124,26 +131,28 @@ def write_summaries(folder: Path, outcomes: Sequence[Outcome], comparison: Compa
 
     Without one, that of an earlier report is removed. Raises OSError.
     """
-    pictures = {o.slug: _pictures(folder, o) for o in outcomes}
-    attachments = {slug: f"{_shown(folder)}/{found[0].path}" for slug, found in pictures.items() if found}
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes))
-    with atomic.replacing(folder / "junit.xml") as part:
-        junit.write(part, outcomes, attachments)
     atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
     markdown.write(folder, comparison)
-    _write_index(folder, outcomes, comparison)
+    _write_linked(folder, outcomes, comparison)
 
 
-def _write_index(folder: Path, outcomes: Sequence[Outcome], comparison: Comparison | None = None) -> None:
-    """The page of the run, with links to what there is."""
+def _write_linked(folder: Path, outcomes: Sequence[Outcome], comparison: Comparison | None = None) -> None:
+    """JUnit and the page of the run, with links to what there is."""
+    pictures = {o.slug: _pictures(folder, o) for o in outcomes}
+    shown, pages = _shown(folder), _named(folder, outcomes, viewer.PAGE)
+    with atomic.replacing(folder / "junit.xml") as part:
+        attachments = {slug: f"{shown}/{found[0].path}" for slug, found in pictures.items() if found}
+        junit.write(part, outcomes, attachments, links.to_moments(outcomes, pages, shown))
     times = TIMES if (folder / TIMES).is_file() else ""
     files = html.ReportFiles(
-        {o.slug: _pictures(folder, o) for o in outcomes},
+        pictures,
         _logs(folder, outcomes),
         _named(folder, outcomes, RECORDING),
         _specs(folder, outcomes),
-        _named(folder, outcomes, viewer.PAGE),
+        pages,
         times,
+        check_history.read(folder),
     )
     atomic.write_text(folder / "index.html", html.render(outcomes, files, comparison))
 
@@ -191,7 +200,7 @@ def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
     drive = read_drive(test.plan, test.folder, folder / RECORDING)
     if drive is None:
         return
-    from dodo_dsl.report.trajectory_plot import draw
+    from dodo_dsl.report.pictures.trajectory_plot import draw
 
     with atomic.replacing(folder / TRAJECTORY) as part:
         draw(drive, outcome, part)

@@ -1,0 +1,3 @@
+"""Records the bus; tests with cameras have their pictures encoded, too."""
+
+LIBRARIES = ("av", "services.rec_recorder.pictures")

@@ -1,5 +1,6 @@
 """Pictures of shared memory as `opendlv.proxy.ImageReading` messages; only recorders of frames load this."""
 
+import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,10 +9,13 @@ from typing import Any
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.memory import pixels
 from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.video.decoder import VideoError
 from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder
-from services.rec_recorder.source import Source
+from services.rec_recorder.source import Source, SourceError
 
 MESSAGE = "opendlv.proxy.ImageReading"
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,7 @@ class Quality:
     key_interval: int
     quality: int
     lossless: bool
+    fast: bool = False
 
 
 class RecordedCamera:
@@ -42,7 +47,7 @@ class RecordedCamera:
         layout = self._source.spec.layout(len(data))
         if self._encoder is None or layout != self._layout:
             quality = self._quality
-            self._encoder = VideoEncoder(*layout, quality.key_interval, quality.quality, quality.lossless)
+            self._encoder = VideoEncoder(*layout, quality.key_interval, quality.quality, quality.lossless, quality.fast)
             self._layout = layout
         message = self._message(self._encoder.encode(pixels.view(data, *layout)))
         sent = time.time_ns() // 1000
@@ -66,12 +71,19 @@ class RecordedCamera:
 
 
 class Cameras:
-    """All memories that are recorded: each picture goes to `write` while `is_on`."""
+    """All memories that are recorded: each picture goes to `write` while `is_on`.
+
+    Where pictures are not ``required``, a camera whose pictures cannot be encoded is logged and left out.
+    """
 
     def __init__(
-        self, cameras: Sequence[RecordedCamera], write: Callable[[Envelope], None], is_on: Callable[[], bool]
+        self,
+        cameras: Sequence[RecordedCamera],
+        write: Callable[[Envelope], None],
+        is_on: Callable[[], bool],
+        required: bool = True,
     ) -> None:
-        self._cameras, self._write, self._is_on = cameras, write, is_on
+        self._cameras, self._write, self._is_on, self._required = list(cameras), write, is_on, required
         self._was_on = True
 
     def update(self, now: int) -> None:
@@ -79,13 +91,24 @@ class Cameras:
         if not self._is_on():
             self._was_on = False
             return
-        for camera in self._cameras:
+        for camera in tuple(self._cameras):
             if not self._was_on:
                 camera.restart()
-            envelope = camera.envelope(now)
+            envelope = self._taken(camera, now)
             if envelope is not None:
                 self._write(envelope)
         self._was_on = True
+
+    def _taken(self, camera: RecordedCamera, now: int) -> Envelope | None:
+        try:
+            return camera.envelope(now)
+        except (SourceError, VideoError) as error:
+            if self._required:
+                raise
+            _log.warning("no pictures are recorded: %s", error)
+            self._cameras.remove(camera)
+            camera.close()
+            return None
 
     def close(self) -> None:
         """Detach from all memories."""

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from services.rec_recorder.snapshot import SnapshotWriter
 
 LOOKS_HZ, SNAPSHOT_LOOKS_HZ = 200.0, 20.0
+"""Times a second at most that memories are looked at."""
+FAST_LOOKS = 4
+"""Looks a picture at most where the newest pictures are kept, of which none has to be exactly in time."""
 COMMAND = "cluon.data.RecorderCommand"
 MEGABYTE = 1_000_000
 
@@ -27,12 +30,17 @@ class Recorder(Service):
     has_begun = False
 
     def __init__(
-        self, recording: RecordingFile, cameras: "Cameras | None", snapshot: "SnapshotWriter | None", commands: bool
+        self,
+        recording: RecordingFile,
+        cameras: "Cameras | None",
+        snapshot: "SnapshotWriter | None",
+        commands: bool,
+        looks_hz: float = LOOKS_HZ,
     ) -> None:
         self.observe = recording.write
         self._recording, self._cameras, self._snapshot = recording, cameras, snapshot
         if cameras is not None:
-            self.period = period_of(LOOKS_HZ)
+            self.period = period_of(looks_hz)
         elif snapshot is not None:
             self.period = period_of(SNAPSHOT_LOOKS_HZ)
         if commands:
@@ -61,14 +69,17 @@ def build(context: Context) -> Service:
     for name in ("frames", "snapshot"):
         if flags[name] and not memories:
             raise ValueError(f"--{name} needs --memories: the names of the shared memories to record")
+    if flags["pictures"] and not flags["frames"]:
+        raise ValueError("--pictures needs --frames: the rate of the pictures")
     max_size = flags["max-size"] and round(flags["max-size"] * MEGABYTE)
     recording = context.resources.enter_context(RecordingFile(Path(flags["rec"]), max_size, _traffic(context)))
     if flags["paused"]:
         recording.is_on = False
-    sources = [Source(spec, round(period_of(flags["frames"]))) for spec in memories if flags["frames"]]
+    period, is_stepped = flags["frames"] and round(period_of(flags["frames"])), context.clock.relays
+    sources = [Source(spec, period, is_stepped=is_stepped) for spec in memories if flags["frames"]]
     cameras = _cameras(context, sources, recording) if sources else None
     snapshot = _snapshot(context, Path(flags["snapshot"]), memories[0]) if flags["snapshot"] else None
-    recorder = Recorder(recording, cameras, snapshot, flags["commands"])
+    recorder = Recorder(recording, cameras, snapshot, flags["commands"], _looks_hz(context))
     context.resources.callback(_end, recorder, recording, context)
     return recorder
 
@@ -82,6 +93,14 @@ def _traffic(context: Context) -> Traffic:
     limit = round(context.flags["limit"] * MEGABYTE)
     now = None if context.clock.relays else context.clock.now
     return Traffic(limit, now, lambda: session.lost if session else 0, name)
+
+
+def _looks_hz(context: Context) -> float:
+    """How often memories are looked at; in lockstep a picture waits for the step that it belongs to."""
+    rate: float = context.flags["frames"]
+    if not (rate and context.flags["pictures"]):
+        return LOOKS_HZ
+    return min(LOOKS_HZ, rate if context.clock.relays else max(FAST_LOOKS * rate, SNAPSHOT_LOOKS_HZ))
 
 
 def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None:
@@ -100,17 +119,23 @@ def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "SnapshotWrit
 
 
 def _cameras(context: Context, sources: list[Source], recording: RecordingFile) -> "Cameras":
+    from services.rec_recorder.newest import NewestPictures
     from services.rec_recorder.pictures import Cameras, Quality, RecordedCamera
 
     flags = context.flags
-    quality = Quality(flags["key-interval"], flags["quality"], flags["lossless"])
+    newest = None
+    if flags["pictures"]:
+        newest = NewestPictures(Path(flags["pictures"]), round(flags["pictures-size"] * MEGABYTE))
+        context.resources.callback(newest.close)
+    quality = Quality(flags["key-interval"], flags["quality"], flags["lossless"], fast=newest is not None)
     cameras = Cameras(
         [
             RecordedCamera(source, quality, context.messages, flags["id"] + number)
             for number, source in enumerate(sources)
         ],
-        recording.write,
-        lambda: recording.is_on,
+        newest.write if newest else recording.write,
+        lambda: recording.is_on and (newest is None or newest.is_on),
+        required=newest is None,
     )
     context.resources.callback(cameras.close)
     return cameras

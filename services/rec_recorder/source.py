@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 
 RETRY = 200_000
-PATIENCE = 0.05
+PATIENCE, STEPPED_PATIENCE = 0.05, 2.0
+"""Seconds to wait for a memory's lock; in lockstep nothing is lost by waiting for a reader that gets no processor."""
 COMMON_SIZES = (
     (320, 240), (640, 360), (640, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024),
     (1640, 1232), (1920, 1080), (2592, 1944), (3280, 2464),
@@ -65,11 +66,20 @@ class Source:
     """The newest picture of a memory, at most one each `period` microseconds of its own sample times.
 
     It polls the memory and never waits for a notification, so that a camera that counts its readers does not see it.
-    What was in the memory at first is skipped, as it may not be a picture yet.
+    What was in the memory at first is skipped, as it may not be a picture yet; in lockstep (``is_stepped``) it is one
+    if it has a sample time of the test.
     """
 
-    def __init__(self, spec: MemorySpec, period: int, attach: Callable[[str], SharedMemory] | None = None) -> None:
+    def __init__(
+        self,
+        spec: MemorySpec,
+        period: int,
+        attach: Callable[[str], SharedMemory] | None = None,
+        is_stepped: bool = False,
+    ) -> None:
         self.spec = spec
+        self._is_stepped = is_stepped
+        self._patience = STEPPED_PATIENCE if is_stepped else PATIENCE
         self._period = period
         self._attach = attach or SharedMemory.attach
         self._memory: SharedMemory | None = None
@@ -88,9 +98,10 @@ class Source:
             if self._memory is None and not self._found(now):
                 return None
             assert self._memory is not None
-            with self._memory.lock(PATIENCE):
+            with self._memory.lock(self._patience):
                 time = self._memory.sample_time()
-                return (bytes(self._memory.buffer), time) if self._is_due(time) else None
+                is_picture = not self._is_stepped or time <= now
+                return (bytes(self._memory.buffer), time) if is_picture and self._is_due(time) else None
         except SharedMemoryError as error:
             _log.debug("no picture of '%s': %s", self.spec.name, error)
             if not self._is_there():
@@ -101,7 +112,7 @@ class Source:
     def skip(self) -> None:
         """Skip the picture that is there now."""
         if self._memory is not None:
-            with suppress(SharedMemoryError), self._memory.lock(PATIENCE):
+            with suppress(SharedMemoryError), self._memory.lock(self._patience):
                 self._last, self._due = self._memory.sample_time(), None
 
     def close(self) -> None:
@@ -125,8 +136,8 @@ class Source:
             return False
         memory = self._attach(self.spec.name)
         try:
-            with memory.lock(PATIENCE):
-                self._last, self._due = memory.sample_time(), None
+            with memory.lock(self._patience):
+                self._last, self._due = 0 if self._is_stepped else memory.sample_time(), None
         except SharedMemoryError:
             memory.close()
             raise

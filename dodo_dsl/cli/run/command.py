@@ -17,15 +17,17 @@ from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.loading import Loading, loading
 from dodo_dsl.cli.run.profile import COMMAND, FILE_NAME, Profile, ProfiledProgress
+from dodo_dsl.cli.run.report_lock import reserved
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.report_folder import Drawable, forget, write_report
-from dodo_dsl.run.backends import Backends, Containers, Job, Processes
+from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.history import History
+from dodo_dsl.run.mixed.choice import choose
 from dodo_dsl.run.rigs.attendance import is_real
-from dodo_dsl.run.runner import Policy, Runner, default_backend
+from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.spec.deployment.deployment import Deployment
@@ -38,6 +40,7 @@ EXAMPLES = """examples:
   dodo run 'sil-*' -j 4                        by pattern, four at a time
   dodo run --application ../app/docker-compose.yml --level sil
   dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
+  dodo run sil-closed-straight --watch         again whenever spec, map or application are saved
   dodo run --compiled generated/sil-closed-straight --report dodo-report
 
 exit codes: 0 all passed, 1 some failed, 2 wrong usage or spec, 3 some ended in error, 130 interrupted
@@ -50,7 +53,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--level", action="append", choices=LEVELS, default=[], help="only tests of this level; repeatable"
     )
     parser.add_argument(
-        "--backend", choices=("process", "docker"), help="default: process, if the application allows it"
+        "--backend",
+        choices=("process", "docker", "mixed"),
+        help="where services run; mixed: the application in containers, DoDo's own as processes (default: process, if "
+        "the application allows it; else mixed on a rig, or where DoDo's images are missing; else docker)",
     )
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
@@ -68,6 +74,8 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
     parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="folder of a compiled test")
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
+    parser.add_argument("--watch", action="store_true",
+                        help="run again, in lockstep, what a saved file affects, and show the change")  # fmt: skip
     parser.add_argument("--profile", action="store_true", help="show where the time went, and write DIR/profile.json")
     selection.add_application(parser)
 
@@ -79,12 +87,17 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     profile = Profile()
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
+    if options.watch:
+        from dodo_dsl.cli.run import watch
+
+        return watch.main(options, stdout)
     with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
         profile.enter(COMMAND, "compile")
         jobs, deployment = prepare(options, folder.path, stdout)
         _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-        runner = _runner(options, jobs, deployment, stdout, load, profile)
-        outcomes, is_reported = _run(runner, jobs, options.report, stdout, profile)
+        runner = runner_of(options, jobs, deployment, stdout, load, profile)
+        with reserved(options.report, stdout):
+            outcomes, is_reported = run(runner, jobs, options.report, stdout, profile)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
@@ -109,7 +122,7 @@ def _refuse_to_keep(plans: Sequence[Plan]) -> None:
             )
 
 
-def _runner(
+def runner_of(
     options: argparse.Namespace,
     jobs: Sequence[Job],
     deployment: Deployment,
@@ -117,8 +130,9 @@ def _runner(
     load: Loading,
     profile: Profile,
 ) -> Runner:
+    """The runner of these jobs, announced."""
     plans = [job.plan for job in jobs]
-    backend = options.backend or default_backend(plans)
+    backend = options.backend or choose(plans)
     order = schedule(options.jobs, expectation(backend), usage(backend))
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{forecast(order, jobs, backend)}\n")
@@ -130,17 +144,21 @@ def _runner(
 def _backends(
     options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, load: Loading
 ) -> Backends:
-    if backend == "docker":
+    roots = _roots(options, deployment)
+    if backend != "process":
+        from dodo_dsl.run.docker.containers import Containers
+        from dodo_dsl.run.mixed.backends import Mixed
+
         if options.compiled and options.isolation not in (None, plans[0].isolation):
             raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
-        return Containers(subnets(deployment.subnets), _roots(options, deployment))
+        containers = Containers(subnets(deployment.subnets), roots)
+        return containers if backend == "docker" else Mixed(containers, (load.descriptor,), roots, load.take)
     without = sorted({s.name for p in plans for s in p.application.services if not s.process})
     if without:
-        advice = "add for example 'x-dodo-process: [python, main.py]', or run with --backend docker"
+        advice = "add for example 'x-dodo-process: [python, main.py]', or run with --backend mixed or docker"
         raise UsageError(
             f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
         )
-    roots = _roots(options, deployment)
     return Processes(deployment.cids, options.isolation, (load.descriptor,), roots, load.take)
 
 
@@ -150,11 +168,19 @@ def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:
     return [deployment.root, *named]
 
 
-def _run(
-    runner: Runner, jobs: Sequence[Job], report: Path, stdout: TextIO, profile: Profile
+def run(
+    runner: Runner,
+    jobs: Sequence[Job],
+    report: Path,
+    stdout: TextIO,
+    profile: Profile,
+    others: Sequence[Outcome] = (),
 ) -> tuple[list[Outcome], bool]:
-    """The outcomes, and whether the report holds all of them; they are printed in any case."""
-    gone = forget(report.resolve(), [job.plan.slug for job in jobs])
+    """The outcomes, and whether the report holds all of them; they are printed in any case.
+
+    ``others`` are outcomes of tests that did not run again and stay in the report.
+    """
+    gone = forget(report.resolve(), [job.plan.slug for job in jobs], {outcome.slug for outcome in others})
     profile.enter(COMMAND, "run")
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
@@ -166,10 +192,11 @@ def _run(
         history = History()
         history.add((tests[outcome.slug], outcome) for outcome in outcomes)
         times = history.times({(job.plan.spec, job.test) for job in jobs}, runner.backends.name)
+        past = {o.slug: history.checks(o.spec, tests[o.slug], o.backend, o.clock) for o in outcomes}
         drawables = {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs}
         problems, unwritten = [], ""
         try:
-            problems = write_report(report, outcomes, drawables, times)
+            problems = write_report(report, [*outcomes, *others], drawables, times, past)
         except Exception as error:  # noqa: BLE001  (the outcomes are printed)
             why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
             unwritten = f"'{report}' cannot take the whole report: {why}"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl import atomic
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.compiler import NoApplication, plan
@@ -58,9 +59,12 @@ def _deployment(stdout: TextIO) -> Deployment:
 
 
 def _usable(report: Path, slugs: Sequence[str]) -> Path:
-    """The report's folder, made; a folder of specs or of compiled tests is refused."""
+    """The report's folder, made, and then left out of git; a folder of specs or of compiled tests is refused."""
+    is_new = not report.exists()
     try:
         report.mkdir(parents=True, exist_ok=True)
+        if is_new:
+            atomic.write_text(report / ".gitignore", "*\n")
     except OSError as error:
         raise UsageError(f"'{report}' cannot take the report: {error.strerror}") from error
     for slug in slugs:

@@ -14,6 +14,7 @@ from typing import Self
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.runner import Progress
+from dodo_dsl.run.standing import Standing
 
 FILE_NAME = "profile.json"
 COMMAND = "dodo run"
@@ -117,6 +118,9 @@ class ProfiledProgress:
     def phase(self, slug: str, text: str) -> None:
         self._profile.enter(slug, text)
         self._shown.phase(slug, text)
+
+    def standing(self, slug: str, standing: Standing) -> None:
+        self._shown.standing(slug, standing)
 
     def done(self, outcome: Outcome) -> None:
         self._profile.leave(outcome.slug)

@@ -1,13 +1,15 @@
-"""Live progress of a run: a moving display on a terminal, plain lines elsewhere."""
+"""Live progress of a run: a table on a terminal, plain lines elsewhere."""
 
 import time
 from collections.abc import Sequence
-from typing import Any, Self, TextIO
+from typing import Self, TextIO
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.terminal import printable, unescaped
+from dodo_dsl.run.runner import Progress
+from dodo_dsl.run.standing import Standing
+from dodo_dsl.terminal import printable
 
-_STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
+STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
 
 
 def summary_line(outcome: Outcome, width: int) -> str:
@@ -39,54 +41,14 @@ class PlainProgress:
     def phase(self, slug: str, text: str) -> None:
         self.note(f"[{time.monotonic() - self.start:6.1f} s] {slug:<{self.width}}  {text}")
 
+    def standing(self, slug: str, standing: Standing) -> None:
+        """How far a test is takes no line of its own."""
+
     def done(self, outcome: Outcome) -> None:
         self.phase(outcome.slug, outcome.outcome)
 
     def rest(self, seconds: float, tests: int) -> None:
         self.note(f"[{time.monotonic() - self.start:6.1f} s] {count(tests)} to go, {about(seconds)}")
-
-
-class LiveProgress:
-    """One moving line per test. Texts of services are never read as rich's markup."""
-
-    def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
-        from rich.console import Console
-        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-        fields = ("description", "fields[outcome]", "fields[state]")
-        columns = [TextColumn(f"{{task.{name}}}", markup=name == "fields[outcome]") for name in fields]
-        self._progress: Any = Progress(
-            SpinnerColumn(), *columns, TimeElapsedColumn(), console=Console(file=unescaped(stream))
-        )
-        self._rest: Any = None
-        self._tasks = {s: self._add(s, "waiting") for s in slugs}
-
-    def _add(self, description: str, state: str) -> Any:
-        return self._progress.add_task(description, total=None, start=not description, outcome="", state=state)
-
-    def __enter__(self) -> Self:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def note(self, text: str) -> None:
-        self._progress.console.print(printable(text), markup=False, emoji=False)
-
-    def phase(self, slug: str, text: str) -> None:
-        self._progress.start_task(self._tasks[slug])
-        self._progress.update(self._tasks[slug], state=printable(text))
-
-    def done(self, outcome: Outcome) -> None:
-        style = _STYLES[outcome.outcome]
-        text = f"[{style}]{outcome.outcome}[/]"
-        self._progress.update(self._tasks[outcome.slug], outcome=text, state="", total=1, completed=1)
-
-    def rest(self, seconds: float, tests: int) -> None:
-        if self._rest is None:
-            self._rest = self._add("", "")
-        self._progress.update(self._rest, state=f"{count(tests)} to go, {about(seconds)}")
 
 
 def count(number: int, what: str = "test") -> str:
@@ -98,5 +60,9 @@ def about(seconds: float) -> str:
     return f"about {seconds / 60:.0f} min" if seconds > 180 else f"about {seconds:.0f} s"
 
 
-def choose(stream: TextIO, slugs: Sequence[str]) -> PlainProgress | LiveProgress:
-    return LiveProgress(stream, slugs) if stream.isatty() else PlainProgress(stream, slugs)
+def choose(stream: TextIO, slugs: Sequence[str]) -> Progress:
+    if not stream.isatty():
+        return PlainProgress(stream, slugs)
+    from dodo_dsl.cli.run.live import LiveProgress
+
+    return LiveProgress(stream, slugs)

@@ -5,6 +5,7 @@ import json
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dodo_dsl.terminal import printable
 
@@ -27,7 +28,12 @@ def shown(text: object, most: int = MOST_TEXT) -> str:
     return printable(line[:most]) + more
 
 
-def script(document: Any) -> str:
+def unpacked(text: str) -> NDArray[np.float32]:
+    """The numbers that ``packed`` made this of; raises ValueError."""
+    return np.frombuffer(base64.b64decode(text, validate=True), "<f4")
+
+
+def script(document: Any, variable: str = VARIABLE) -> str:
     """A classic script that assigns a JSON value; only ASCII, and no character that begins a tag."""
     text = json.dumps(document, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return "var " + VARIABLE + " = " + text.replace("<", "\\u003c") + ";\n"
+    return "var " + variable + " = " + text.replace("<", "\\u003c") + ";\n"

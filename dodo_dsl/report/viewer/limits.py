@@ -13,6 +13,7 @@ from dodo_dsl.report.viewer.scene import flags_of
 
 _OTHER_NAMES = {
     "time-to-goal": ("max-time", "goal"),
+    "to-goal": ("goal", "gates"),
     "wall-margin": ("min-margin", "walls"),
     "answered": ("min-frames",),
 }

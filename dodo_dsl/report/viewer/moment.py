@@ -8,7 +8,8 @@ from dodo_dsl.outcome import Outcome
 
 _GAPS = ("gap", "coverage", "unanswered")
 """Checks that a hole decides, with its begin as evidence."""
-_END = "the end of the test"
+END = "the end of the test"
+"""What a test has that no verdict decided."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,12 @@ def decisive(outcome: Outcome, duration: float) -> Moment:
     """The evidence of the verdict that became the outcome; without one the end, as what else decides ends a test."""
     verdict = next((v for v in outcome.verdicts if v.get("reason") == outcome.reason), None)
     if verdict is None or not isinstance(verdict.get("evidence"), Mapping):
-        return Moment(duration, _END)
+        return Moment(duration, END)
     evidence = verdict["evidence"]
     failed = {check["name"] for check in outcome.checks if not check["ok"]}
     time = _time(evidence, failed)
     if time is None:
-        return Moment(duration, _END)
+        return Moment(duration, END)
     return Moment(
         min(max(time[0], 0.0), max(duration, time[0])), time[1], _number(evidence.get("x")), _number(evidence.get("y"))
     )

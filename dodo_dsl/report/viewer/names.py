@@ -7,5 +7,7 @@ LOGS = "logs"
 """The folder of the services' logs in that of a test."""
 VIDEOS = tuple(f"camera-{number}.mp4" for number in range(4))
 """Of the cameras of a test."""
-FILES = (PAGE, DATA, *VIDEOS)
+BEFORE = "before.js"
+"""The way of the same test in another report, where they are compared."""
+FILES = (PAGE, DATA, BEFORE, *VIDEOS)
 """In the folder of each test."""

@@ -10,13 +10,14 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.odvd.tokens import OdvdError
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.plan.recorder_service import RECORDING
+from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING
 from dodo_dsl.report.viewer import boxes, judged, limits, log_lines, moment, pictures, recorded, scene
 from dodo_dsl.report.viewer.encoded import packed, script, shown
-from dodo_dsl.report.viewer.names import DATA, LOGS, PAGE, SHARED
+from dodo_dsl.report.viewer.names import BEFORE, DATA, LOGS, PAGE, SHARED
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
 
 VERSION = 1
+_OF_BEFORE = f'<script defer src="{BEFORE}"></script>\n'
 
 
 def write_shared(report: Path) -> None:
@@ -35,8 +36,11 @@ def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
 
 
 def write_html(folder: Path) -> None:
-    """The page alone, which is the same for all tests; raises OSError."""
-    atomic.write_bytes(folder / PAGE, (_sources() / PAGE).read_bytes())
+    """The page alone: the same for all tests, but for whether there is a way to compare with. Raises OSError."""
+    text = (_sources() / PAGE).read_text(encoding="utf-8")
+    if not (folder / BEFORE).is_file():
+        text = text.replace(_OF_BEFORE, "")
+    atomic.write_text(folder / PAGE, text)
 
 
 def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict[str, Any]:
@@ -82,7 +86,7 @@ def _facts(outcome: Outcome) -> dict[str, Any]:
 
 
 def _videos(folder: Path, test: RecordedTest, messages: MessageSet) -> list[dict[str, Any]]:
-    found = pictures.write(folder, folder / RECORDING, test, messages)
+    found = pictures.write(folder, [folder / RECORDING, folder / PICTURES_FILE], test, messages)
     return [{"problem": each} if isinstance(each, str) else dataclasses.asdict(each) for each in found]
 
 

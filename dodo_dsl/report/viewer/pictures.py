@@ -7,15 +7,17 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dodo_dsl import atomic
 from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
 from dodo_dsl.opendlv.video.picture_size import too_large
 from dodo_dsl.report.viewer.names import VIDEOS
 from dodo_dsl.report.viewer.recorded import MICROSECONDS, PICTURES, RecordedTest
 
-MOST_BYTES = 16 << 20
-"""Of one video; the oldest frames are left out."""
+MOST_BYTES = 32_000_000
+"""Of all videos of a test, in equal parts; the oldest frames are left out."""
 _FORMATS = ("h264", "H264")
 _START, _IDR, _SET = b"\x00\x00\x01", 5, 7
 
@@ -36,19 +38,30 @@ class Video:
     """Frames before them that are left out."""
 
 
-def write(folder: Path, recording: Path, test: RecordedTest, messages: MessageSet) -> Iterator[Video | str]:
-    """A video in ``folder`` of each camera of a test, a few at most, or a sentence on why there is none."""
-    senders = [channel.sender for channel in test.channels if channel.message == PICTURES]
-    for sender, name in zip(senders, VIDEOS, strict=False):
+def write(folder: Path, recordings: Sequence[Path], test: RecordedTest, messages: MessageSet) -> Iterator[Video | str]:
+    """A video in ``folder`` of each camera in a test's recordings, a few at most, or a sentence on why not."""
+    cameras = [(path, sender) for path in recordings for sender in _senders(path, messages)]
+    cameras = cameras[: len(VIDEOS)]
+    for (path, sender), name in zip(cameras, VIDEOS, strict=False):
         try:
-            yield _write(folder / name, recording, sender, test.begin, messages)
+            images = _images(path, sender, messages)
+            yield _write(folder / name, images, test.begin, MOST_BYTES // len(cameras))
         except NoVideo as problem:
             yield str(problem)
 
 
-def _write(target: Path, recording: Path, sender: int, begin: int, messages: MessageSet) -> Video:
-    images = _images(recording, sender, messages)
-    kept = _kept(images)
+def _senders(recording: Path, messages: MessageSet) -> list[int]:
+    """The sender stamps of the cameras in a recording, which may be missing or empty."""
+    try:
+        with Recording(recording) as opened:
+            rows = opened.rows({messages.id(PICTURES)})
+            return [int(sender) for sender in np.unique(opened.index["sender_stamp"][rows])]
+    except (OSError, RecordingError):
+        return []
+
+
+def _write(target: Path, images: Sequence[tuple[int, Any]], begin: int, most_bytes: int) -> Video:
+    kept = _kept(images, most_bytes)
     if not kept:
         raise NoVideo("none of the recorded pictures stands alone, so none can be shown")
     first = kept[0][1]
@@ -73,12 +86,12 @@ def _images(recording: Path, sender: int, messages: MessageSet) -> list[tuple[in
     return images
 
 
-def _kept(images: Sequence[tuple[int, Any]]) -> Sequence[tuple[int, Any]]:
+def _kept(images: Sequence[tuple[int, Any]], most_bytes: int) -> Sequence[tuple[int, Any]]:
     """The newest of them that fit, from one that stands alone on."""
     size, first = 0, len(images)
     for number in range(len(images) - 1, -1, -1):
         size += len(images[number][1].data)
-        if size > MOST_BYTES:
+        if size > most_bytes:
             break
         if _stands_alone(images[number][1].data):
             first = number

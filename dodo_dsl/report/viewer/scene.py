@@ -5,7 +5,7 @@ from typing import Any
 
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.plan.model import Plan, PlannedService
-from dodo_dsl.report.trajectory import Ground, read_ground
+from dodo_dsl.report.pictures.trajectory import Ground, read_ground
 from dodo_dsl.report.viewer.encoded import shown
 
 FRAME = "opendlv.sim.Frame"

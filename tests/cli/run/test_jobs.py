@@ -102,3 +102,11 @@ def test_a_compiled_test_takes_seed_wall_timeout_and_repetitions(folder: Path, c
 def test_a_compiled_test_keeps_its_clock(folder: Path, compiled: Path) -> None:
     with pytest.raises(UsageError, match="compiled for clock lockstep"):
         run_compiled(folder, compiled, "--clock", "realtime")
+
+
+def test_git_ignores_a_new_report_folder_but_no_other(folder: Path) -> None:
+    prepared(folder)
+    assert (folder / "report/.gitignore").read_text() == "*\n"
+    (folder / "report/.gitignore").unlink()
+    prepared(folder)
+    assert not (folder / "report/.gitignore").exists()

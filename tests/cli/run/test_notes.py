@@ -53,5 +53,5 @@ def test_who_cannot_be_a_process_is_told_what_to_write() -> None:
     assert (code, err) == (
         2,
         "dodo run: application service 'application' has no 'x-dodo-process', which the process backend needs; "
-        "add for example 'x-dodo-process: [python, main.py]', or run with --backend docker\n",
+        "add for example 'x-dodo-process: [python, main.py]', or run with --backend mixed or docker\n",
     )

@@ -4,7 +4,9 @@ import re
 
 import pytest
 
-from dodo_dsl.cli.run.progress import LiveProgress, PlainProgress, about, choose, count
+from dodo_dsl.cli.run.live import LiveProgress, Pace
+from dodo_dsl.cli.run.progress import PlainProgress, about, choose, count
+from dodo_dsl.run.standing import Standing
 from tests.cli.terminal import SAID, Terminal, shown, wide
 from tests.report.test_report_folder import OUTCOME
 
@@ -49,3 +51,32 @@ def test_a_stream_chooses_its_display(terminal: Terminal) -> None:
 def test_counts_and_forecasts_in_words() -> None:
     assert [count(0), count(1), count(2), count(1, "stale test")] == ["0 tests", "1 test", "2 tests", "1 stale test"]
     assert [about(2.6), about(180), about(200)] == ["about 3 s", "about 180 s", "about 3 min"]
+
+
+def test_a_running_test_has_a_line_with_its_time_pace_and_nearest_check(terminal: Terminal) -> None:
+    clock = [10.0]
+    with LiveProgress(terminal, ["drive", "look", "waits"], lambda: clock[0]) as progress:
+        for slug in ("drive", "look"):
+            progress.phase(slug, "running")
+            progress.standing(slug, Standing(0.0, slug == "drive"))
+        clock[0] = 12.0
+        progress.standing("drive", Standing(7.0, True, "gap [m]\x1b[2J 3, margin 0.5"))
+    said = [" ".join(line.split()[1:]) for line in re.split(r"[\r\n]+", shown(terminal.getvalue())) if line.strip()]
+    assert said[-2:] == ["drive running 7.0 s x3.5 gap [m]�[2J 3, margin 0.5", "look running 2.0 s"]
+    assert "waits" not in shown(terminal.getvalue())
+
+
+def test_the_time_of_a_test_begins_anew_with_its_next_attempt(terminal: Terminal) -> None:
+    clock = [10.0]
+    with LiveProgress(terminal, ["look"], lambda: clock[0]) as progress:
+        for begin in (10.0, 50.0):
+            clock[0] = begin
+            progress.phase("look", "running")
+            progress.standing("look", Standing(0.0, False))
+        clock[0] = 53.0
+    assert " ".join(shown(terminal.getvalue()).split()).endswith("look running 3.0 s")
+
+
+def test_a_pace_without_time_has_no_factor() -> None:
+    assert Pace(1.0, 1.0, Standing(0.0, True)).text(5.0) == "0.0 s"
+    assert Pace(1.0, 1.0, Standing(2.0, True)).text(5.0) == "2.0 s"

@@ -19,7 +19,7 @@ report, plan = map(Path, sys.argv[1:])
 outcome, = results.load(report / "results.json")
 page.write_shared(report)
 page.write(report / outcome.slug, outcome, from_json(plan.read_text()), report.parent / "compiled")
-print(sorted({"av", "cv2", "matplotlib", "PIL", "shapely"} & set(sys.modules)))
+print(sorted({"av", "cv2", "PIL", "shapely"} & set(sys.modules)))
 """
 
 

@@ -34,7 +34,8 @@ DRIVES = {
     "rig refusal": (failures.rig_refused(), 0.0),
 }
 NAMES = list(DRIVES)
-SCRIPTS = (drives.ROOT / "templates" / "viewer" / "drive.html").read_text().count("<script")
+SCRIPTS = (drives.ROOT / "templates" / "viewer" / "drive.html").read_text().count("<script") - 1
+"""But for that of another report's way."""
 
 
 @pytest.fixture(scope="module")

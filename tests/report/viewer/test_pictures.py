@@ -17,7 +17,7 @@ from tests.report.viewer.drives import MESSAGES, MadeDrive, Sample, record
 def written(folder: Path, samples: Sequence[Sample]) -> list[Any]:
     record(folder / "test.rec", MadeDrive("x", 1.5, samples, {}))
     test = recorded.read(folder / "test.rec", MESSAGES)
-    return list(pictures.write(folder, folder / "test.rec", test, MESSAGES))
+    return list(pictures.write(folder, [folder / "test.rec", folder / "frames.rec"], test, MESSAGES))
 
 
 def test_frames_keep_their_times_and_content(tmp_path: Path) -> None:

@@ -17,7 +17,8 @@ from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
 from services.rec_recorder.service import Recorder
-from tests.services.built import MESSAGES, built
+from services.rec_recorder.source import SourceError
+from tests.services.built import MESSAGES, built, refusal
 from tests.services.process import running, send
 from tests.services.rec_replay.viewer import Viewer
 
@@ -77,9 +78,9 @@ class Stage:
 
 
 @contextmanager
-def staged(path: Path, kind: str, *flags: str) -> Iterator[Stage]:
+def staged(path: Path, kind: str, *flags: str, width: int = WIDTH) -> Iterator[Stage]:
     camera = CameraMemory(kind)
-    memories = f"--memories={camera.name}:{WIDTH}x{HEIGHT}"
+    memories = f"--memories={camera.name}:{width}x{HEIGHT}"
     with camera.memory, built("rec_recorder", f"--rec={path}", "--frames=20", memories, *flags) as recorder:
         yield Stage(recorder, camera)
 
@@ -156,3 +157,43 @@ def test_commands_pause_pictures_and_messages(tmp_path: Path) -> None:
     assert [e.data_type for e in envelopes] == [IMAGE, 11, IMAGE]
     image = MESSAGES.decode(IMAGE, envelopes[2].payload)
     assert b"\0\0\0\1\x67" in image.data  # it can be decoded without the picture that is missing
+
+
+def test_pictures_alone_are_in_a_recording_of_their_own(tmp_path: Path) -> None:
+    path, pictures = tmp_path / "drive.rec", tmp_path / "frames.rec"
+    with staged(path, "i420", f"--pictures={pictures}") as stage:
+        for number in range(COUNT):
+            stage.hear("opendlv.proxy.PedalPositionRequest")
+            stage.show(number)
+    assert recorded(pictures) == list(range(COUNT))
+    assert {e.data_type for e in read_envelopes(path)} == {1086}
+    decoder = VideoDecoder("h264")
+    frames = [decoder.decode(MESSAGES.decode(IMAGE, e.payload).data) for e in read_envelopes(pictures)]
+    error = frames[-1].pixels("i420").astype(float) - scene(COUNT - 1, "i420")  # type: ignore[union-attr]
+    assert 10 * np.log10(255**2 / (error**2).mean()) > 34  # PSNR in dB
+
+
+def test_what_cannot_be_encoded_ends_only_the_pictures_that_decide_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with staged(tmp_path / "one.rec", "i420", f"--pictures={tmp_path / 'frames.rec'}", width=162) as stage:
+        stage.show(0)
+        stage.show(1)
+    assert [r.getMessage() for r in caplog.records] == [
+        f"no pictures are recorded: memory 'recorded-{os.getpid()}.i420' has 28800 bytes, "
+        "not those of a picture of 162 x 120 pixels"
+    ]
+    with staged(tmp_path / "two.rec", "i420", width=162) as stage, pytest.raises(SourceError):
+        stage.show(0)
+
+
+def test_looks_are_as_few_as_pictures_need(tmp_path: Path) -> None:
+    with staged(tmp_path / "one.rec", "i420") as stage:
+        assert stage.recorder.period == 5000
+    with staged(tmp_path / "two.rec", "i420", f"--pictures={tmp_path / 'frames.rec'}") as stage:
+        assert stage.recorder.period == 12_500
+
+
+def test_a_recording_of_pictures_needs_their_rate(tmp_path: Path) -> None:
+    said = refusal("rec_recorder", f"--rec={tmp_path / 'drive.rec'}", f"--pictures={tmp_path / 'frames.rec'}")
+    assert said == "--pictures needs --frames: the rate of the pictures"

@@ -52,6 +52,14 @@ def test_pictures_at_a_rate(memory: SharedMemory, times_ms: list[int], wanted_ms
     source.close()
 
 
+def test_in_lockstep_the_first_picture_is_taken_and_nothing_before(memory: SharedMemory) -> None:
+    source = Source(MemorySpec(memory.name), PERIOD, is_stepped=True)
+    assert source.take(1_000_000) is None  # its file is of today
+    put(memory, 7, 2_000_000)
+    assert source.take(2_000_000) == (bytes([7]) * memory.size, 2_000_000)
+    source.close()
+
+
 def test_a_memory_that_comes_and_goes(memory: SharedMemory) -> None:
     name = f"{memory.name}.late"
     source = Source(MemorySpec(name), PERIOD)

@@ -1,0 +1,45 @@
+"""The recording of pictures that keeps the newest ones."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from services.rec_recorder.model import RecordingFileError
+from services.rec_recorder.newest import NewestPictures
+
+
+def picture(number: int, size: int = 100) -> Envelope:
+    return Envelope(1055, bytes(size), 1, 1, number, 0)
+
+
+def test_the_oldest_go_where_there_are_too_many(tmp_path: Path) -> None:
+    path = tmp_path / "frames.rec"
+    pictures = NewestPictures(path, 1500)
+    for number in range(40):
+        pictures.write(picture(number))
+        times = [e.sample_time for e in read_envelopes(path)]  # at any time, as a recorder may be killed
+        assert times == list(range(times[0], number + 1))
+        assert path.stat().st_size <= 1500
+        assert number < 10 or path.stat().st_size > 900
+    pictures.close()
+    assert [file.name for file in tmp_path.iterdir()] == ["frames.rec"]
+
+
+def test_a_picture_that_fits_nowhere_ends_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / "frames.rec"
+    pictures = NewestPictures(path, 1500)
+    for size in (100, 2000, 100):
+        pictures.write(picture(1, size))
+    pictures.close()
+    assert (pictures.is_on, len(list(read_envelopes(path)))) == (False, 1)
+    assert [r.getMessage() for r in caplog.records] == ["no more pictures are recorded: a picture has 2031 bytes"]
+
+
+def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "frames.rec"
+    path.write_bytes(b"dear")
+    with pytest.raises(RecordingFileError, match="exists and is not overwritten"):
+        NewestPictures(path, 1500)
+    assert path.read_bytes() == b"dear"
