@@ -1,7 +1,7 @@
 """What the drives of a search say: how often the test fails, by which conditions, and at worst."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -35,9 +35,27 @@ class Failure:
 
 
 @dataclass(frozen=True)
+class Shrunk:
+    """A failure at values as near to the nominal ones as it was found at; ``changed`` are those that differ.
+
+    ``failed`` is how many of its ``repeats`` drives failed for its reason. ``spec`` is the name of the test that has
+    these values, empty where it does not fail each time.
+    """
+
+    kind: str
+    reason: str
+    values: Mapping[str, str]
+    changed: tuple[str, ...]
+    failed: int
+    repeats: int
+    spec: str
+
+
+@dataclass(frozen=True)
 class Findings:
     """Of a sweep; ``rate`` is the share of ``judged`` drives that failed, with the ends of its interval.
 
+    ``proposed`` are the judged drives of the optimiser, which looks for failures, so that they count in no rate.
     ``errors`` are drives without an answer, which are left out, and ``left_out`` has their reasons. ``worst`` is None
     where no drive was judged.
     """
@@ -48,6 +66,8 @@ class Findings:
     judged: int
     failed: int
     errors: int
+    proposed: int
+    proposed_failed: int
     rate: float | None
     low: float
     high: float
@@ -55,6 +75,7 @@ class Findings:
     worst: Drive | None
     failures: tuple[Failure, ...]
     left_out: tuple[Failure, ...]
+    shrunk: tuple[Shrunk, ...] = ()
 
 
 def kind_of(reason: str) -> str:
@@ -62,9 +83,17 @@ def kind_of(reason: str) -> str:
     return _NUMBER.sub("#", reason)
 
 
-def find(test: str, seed: int, space: Space, nominal: Drive | None, drives: Sequence[Drive]) -> Findings:
-    judged = [drive for drive in drives if drive.outcome != "error"]
+def find(
+    test: str, seed: int, space: Space, nominal: Drive | None, swept: Sequence[Drive], proposed: Sequence[Drive] = ()
+) -> Findings:
+    """What the drives of a sweep and those that the optimiser proposed say."""
+    judged = [drive for drive in swept if drive.outcome != "error"]
     failed = [drive for drive in judged if drive.outcome == "failed"]
+    rated = [drive.values for drive in swept]
+    others = [drive for drive in proposed if drive.values not in rated]
+    further = [drive for drive in others if drive.outcome != "error"]
+    left_out = [drive for drive in (*swept, *others) if drive.outcome == "error"]
+    further_failed = [drive for drive in further if drive.outcome == "failed"]
     low, high = interval(len(failed), len(judged))
     return Findings(
         test,
@@ -72,14 +101,16 @@ def find(test: str, seed: int, space: Space, nominal: Drive | None, drives: Sequ
         nominal,
         len(judged),
         len(failed),
-        len(drives) - len(judged),
+        len(left_out),
+        len(further),
+        len(further_failed),
         len(failed) / len(judged) if judged else None,
         low,
         high,
         tuple(sorted(_influences(space, judged), key=lambda one: -abs(one.correlation))),
-        min(judged, key=_margin, default=None),
-        tuple(_failures(failed)),
-        tuple(_failures([drive for drive in drives if drive.outcome == "error"])),
+        min((*judged, *further), key=_margin, default=None),
+        tuple(failures_of([*failed, *further_failed])),
+        tuple(failures_of(left_out)),
     )
 
 
@@ -97,7 +128,8 @@ def _margin(drive: Drive) -> float:
     return -1.0 if drive.margin is None else drive.margin
 
 
-def _failures(failed: Sequence[Drive]) -> list[Failure]:
+def failures_of(failed: Sequence[Drive]) -> list[Failure]:
+    """Failed drives by the kinds of their reasons, the most frequent first."""
     kinds: dict[str, list[Drive]] = {}
     for drive in failed:
         kinds.setdefault(kind_of(drive.reason), []).append(drive)

@@ -1,6 +1,7 @@
 """The space that a test's ranges span: its points as values of the spec."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -27,6 +28,19 @@ class Space:
 
     def values(self, point: Point) -> Values:
         return {one.name: self._value(one, share) for one, share in zip(self.ranges, point, strict=True)}
+
+    def point(self, texts: dict[str, str]) -> Point:
+        """Where values lie, by their texts: the middle of the shares that become whole numbers and values of lists."""
+        return tuple(self._share(one, texts[one.name]) for one in self.ranges)
+
+    def _share(self, one: Range, text: str) -> float:
+        if one.is_list:
+            return ([end.text for end in one.ends].index(text) + 0.5) / len(one.ends)
+        low, high = (one.number(end.text) for end in one.ends)
+        if one.name in self.whole:
+            first, last = math.ceil(low), math.floor(high)
+            return float((one.number(text) - first) + Decimal("0.5")) / (last - first + 1)
+        return float((one.number(text) - low) / (high - low))
 
     def _value(self, one: Range, share: float) -> Scalar:
         if one.is_list:
@@ -79,10 +93,10 @@ def nominal(space: Space) -> Values:
     return vary.nominal(space.ranges)
 
 
-def sweep(space: Space, number: int, seed: int) -> list[Values]:
+def sweep(space: Space, number: int, seed: int) -> Iterator[Values]:
     """The first points of a scrambled Sobol sequence, which a longer sweep with the same seed continues."""
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(len(space.ranges), scramble=True, seed=seed)
     points = sequence.random_base2(max(number - 1, 0).bit_length())[:number]
-    return [space.values(tuple(map(float, point))) for point in points]
+    yield from (space.values(tuple(map(float, point))) for point in points)

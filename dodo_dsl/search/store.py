@@ -39,9 +39,9 @@ class Drive:
 class Store:
     """The drives of one study: the same test, ranges and seed. Raises OtherSearch for those of another."""
 
-    def __init__(self, folder: Path, key: str) -> None:
+    def __init__(self, folder: Path, key: str, name: str = FILE_NAME) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self._path = folder / FILE_NAME
+        self._path = folder / name
         try:
             self._connection = sqlite3.connect(self._path)
             self._connection.executescript(_TABLES)
@@ -84,8 +84,8 @@ class Store:
 
 
 @contextlib.contextmanager
-def opened(folder: Path, key: str) -> Iterator[Store]:
-    store = Store(folder, key)
+def opened(folder: Path, key: str, name: str = FILE_NAME) -> Iterator[Store]:
+    store = Store(folder, key, name)
     try:
         yield store
     finally:

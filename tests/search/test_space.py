@@ -35,6 +35,12 @@ def test_values_of_a_point(point: tuple[float, ...], expected: dict[str, str]) -
     assert texts(ONE.values(point)) == expected
 
 
+@given(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)))
+def test_the_point_of_values_has_these_values(point: tuple[float, ...]) -> None:
+    values = texts(ONE.values(point))
+    assert texts(ONE.values(ONE.point(values))) == values
+
+
 def test_bare_numbers_are_numbers_of_the_spec() -> None:
     assert ONE.values((0.5, 0.5, 0.5))["n"].value == 2
     assert space("{e: {from: 0.3, to: 2, nominal: 1}}").values((0.25,))["e"].value == 0.725

@@ -3,14 +3,14 @@
 import argparse
 import asyncio
 import importlib.util
-import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO, cast
 
-from dodo_dsl import atomic
+from dodo_dsl import atomic, package_data
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
@@ -18,24 +18,28 @@ from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run.forecast import expectation
 from dodo_dsl.cli.run.loading import Loading, loading
-from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
-from dodo_dsl.cli.search.drives import Drives, Interrupted, Kept
+from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, undisturbed
+from dodo_dsl.cli.search.course import Course
+from dodo_dsl.cli.search.drives import Drives, Interrupted, Kept, end_like_interrupt
 from dodo_dsl.cli.search.progress import SearchProgress
+from dodo_dsl.cli.search.shrinking import Shrinker
 from dodo_dsl.cli.search.study import Study, study_of
 from dodo_dsl.cli.search.text import lines
 from dodo_dsl.run.backends import Processes
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
-from dodo_dsl.search.findings import Findings, document, find
-from dodo_dsl.search.space import nominal, sweep, texts
+from dodo_dsl.search.findings import Findings, document, failures_of, find
+from dodo_dsl.search.itinerary import Itinerary
+from dodo_dsl.search.space import nominal, texts
 from dodo_dsl.search.store import Store, opened
-from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.terminal import json_text
 
 EXAMPLES = """examples:
   dodo search sil-my-drive                 100 drives within the test's ranges
   dodo search sil-my-drive --runs 1000 -j 4
   dodo search sil-my-drive --minutes 30    as many drives as fit into half an hour
+  dodo search sil-my-drive --save          keep a test of each failure among your tests
+  dodo search sil-my-drive --sweep         only measure how often it fails
 
 The same command again goes on where an earlier one was interrupted, or with more drives.
 
@@ -53,10 +57,19 @@ _NEEDED = "scipy"
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("test", metavar="TEST", help="name or path of a test in lockstep with ranges, 'vary'")
     parser.add_argument(
-        "--runs", type=positive, metavar="N", help=f"drives of the sweep (default: {_RUNS}, unless --minutes is given)"
+        "--runs", type=positive, metavar="N", help=f"drives (default: {_RUNS}, unless --minutes is given)"
     )
-    parser.add_argument("--minutes", type=minutes, metavar="M", help="begin no further drives after that time")
-    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of the sweep (default: 0)")
+    parser.add_argument(
+        "--sweep", action="store_true", help="no drives near the worst ones: all tell how often it fails"
+    )
+    parser.add_argument(
+        "--minutes",
+        type=minutes,
+        metavar="M",
+        help="look for failures no longer than that; to shrink them takes further drives",
+    )
+    parser.add_argument("--save", action="store_true", help="put a test of each failure beside TEST, to be kept")
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of the search (default: 0)")
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
     )
@@ -71,8 +84,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if importlib.util.find_spec(_NEEDED) is None:
         raise UsageError(f"this needs {_NEEDED}: pip install 'dodo-dsl[search]'")
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, stop_like_interrupt)
+    end_like_interrupt()
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
@@ -92,7 +104,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if not findings.judged:
         return Exit.ERROR
     fails_at_nominal = findings.nominal is not None and findings.nominal.outcome == "failed"
-    return Exit.PROBLEMS if findings.failed or fails_at_nominal else Exit.OK
+    return Exit.PROBLEMS if findings.failures or fails_at_nominal else Exit.OK
 
 
 def _search(
@@ -100,26 +112,36 @@ def _search(
 ) -> tuple[Findings, bool]:
     """What was found, and whether an interrupt ended it."""
     runs = min(options.runs or (_MOST_BY_TIME if options.minutes else _RUNS), _MOST_RUNS)
-    candidates = sweep(study.space, runs, options.seed)
+    course = Course(Itinerary(study.space, runs, options.seed, not options.sweep), store)
     deployment = study.checked.deployment
     backends = Kept(Processes(deployment.cids, options.isolation, (load.descriptor,), [deployment.root], load.take))
     order = schedule(options.jobs, expectation(backends.name))
-    different = len({tuple(texts(values).items()) for values in (nominal(study.space), *candidates)})
     deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
-    with _shown(stdout, different if options.runs or not deadline else None, deadline) as progress:
+    with _shown(stdout, runs + 1 if options.runs or not deadline else None, deadline) as progress:
         drives = Drives(study.checked, study.test.spec, store, backends, order, progress, work, report, deadline)
-        interrupted = asyncio.run(_sweep(drives, backends, study, candidates))
+        shrinker = Shrinker(drives, study.space, runs + 1, _registry(study) if options.save else None)
+        interrupted = asyncio.run(_follow(course, shrinker, backends))
     at_nominal = store.get(texts(nominal(study.space)))
-    swept = drives.known(candidates)
-    return find(study.test.spec.title, options.seed, study.space, at_nominal, swept), interrupted
+    swept, proposed = course.known(True), course.known(False)
+    findings = find(study.test.spec.title, options.seed, study.space, at_nominal, swept, proposed)
+    return replace(findings, shrunk=tuple(shrinker.found)), interrupted
 
 
-async def _sweep(drives: Drives, backends: Kept, study: Study, candidates: list[Values]) -> bool:
-    """Drives the nominal values and all candidates; whether that was interrupted."""
+def _registry(study: Study) -> Path:
+    """The folder of the user's own tests; raises UsageError for a test that ships."""
+    root = study.test.spec.location.root
+    if package_data.is_shipped(root, study.checked.deployment.root):
+        raise UsageError("'--save' is for tests of your own: copy this one with 'dodo new NAME --extends'")
+    return root
+
+
+async def _follow(course: Course, shrinker: Shrinker, backends: Kept) -> bool:
+    """Whether it was interrupted."""
     try:
-        await drives.drive([nominal(study.space)], 0)
-        await drives.drive(candidates, 1)
-    except Interrupted:
+        await course.follow(shrinker.drives)
+        failed = course.failed() if course.itinerary.proposes else []
+        await shrinker.shrink(failures_of([drive for _, drive in failed]), failed)
+    except (Interrupted, KeyboardInterrupt):
         return True
     finally:
         backends.end()

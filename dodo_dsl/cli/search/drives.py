@@ -1,15 +1,16 @@
 """Drives of a search: candidates compiled as tests and run in rounds, those of the store only once."""
 
-import itertools
 import shutil
+import signal
 import time
 from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl import compiler
 from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.run.uninterrupted import stop_like_interrupt
 from dodo_dsl.cli.search.progress import SearchProgress
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.emit.output_folder import write
@@ -20,6 +21,7 @@ from dodo_dsl.run.backends import Backends, Job, Say
 from dodo_dsl.run.protocol import Backend
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import Schedule
+from dodo_dsl.search.itinerary import key
 from dodo_dsl.search.space import texts
 from dodo_dsl.search.store import Drive, Store
 from dodo_dsl.spec.instances.vary import Values
@@ -27,6 +29,8 @@ from dodo_dsl.spec.model import Spec
 
 _ROUND = 8
 """Drives a core in a round, so that cores hardly wait for its last one; one where time ends the search."""
+_REPEAT = "#"
+"""No name of a range."""
 RETRIES = 1
 """A drive that ended in error is driven once more, and left out when it does so again."""
 
@@ -58,9 +62,20 @@ class Kept:
         return self._backends.open(job, say, keep)
 
 
+def end_like_interrupt() -> None:
+    """SIGTERM and SIGHUP end the search as Ctrl-C does; a round takes them, and does not give them back."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, stop_like_interrupt)
+
+
+def repeated(values: Values, repeat: int) -> dict[str, str]:
+    """What names a drive in the store: its values, and from the second one on its number among those at them."""
+    return texts(values) | ({_REPEAT: str(repeat)} if repeat > 1 else {})
+
+
 @dataclass
 class Drives:
-    """Drives a test at any values. ``work`` takes compiled tests, ``report`` what drives say."""
+    """Drives a test at any values. ``work`` takes compiled tests, ``folder`` of ``report`` what drives say."""
 
     checked: compiler.Checked
     spec: Spec
@@ -71,40 +86,36 @@ class Drives:
     work: Path
     report: Path
     deadline: float | None = None
+    folder: str = "drives"
+    _counted: set[tuple[str, ...]] = field(default_factory=set)
 
     @property
     def is_over(self) -> bool:
         """Whether the time for the search is over."""
         return self.deadline is not None and time.monotonic() >= self.deadline
 
-    def known(self, candidates: Sequence[Values]) -> list[Drive]:
-        """The drives of the candidates, up to the first that was not driven."""
-        found = (self.store.get(texts(values)) for values in candidates)
-        return [drive for drive in itertools.takewhile(lambda drive: drive is not None, found) if drive]
-
-    async def drive(self, candidates: Sequence[Values], first: int) -> None:
+    async def drive(self, candidates: Sequence[Values], first: int, repeat: int = 1) -> None:
         """Drives the candidates, numbered from ``first`` on, as far as time suffices.
 
-        Candidates with the same values share a drive. Raises Interrupted.
+        Candidates with the same values share a drive, but for each ``repeat``. Raises Interrupted.
         """
         numbers: dict[int, Values] = {}
-        seen = set()
         for number, values in enumerate(candidates, first):
-            key = tuple(texts(values).items())
-            known = self.store.get(texts(values)) if key not in seen else None
+            point = (*key(values), str(repeat))
+            known = self.store.get(repeated(values, repeat)) if point not in self._counted else None
             if known:
                 self.progress.count(known)
-            elif key not in seen:
+            elif point not in self._counted:
                 numbers[number] = values
-            seen.add(key)
+            self._counted.add(point)
         size = max(1, int(self.order.capacity)) * (_ROUND if self.deadline is None else 1)
         missing = list(numbers.items())
         for start in range(0, len(missing), size):
             if self.is_over:
                 break
-            await self._round(dict(missing[start : start + size]))
+            await self._round(dict(missing[start : start + size]), repeat)
 
-    async def _round(self, candidates: dict[int, Values]) -> None:
+    async def _round(self, candidates: dict[int, Values], repeat: int) -> None:
         folder = self.work / f"round-{min(candidates)}"
         jobs = self._jobs(candidates, folder)
         by_slug = {job.plan.slug: number for number, job in jobs.items()}
@@ -115,7 +126,8 @@ class Drives:
                 return None
             number = by_slug[outcome.slug]
             margin = worst_margin(outcome)
-            drive = Drive(number, texts(candidates[number]), outcome.outcome, margin, outcome.reason)
+            point = repeated(candidates[number], repeat)
+            drive = Drive(number, point, outcome.outcome, margin, outcome.reason)
             self.store.add(drive)
             if outcome.outcome == "passed":
                 shutil.rmtree(jobs[number].report, ignore_errors=True)
@@ -123,6 +135,7 @@ class Drives:
 
         self.progress.take = take
         await runner.run(list(jobs.values()))
+        end_like_interrupt()
         shutil.rmtree(folder, ignore_errors=True)
         if runner.interrupted:
             raise Interrupted
@@ -136,5 +149,5 @@ class Drives:
         write(made.compiled, made.pipeline, folder)
         plans = {plan.slug: plan for plan in made.compiled.suite.plans}
         slugs = dict(zip(candidates, (test.spec.slug for test in checked.tests), strict=True))
-        drives = self.report / "drives"
+        drives = self.report / self.folder
         return {n: Job(plans[slug], folder / slug, drives / slug, self.spec.slug) for n, slug in slugs.items()}

@@ -6,6 +6,7 @@ from typing import Any, Self, TextIO
 
 from dodo_dsl.cli.run.progress import about, count
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.run.standing import Standing
 from dodo_dsl.search.store import Drive
 from dodo_dsl.terminal import printable, unescaped
 
@@ -42,6 +43,9 @@ class SearchProgress:
     def phase(self, slug: str, text: str) -> None:
         """Phases of single drives are not shown."""
 
+    def standing(self, slug: str, standing: Standing) -> None:
+        """How far a drive is is not shown."""
+
     def rest(self, seconds: float, tests: int) -> None:
         """The rest of a round is not shown."""
 
@@ -59,10 +63,16 @@ class SearchProgress:
         if drive.margin is not None:
             self._worst = drive.margin if self._worst is None else min(self._worst, drive.margin)
 
+    def shrink(self, reason: str) -> None:
+        """From now on, drives shrink a failure; how many it takes is not known."""
+        self._total = self._deadline = None
+        self.note(f"shrinking: {reason}")
+
     def _show(self, drive: Drive) -> None:
         of = f" of {self._total}" if self._total else ""
         worst = "" if self._worst is None else f", worst margin {self._worst:.3f}"
-        line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}, {about(self._left())} to go"
+        left = f", {about(self._left())} to go" if self._total or self._deadline else ""
+        line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}{left}"
         if self._status is not None:
             self._status.update(line)
         else:

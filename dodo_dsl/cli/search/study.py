@@ -50,11 +50,11 @@ def study_of(options: argparse.Namespace, work: Path, stdout: TextIO) -> Study:
         raise UsageError("a search starts the application as processes: give each of its services 'x-dodo-process'")
     space = space_of(tests[0])
     texts = [file.text for file in render_plan(plan)]
-    texts += _digests(checked, tests[0].spec, work)
+    texts += digests(checked, tests[0].spec, work)
     return Study(checked, tests[0], space, _key(texts, space, options.seed))
 
 
-def _digests(checked: Checked, spec: Spec, work: Path) -> list[str]:
+def digests(checked: Checked, spec: Spec, work: Path) -> list[str]:
     """What the files of the test hold, as maps and recordings, also those at the ends of its ranges."""
     nominal = vary.nominal(spec.ranges)
     ends = {str(n): {**nominal, **corner} for n, corner in enumerate(vary.corners(spec.ranges))}

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl.search.findings import CONFIDENCE, Findings
+from dodo_dsl.search.findings import CONFIDENCE, Findings, Shrunk
 from dodo_dsl.search.store import Drive
 from dodo_dsl.terminal import printable
 
@@ -24,6 +24,18 @@ def lines(findings: Findings) -> Iterator[str]:
     for failure in findings.failures:
         yield printable(f"failed {failure.drives} x: {failure.kind}")
         yield f"  at worst: {values(failure.worst)} (drive {failure.worst.number})"
+    for shrunk in findings.shrunk:
+        yield from _shrunk(shrunk)
+
+
+def _shrunk(shrunk: Shrunk) -> Iterator[str]:
+    away = ", ".join(f"{name} {shrunk.values[name]}" for name in shrunk.changed)
+    yield printable(f"the simplest failure of its kind: {away or 'all values nominal'}")
+    yield printable(f"  {shrunk.reason}")
+    if shrunk.spec:
+        yield f"  as a test: {shrunk.spec}"
+    else:
+        yield f"  only {shrunk.failed} of {shrunk.repeats} drives failed so: no test is written"
 
 
 def _rate(findings: Findings) -> Iterator[str]:
@@ -34,6 +46,9 @@ def _rate(findings: Findings) -> Iterator[str]:
             f"{findings.failed} of {findings.judged} drives failed: {findings.rate:.2%}, "
             f"{CONFIDENCE:.0%} interval {findings.low:.2%} to {findings.high:.2%}"
         )
+    if findings.proposed:
+        share = f"{findings.proposed_failed} of {findings.proposed}"
+        yield f"{share} further drives failed, where failures were expected: they do not count in this rate"
     if findings.errors:
         yield f"{findings.errors} left out, as they ended in error twice:"
         yield from (printable(f"  {group.drives} x: {group.kind}") for group in findings.left_out)

@@ -13,12 +13,16 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl import compiler
+from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.search import command
 from dodo_dsl.cli.search.drives import Drives
 from dodo_dsl.margins import with_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
+from dodo_dsl.search import itinerary
+from dodo_dsl.search.itinerary import FIRST
 from tests.check import examples
 from tests.run import scripted
 from tests.run.scripted import Events, ScriptedBackend, ScriptedBackends
@@ -106,9 +110,10 @@ def search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Search]:
 
 
 def test_the_result_is_that_of_the_values_driven(search: Search) -> None:
-    code, out = search("example", "--runs", "32")
+    code, out = search("example", "--runs", "32", "--sweep")
     found = result()
     assert code == 1
+    assert found["proposed"] == 0
     assert (found["judged"] + found["errors"], found["nominal"]["outcome"]) == (32, "passed")
     assert found["rate"] == found["failed"] / found["judged"]
     assert found["low"] < 3 / 14 < found["high"]
@@ -126,33 +131,85 @@ def test_the_result_is_that_of_the_values_driven(search: Search) -> None:
     assert not list(Path("report").glob("**/*--run-0"))
 
 
-def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
+def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
+    _, out = search("example", "--runs", "16", "--save")
+    (shrunk,) = result()["shrunk"]
+    start = float(shrunk["values"]["start"].removesuffix(" cm")) / 100
+    assert (shrunk["changed"], shrunk["values"]["clutter"]) == (["start"], "0")
+    assert (shrunk["failed"], shrunk["repeats"]) == (3, 3)
+    assert LIMIT < start < LIMIT + 0.001
+    assert f"as a test: {shrunk['spec']}" in out
+    assert not Path("report/search/example/shrinking").exists()
+    assert main(["compile", "--check", shrunk["spec"]], stdout := StringIO(), StringIO()) == 0, stdout.getvalue()
+    checked = selection.select([shrunk["spec"]], (), [])
+    (plan,) = compiler.plan(checked, Path("out")).compiled.suite.plans
+    assert (start_of(plan), plan.clock) == (pytest.approx(start), "lockstep")
+    assert f"hit wall right after {start:.3f} m" in checked.tests[0].spec.description
+    driven = len(search.driven)
     search("example", "--runs", "16")
+    assert (driven > 17, search.driven) == (True, [])
+
+
+def test_what_is_saved_replaces_no_other_test(search: Search) -> None:
+    search("example", "--runs", "8", "--save")
+    (shrunk,) = result()["shrunk"]
+    (path,) = (one for one in Path().glob(f"**/{shrunk['spec']}.dodo.yml") if "report" not in one.parts)
+    path.write_text(path.read_text() + "# mine\n")
+    _, out = search("example", "--runs", "9", "--save")
+    assert path.read_text().endswith("# mine\n") and "holds another test" in out
+
+
+def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
+    search("example", "--runs", "16", "--sweep")
     twice = {slug for slug in search.driven if search.driven.count(slug) == 2}
     assert len(twice) == result()["errors"] > 0
     assert len(search.driven) == 17 + len(twice)
 
 
-def test_an_interrupted_search_goes_on_to_the_same_result(search: Search) -> None:
-    search("example", "--runs", "16", "-j", "1", report="whole")
+@pytest.mark.parametrize("ends_at", [2, 7, 12, 15])
+def test_an_interrupted_search_goes_on_to_the_same_result(search: Search, ends_at: int) -> None:
+    search("example", "--runs", "18", "-j", "1", report="whole")
     whole = set(search.driven)
-    search.ends_at = 7
-    code, out = search("example", "--runs", "16", "-j", "1")
+    search.ends_at = ends_at
+    code, out = search("example", "--runs", "18", "-j", "1")
     assert code == 130
     assert "the same command goes on" in out
     before = set(search.driven)
     search.ends_at = None
-    assert search("example", "--runs", "16", "-j", "1")[0] == 1
+    assert search("example", "--runs", "18", "-j", "1")[0] == 1
     assert result() == result("whole")
     assert before | set(search.driven) == whole
     assert len(before & set(search.driven)) <= 1
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_search_is_interrupted_between_drives_too(
+    search: Search, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    monkeypatch.setattr(itinerary, "propose", lambda *_: os.kill(os.getpid(), number))
+    code, out = search("example", "--runs", "18")
+    assert (code, "the same command goes on" in out, len(set(search.driven))) == (130, True, FIRST + 1)
+
+
+def test_the_result_is_the_same_however_many_drive_at_once(search: Search) -> None:
+    for jobs in ("1", "3"):
+        search("example", "--runs", "18", "-j", jobs, report=jobs)
+    assert result("1") == result("3")
+
+
+def test_further_drives_fail_more_often_than_the_sweep(search: Search) -> None:
+    search("example", "--runs", "48", "--seed", "2")
+    found = result()
+    assert found["judged"] + found["errors"] + found["proposed"] >= 48
+    assert found["proposed_failed"] / found["proposed"] > 1.5 * found["rate"] > 0
+    assert found["failures"][0]["drives"] == found["failed"] + found["proposed_failed"]
+
+
 def test_more_runs_continue_the_sweep(search: Search) -> None:
-    search("example", "--runs", "4")
-    search("example", "--runs", "9")
+    search("example", "--runs", "4", "--sweep")
+    search("example", "--runs", "9", "--sweep")
     assert len(set(search.driven)) == 5
-    search("example", "--runs", "9", report="whole")
+    search("example", "--runs", "9", "--sweep", report="whole")
     assert result() == result("whole")
 
 

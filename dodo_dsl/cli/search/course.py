@@ -1,0 +1,55 @@
+"""The course of a search: generation after generation driven, until all are done or time is over."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from dodo_dsl.cli.search.drives import Drives
+from dodo_dsl.search.itinerary import Candidate, Itinerary, key
+from dodo_dsl.search.space import nominal, texts
+from dodo_dsl.search.store import Drive, Store
+from dodo_dsl.spec.instances.vary import Values
+
+
+@dataclass
+class Course:
+    """Follows an itinerary; ``done`` are the candidates that were driven, in their order."""
+
+    itinerary: Itinerary
+    store: Store
+    done: list[Candidate] = field(default_factory=list)
+
+    async def follow(self, drives: Drives) -> None:
+        """Drives the nominal values and the itinerary as far as time suffices. Raises Interrupted."""
+        await drives.drive([nominal(self.itinerary.space)], 0)
+        margins: dict[tuple[str, ...], float | None] = {}
+        for batch in self.itinerary.generations(margins):
+            try:
+                await drives.drive([one.values for one in batch], 1 + len(self.done))
+            finally:
+                self._take(batch, margins)
+            if any(key(one.values) not in margins for one in batch):
+                return
+
+    def _take(self, batch: Sequence[Candidate], margins: dict[tuple[str, ...], float | None]) -> None:
+        """What is known of the candidates, up to the first that was not driven."""
+        for one in batch:
+            drive = self.store.get(texts(one.values))
+            if drive is None:
+                return
+            margins[key(one.values)] = drive.margin
+            self.done.append(one)
+
+    def failed(self) -> list[tuple[Values, Drive]]:
+        """The drives that failed, with their values."""
+        drives = ((one.values, self.store.get(texts(one.values))) for one in self.done)
+        return [(values, drive) for values, drive in drives if drive and drive.outcome == "failed"]
+
+    def known(self, swept: bool) -> list[Drive]:
+        """The drives of the sweep, or those that were proposed, each of their values once."""
+        return list(self._known(swept))
+
+    def _known(self, swept: bool) -> Iterator[Drive]:
+        chosen = {key(one.values): one.values for one in self.done if one.swept is swept}
+        for values in chosen.values():
+            if drive := self.store.get(texts(values)):
+                yield drive

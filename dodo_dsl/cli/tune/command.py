@@ -1,0 +1,140 @@
+"""dodo tune: find values of the application's parameters with which it passes by more."""
+
+import argparse
+import asyncio
+import importlib.util
+import math
+import time
+from pathlib import Path
+from typing import TextIO, cast
+
+from dodo_dsl import atomic
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.numbers import minutes, positive, seed
+from dodo_dsl.cli.report import REPORT
+from dodo_dsl.cli.run.forecast import expectation
+from dodo_dsl.cli.run.loading import Loading, loading
+from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, undisturbed
+from dodo_dsl.cli.search.drives import Interrupted, Kept, end_like_interrupt
+from dodo_dsl.cli.search.progress import SearchProgress
+from dodo_dsl.cli.tune import result
+from dodo_dsl.cli.tune.course import TuneCourse
+from dodo_dsl.cli.tune.study import TuneStudy, tune_study
+from dodo_dsl.cli.tune.trials import Trials
+from dodo_dsl.run.backends import Processes
+from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.search.itinerary import Itinerary
+from dodo_dsl.search.store import opened
+from dodo_dsl.terminal import json_text
+
+EXAMPLES = """examples:
+  dodo tune sil-my-drive                        50 choices of the application's parameters
+  dodo tune 'sil-*' --mean --minutes 30         the best mean over several tests, in half an hour
+  dodo tune sil-my-drive --samples 8            also at 8 samples of the test's ranges, 'vary'
+
+The same command again goes on where an earlier one was interrupted, or with more runs.
+
+exit codes: 0 the best values pass, 1 they fail, 2 wrong usage or spec, 3 not even the defaults were driven,
+130 interrupted
+"""
+
+FOLDER, STORE, RESULT, VALUES = "tune", "tune.sqlite", "tune.json", "best.env"
+_RUNS = 50
+_MOST_RUNS = 1 << 14
+_NEEDED = "scipy"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tests", metavar="TEST", nargs="+", help="name, pattern or path of tests in lockstep")
+    parser.add_argument(
+        "--runs", type=positive, metavar="N",
+        help=f"choices of values, each driven in all tests and samples (default: {_RUNS}, unless --minutes is given)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--minutes", type=minutes, metavar="M", help="tune no longer than that; held-out samples follow"
+    )
+    parser.add_argument("--mean", action="store_true", help="the mean margin counts, not the worst one")
+    parser.add_argument(
+        "--samples", type=positive, default=0, metavar="N",
+        help="drive each test at N samples of its ranges, too, and judge the result at N others",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of values and samples (default: 0)")
+    parser.add_argument(
+        "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
+    )
+    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the specs' isolation")
+    parser.add_argument(
+        "--report", type=Path, default=REPORT, metavar="DIR",
+        help="the result is kept in DIR/tune (default: dodo-report)",
+    )  # fmt: skip
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if importlib.util.find_spec(_NEEDED) is None:
+        raise UsageError(f"this needs {_NEEDED}: pip install 'dodo-dsl[search]'")
+    end_like_interrupt()
+    more_descriptors()
+    stdout = cast(TextIO, UninterruptedStream(stdout))
+    reap_folders()
+    options.backend = "process"
+    report = options.report.resolve() / FOLDER
+    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
+        study = tune_study(options, folder.path, stdout)
+        with opened(report, study.key, STORE) as store:
+            runs = min(options.runs or (_MOST_RUNS if options.minutes else _RUNS), _MOST_RUNS)
+            itinerary = Itinerary(study.space, runs, options.seed, enough=-math.inf)
+            course = TuneCourse(study, itinerary, store, options.mean)
+            interrupted = _tune(options, course, folder.path, report, load, stdout)
+            if course.done:
+                _write(course, report, stdout)
+    if course.done:
+        stdout.write(f"values: {options.report / FOLDER / VALUES}\n")
+    if interrupted:
+        stdout.write("interrupted: the same command goes on from here\n")
+        return Exit.INTERRUPTED
+    if not course.done:
+        return Exit.ERROR
+    return Exit.PROBLEMS if course.best.margin < 0 else Exit.OK
+
+
+def _write(course: TuneCourse, report: Path, stdout: TextIO) -> None:
+    with undisturbed():
+        atomic.write_text(report / RESULT, json_text(result.document(course)))
+        atomic.write_text(report / VALUES, result.env(course))
+    stdout.writelines(f"{line}\n" for line in result.table(course))
+
+
+def _tune(
+    options: argparse.Namespace, course: TuneCourse, work: Path, report: Path, load: Loading, stdout: TextIO
+) -> bool:
+    """Whether an interrupt ended it."""
+    study = course.study
+    deployment = study.checked.deployment
+    backends = Kept(Processes(deployment.cids, options.isolation, (load.descriptor,), [deployment.root], load.take))
+    order = schedule(options.jobs, expectation(backends.name))
+    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
+    total = _drives(study, course.itinerary.runs) if options.runs or not deadline else None
+    progress = SearchProgress(stdout, total, deadline)
+    trials = Trials(study.checked, course.store, backends, order, progress, work, report / "drives", deadline)
+    try:
+        return asyncio.run(_follow(course, trials))
+    finally:
+        progress.close()
+
+
+def _drives(study: TuneStudy, runs: int) -> int:
+    return (runs + 1) * len(study.scenarios) + 2 * len(study.held_out)
+
+
+async def _follow(course: TuneCourse, trials: Trials) -> bool:
+    try:
+        await course.follow(trials)
+    except (Interrupted, KeyboardInterrupt):
+        return True
+    finally:
+        trials.backends.end()
+    return False

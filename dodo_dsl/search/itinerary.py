@@ -1,0 +1,70 @@
+"""The order in which a search drives: a sweep, and by turns with it what the optimiser proposes.
+
+It is the same for every number of drives, so that a search with more of them goes on with one that had fewer, and it
+depends on nothing but the seed and what earlier drives said, so that it is the same however many run at once.
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from dodo_dsl.search.optimiser import ENOUGH, Tried, propose
+from dodo_dsl.search.space import Space, sweep, texts
+from dodo_dsl.spec.instances.vary import Values
+
+FIRST, SWEPT, PROPOSED = 8, 4, 4
+"""Drives of the sweep before the first proposals, and those of each later generation."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Values to be driven; ``swept`` is whether they belong to the sweep, which tells how often the test fails."""
+
+    values: Values
+    swept: bool
+
+
+@dataclass(frozen=True)
+class Itinerary:
+    """``runs`` drives in a space; ``proposes`` is whether the optimiser takes part, ``enough`` is for it."""
+
+    space: Space
+    runs: int
+    seed: int
+    proposes: bool = True
+    enough: float = ENOUGH
+
+    def generations(self, margins: Mapping[tuple[str, ...], float | None]) -> Iterator[list[Candidate]]:
+        """Candidates to be driven before the next ones are asked for; ``margins`` grows meanwhile.
+
+        It has the margin of drives by the texts of their values, None for one in error. Raises KeyError for values
+        that were not driven.
+        """
+        points = sweep(self.space, self.runs, self.seed)
+        done: list[Candidate] = []
+        number, is_exhausted = 0, False
+        while len(done) < self.runs and not is_exhausted:
+            first = self.runs if not self.proposes else FIRST if number == 0 else SWEPT
+            batch = [Candidate(values, True) for values in itertools.islice(points, first)]
+            if number and self.proposes:
+                tried = list(_tried(self.space, done, margins))
+                seen = {key(one.values) for one in (*done, *batch)}
+                proposed = propose(self.space, tried, seen, PROPOSED, (self.seed, number), self.enough)
+                is_exhausted = bool(tried) and not proposed
+                batch += [Candidate(values, False) for values in proposed]
+            batch = batch[: self.runs - len(done)]
+            yield batch
+            done += batch
+            number += 1
+
+
+def key(values: Values) -> tuple[str, ...]:
+    return tuple(texts(values).values())
+
+
+def _tried(space: Space, done: Sequence[Candidate], margins: Mapping[tuple[str, ...], float | None]) -> Iterator[Tried]:
+    """Each of the values once."""
+    for one in {key(candidate.values): candidate for candidate in done}.values():
+        margin = margins[key(one.values)]
+        if margin is not None:
+            yield Tried(space.point(texts(one.values)), margin)

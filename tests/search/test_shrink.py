@@ -1,0 +1,67 @@
+"""Failures shrunk, against areas in which drives fail."""
+
+from collections.abc import Callable
+
+import pytest
+
+from dodo_dsl.search.shrink import changed, nearest, shrink
+from dodo_dsl.search.space import texts
+from dodo_dsl.search.store import Drive
+from dodo_dsl.spec.instances.vary import Values
+from tests.search.test_space import space
+
+SPACE = space(
+    "{x: {from: -8 cm, to: 8 cm, nominal: 0.33 cm}, y: {from: 0, to: 1, nominal: 1}, n: {from: 0, to: 90, nominal: 5}, "
+    "m: {among: [a, b, c], nominal: b}}",
+    "n",
+)
+Fails = Callable[[float, float, int, str], bool]
+
+
+def fails(values: Values, rule: Fails) -> bool:
+    given = texts(values)
+    return rule(float(given["x"].split()[0]), float(given["y"]), int(given["n"]), given["m"])
+
+
+def shrunk(start: tuple[float, ...], rule: Fails) -> tuple[Values, int]:
+    """The values, and how many drives they took."""
+    first = SPACE.values(start)
+    assert fails(first, rule)
+    steps, number = shrink(SPACE, first), 0
+    asked = next(steps)
+    while True:
+        number += len(asked)
+        try:
+            asked = steps.send([fails(values, rule) for values in asked])
+        except StopIteration as end:
+            values: Values = end.value
+            return values, number
+
+
+@pytest.mark.parametrize(
+    ("rule", "expected"),
+    [
+        (lambda x, y, n, m: x > 5, {"x": "5.01 cm"}),
+        (lambda x, y, n, m: x < -2.5, {"x": "-2.51 cm"}),
+        (lambda x, y, n, m: n >= 40 and y < 0.25, {"y": "0.249", "n": "40"}),
+        (lambda x, y, n, m: m == "c" and n != 5, {"n": "6", "m": "c"}),
+        (lambda x, y, n, m: True, {}),
+    ],
+)
+def test_what_is_left_is_what_it_takes(rule: Fails, expected: dict[str, str]) -> None:
+    start = (0.99, 0.1, 0.9, 0.9) if "-" not in expected.get("x", "") else (0.01, 0.1, 0.9, 0.9)
+    values, number = shrunk(start, rule)
+    assert fails(values, rule)
+    assert {name: texts(values)[name] for name in changed(SPACE, values)} == expected
+    assert number < 50
+
+
+def test_either_of_two_is_enough() -> None:
+    values, _ = shrunk((0.99, 0.1, 0.9, 0.9), lambda x, y, n, m: x > 5 or n > 70)
+    assert len(changed(SPACE, values)) == 1
+
+
+def test_the_nearest_of_several() -> None:
+    far, near = (Drive(number, texts(SPACE.values(point)), "failed", -0.1, "") for number, point in
+                 enumerate([(0.9, 0.1, 0.9, 0.5), (0.6, 0.9, 0.1, 0.5)]))  # fmt: skip
+    assert nearest(SPACE, [far, near]) == near
