@@ -4,8 +4,9 @@ import difflib
 import functools
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +16,7 @@ Severity = Literal["error", "warning"]
 
 _MAX_FRAME_LINE = 160
 _MAX_FILE = 1 << 20
+_PARTS = re.compile(r"[-._]")
 
 
 @dataclass(frozen=True, order=True)
@@ -30,15 +32,24 @@ class Span:
     length: int = 1
 
 
+@dataclass(frozen=True)
+class Fix:
+    """What to write in place of ``old``, which the text at the diagnostic's span has once."""
+
+    old: str
+    new: str
+
+
 @dataclass(frozen=True, order=True)
 class Diagnostic:
-    """One problem; ``rule`` is its name in the rule catalogue."""
+    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` where there is exactly one."""
 
     span: Span
     rule: str
     message: str
     hint: str = ""
     severity: Severity = "error"
+    fix: Fix | None = field(default=None, compare=False)
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
@@ -50,15 +61,32 @@ def ordered(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     return sorted(set(diagnostics))
 
 
+def closest(word: str, known: Iterable[str]) -> list[str]:
+    """The known words of the same parts in another order, such as ``virtual-camera`` for ``camera-virtual``.
+
+    Otherwise at most two that are spelt alike, the nearest first.
+    """
+    choices = sorted(known)
+    parts = sorted(_PARTS.split(word.lower()))
+    turned = [choice for choice in choices if len(parts) > 1 and sorted(_PARTS.split(choice.lower())) == parts]
+    return turned[:1] or difflib.get_close_matches(word.lower(), choices, n=2, cutoff=0.6)
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """A hint that names the nearest known words, or all of them when they are few; empty when there are none."""
     choices = sorted(known)
-    close = difflib.get_close_matches(word.lower(), choices, n=2, cutoff=0.6)
+    close = closest(word, choices)
     if close:
         return "did you mean " + " or ".join(f"'{c}'" for c in close) + "?"
     if 0 < len(choices) <= 12:
         return "known: " + ", ".join(choices)
     return ""
+
+
+def only_fix(word: str, known: Iterable[str], taken: Collection[str] = ()) -> Fix | None:
+    """The known word that is meant, if it is the only one that is near and is not there already."""
+    close = closest(word, known)
+    return Fix(word, close[0]) if len(close) == 1 and close[0] not in taken else None
 
 
 def shown_path(file: str) -> str:
@@ -78,6 +106,11 @@ def _lines(file: str) -> list[str]:
         return []
     with path.open("rb") as stream:
         return stream.read(_MAX_FILE).decode("utf-8", "replace").splitlines()
+
+
+def forget_lines() -> None:
+    """To be called when files have changed."""
+    _lines.cache_clear()
 
 
 def _source_line(span: Span) -> str | None:

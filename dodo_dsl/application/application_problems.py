@@ -1,8 +1,11 @@
 """Problems of an application as a whole: missing files, dependency cycles, and no service that takes a CID."""
 
+import os
+import shlex
+import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
@@ -10,7 +13,7 @@ from dodo_dsl.application.host_access import references
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain, text
 from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.application.service_problems import Written, problems
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors
+from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, has_errors
 
 INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 
@@ -43,18 +46,46 @@ def _missing_files(service: ComposeService, application: ApplicationSource) -> I
 
 
 def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
-    """A missing script of ``x-dodo-process``; other programs may be built later, or be in the PATH."""
+    """What of ``x-dodo-process`` cannot start; programs may be built later, or be in the PATH of another machine."""
     process = service.node.get("x-dodo-process")
-    words = process.items if isinstance(process, source.Sequence) else ()
-    if len(words) < 2 or plain(words[0]) not in INTERPRETERS:
+    words = [word for word in process.items if isinstance(word, source.Scalar)] if _is_list(process) else []
+    if not words or "$" in words[0].text:
         return
-    script = words[1]
-    name = script.text if isinstance(script, source.Scalar) else ""
+    program = words[0]
+    if program.text in INTERPRETERS:
+        if len(words) > 1:
+            yield from _missing_script(program.text, words[1], folder)
+        return
+    own = folder / program.text
+    if "/" not in program.text:
+        near = [] if shutil.which(program.text) else closest(program.text, INTERPRETERS)
+        if near:
+            yield _cannot_start(program, f"there is no program '{program.text}'", f"did you mean '{near[0]}'?")
+    elif own.is_file() and not os.access(own, os.X_OK):
+        yield _cannot_start(
+            program, f"'{program.text}' is not executable", f"run: chmod +x {shlex.quote(program.text)}"
+        )
+    elif not own.exists() and own.parent.is_dir():
+        near = closest(own.name, [path.name for path in own.parent.iterdir() if os.access(path, os.X_OK)])
+        if near:
+            meant = program.text.removesuffix(own.name) + near[0]
+            yield _cannot_start(program, f"there is no program '{program.text}'", f"did you mean '{meant}'?")
+
+
+def _is_list(node: source.Node | None) -> TypeGuard[source.Sequence]:
+    return isinstance(node, source.Sequence)
+
+
+def _cannot_start(word: source.Scalar, message: str, hint: str) -> Diagnostic:
+    return Diagnostic(word.span, "application-file", message, hint, "warning")
+
+
+def _missing_script(interpreter: str, script: source.Scalar, folder: Path) -> Iterator[Diagnostic]:
+    name = script.text
     if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
-        message = f"there is no file '{name}' for {plain(words[0])} to run"
         beside = [path.name for path in folder.iterdir() if path.suffix == Path(name).suffix]
         hint = did_you_mean(Path(name).name, beside) or "without it the application starts in containers only"
-        yield Diagnostic(script.span, "application-file", message, hint, "warning")
+        yield _cannot_start(script, f"there is no file '{name}' for {interpreter} to run", hint)
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:

@@ -44,7 +44,8 @@ class EnvFile:
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo. ``cid_variables`` are the CID variables that its ``env_files`` set.
+    ``declared`` is None without x-dodo or with only ``tune`` there.
+    ``cid_variables`` are the CID variables that its ``env_files`` set.
     """
 
     name: str
@@ -134,6 +135,8 @@ def declared(service: source.Mapping) -> Declared | None:
     """The declaration of a service; None without ``x-dodo``."""
     entry = service.entries.get("x-dodo")
     if entry is None or not isinstance(entry.value, source.Mapping):
+        return None
+    if set(entry.value.entries) == {"tune"}:
         return None
     words = {key: tuple((s.text, s.span) for s in scalars(e.value)) for key, e in entry.value.entries.items()}
     inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))

@@ -80,6 +80,11 @@ def takes_memory(argv: Sequence[str]) -> bool:
     return any(_MEMORY.match(word) for word in argv)
 
 
+def memories(argv: Iterable[str]) -> list[str]:
+    """The names of the shared memories that a command asks for, without a leading slash."""
+    return [match["name"].removeprefix("/") for word in argv if (match := _MEMORY.match(word))]
+
+
 def with_cid(argv: Sequence[str], cid: int) -> tuple[str, ...]:
     """The command with ``--cid=N`` (and ``--cid N``) set."""
     return _map_flag([with_cid_text(word, cid) for word in argv], "--cid", lambda _: str(cid))

@@ -21,10 +21,11 @@ from dodo_dsl.application.load import load
 from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
 from dodo_dsl.application.service_environment import cid_variables, env_files
 from dodo_dsl.application.service_problems import unknown_keys
+from dodo_dsl.application.tunables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.source import Entry, Reader
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.schema import validate
+from dodo_dsl.spec.schema.validation import validate
 
 MAX_SERVICES = 256
 _OURS = ("services", "version", "name", "networks", "include")
@@ -58,6 +59,7 @@ def read_application(
     application = _application(paths[0].resolve(), document, services, files, access, limits)
     found.extend(_shared(document, application))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
+    found.extend(tunable_problems(application))
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
     refused = {problem.span for problem in found}
     withheld = secret_problems.withheld(nodes, files.variables, access.passed)

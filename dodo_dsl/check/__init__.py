@@ -8,11 +8,13 @@ from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.rules import (
+    camera_sources,
     clocks,
     goals,
     layers,
     levels,
     limits,
+    memories,
     messages,
     names,
     parameters,
@@ -32,6 +34,7 @@ RULES: tuple[Rule, ...] = (
     levels.check,
     clocks.check,
     rigs.check,
+    camera_sources.check,
     services.check,
     layers.check,
     parameters.check,
@@ -41,6 +44,7 @@ RULES: tuple[Rule, ...] = (
     goals.check,
     producers.check,
     variables.check,
+    memories.check,
 )
 
 

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Mapping, Node, Reader, read
-from dodo_dsl.spec import decimal_commas, extends
+from dodo_dsl.spec import extends
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.instances.matrix import Choice
-from dodo_dsl.spec.instances.placeholders import Placeholders
+from dodo_dsl.spec.instances.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, Spec, spec_of
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.schema import validate
+from dodo_dsl.spec.schema import decimal_commas
+from dodo_dsl.spec.schema.validation import validate
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
 """The instances of a file, and its problems."""
@@ -41,7 +42,8 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         spec, instance, problems = _at(Spec(location, choice=choice, is_whole=is_whole), template, ranges, {})
         found.extend(problems)
         if number == 0 or not checked_by_rules:
-            found.extend(d for d in validate(instance, "dodo") if is_whole or not _is_missing(d, node))
+            checked = instance if number == 0 else without(instance, MATRIX)
+            found.extend(d for d in validate(checked, "dodo") if is_whole or not _is_missing(d, node))
         corners, problems = _corners(spec)
         found.extend(problems)
         specs.append(replace(spec, corners=corners))
@@ -75,7 +77,7 @@ def _corners(spec: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
         corner, instance, problems = _at(replace(spec, choice=choice), spec.template, spec.ranges, values)
         found.extend(problems)
         if not checked_by_rules and spec.is_whole:
-            found.extend(validate(instance, "dodo"))
+            found.extend(validate(without(instance, MATRIX), "dodo"))
         corners.append(corner)
     return tuple(corners), found
 
@@ -90,12 +92,8 @@ def _only_in_parameters(node: Mapping, placeholders: Placeholders) -> bool:
     for key, entry in node.entries.items():
         if key in LAYERS and isinstance(entry.value, Mapping):
             for use in entry.value.entries.values():
-                if not isinstance(use.value, Mapping) or placeholders.names(_without_parameters(use.value)):
+                if not isinstance(use.value, Mapping) or placeholders.names(without(use.value, "with")):
                     return False
-        elif key != placeholders.key and placeholders.names(entry.value):
+        elif key not in (placeholders.key, MATRIX) and placeholders.names(entry.value):
             return False
     return True
-
-
-def _without_parameters(use: Mapping) -> Mapping:
-    return Mapping(use.span, {key: entry for key, entry in use.entries.items() if key != "with"})

@@ -8,7 +8,7 @@ from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors, shown_path
 from dodo_dsl.source import Mapping, Reader, plain, read
 from dodo_dsl.spec import manifest_consistency
-from dodo_dsl.spec.schema import validate
+from dodo_dsl.spec.schema.validation import validate
 
 Value = str | int | float | bool | list[str | int | float] | None
 

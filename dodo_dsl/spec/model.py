@@ -18,6 +18,8 @@ LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
 LEVELS = ("sil", "dil", "hil")
 KINDS = ("perception", "open-loop", "closed-loop")
+FRAMES = (ALWAYS, ON_FAILURE, NEVER) = ("always", "on-failure", "never")
+"""When the pictures of a test's cameras are kept."""
 _MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "application", "goals")
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
@@ -38,7 +40,8 @@ class Use:
 class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
-    ``isolation`` is None where the spec leaves it to the rig, ``frames_hz`` is 0 where no frames are recorded.
+    ``isolation`` is None where the spec leaves it to the rig. ``frames`` is one of FRAMES, ``frames_hz`` None for the
+    cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``variables`` are those that the application gets from the test, ``goals`` the soft ones by the names of checks.
@@ -57,7 +60,8 @@ class Spec:
     rig: str | None = None
     isolation: str | None = None
     seed: int = 0
-    frames_hz: float = 0.0
+    frames: str = ON_FAILURE
+    frames_hz: float | None = None
     record_limit_mb: float | None = None
     max_response_s: float | None = None
     response_over: float = 0.0
@@ -118,8 +122,16 @@ def _part(node: Node | None, key: str) -> Node | None:
     return node.get(key) if isinstance(node, Mapping) else None
 
 
-def _frames(node: Node | None) -> float:
-    return _number(_part(node, "frames"), "Hz") or 0.0
+def _frames(node: Node | None) -> tuple[str, float | None, list[Diagnostic]]:
+    """When pictures are kept, their rate in Hz, and problems; a rate in place of the word means always."""
+    frames = _part(node, "frames")
+    written = frames.value if isinstance(frames, Scalar) else ON_FAILURE
+    word = written if isinstance(written, str) and written in FRAMES else ALWAYS
+    bounds, expected = (0.01, 1000), "0.01 Hz to 1 kHz"
+    rate, found = _within(_part(node, "rate"), "rate", "Hz", bounds, expected)
+    if written not in FRAMES:
+        rate, found = _within(frames, "frames", "Hz", bounds, expected)
+    return word, rate, found
 
 
 def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -> tuple[Spec, list[Diagnostic]]:
@@ -134,6 +146,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
     timeout, found = _within(node.get("timeout"), "timeout", "s", (0.1, 86_400), "0.1 s to 24 h")
     longest, more = _within(_part(response, "max"), "max", "s", (0.0001, 3600), "0.1 ms to 1 h")
     largest, also = _within(_part(node.get("record"), "limit"), "limit", "MB", (1, 100_000), "1 MB to 100 GB")
+    frames, rate, wrong = _frames(node.get("record"))
     over, most = _within(_part(response, "over"), "over", quantity.SHARE, (0, 1), "0 % to 100 %")
     spec = Spec(
         location,
@@ -146,7 +159,8 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         rig=text("rig"),
         isolation=text("isolation"),
         seed=_seed(node.get("seed")),
-        frames_hz=_frames(node.get("record")),
+        frames=frames,
+        frames_hz=rate,
         record_limit_mb=largest,
         max_response_s=longest,
         response_over=over or 0.0,
@@ -158,7 +172,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         spans={key: entry.value.span for key, entry in node.entries.items()},
         is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),
     )
-    return spec, [*found, *more, *also, *most]
+    return spec, [*found, *more, *also, *wrong, *most]
 
 
 def _variables(application: Node | None) -> dict[str, Entry]:

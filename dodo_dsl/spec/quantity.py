@@ -3,7 +3,7 @@
 import re
 from decimal import Decimal, InvalidOperation, localcontext
 
-from dodo_dsl.diagnostics import did_you_mean
+from dodo_dsl.diagnostics import Fix, did_you_mean, only_fix
 
 SHARE = "1"
 """The unit of shares, which need none: 0.5 is 50 %."""
@@ -39,11 +39,12 @@ UNITS = tuple(_DIMENSION)
 
 
 class QuantityError(ValueError):
-    """A value is not a quantity in the expected unit; ``hint`` suggests one."""
+    """A value is not a quantity in the expected unit; ``hint`` suggests one, ``fix`` is the only one."""
 
-    def __init__(self, message: str, hint: str = "") -> None:
+    def __init__(self, message: str, hint: str = "", fix: Fix | None = None) -> None:
         super().__init__(message)
         self.hint = hint
+        self.fix = fix
 
 
 def units_of(unit: str) -> list[str]:
@@ -83,7 +84,7 @@ def convert(value: object, unit: str) -> Decimal:
     written = match["unit"]
     if written not in _DIMENSION:
         siblings = _FACTORS[_DIMENSION[unit]]
-        raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings))
+        raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings), only_fix(written, siblings))
     if _DIMENSION[written] != _DIMENSION[unit]:
         message = f"'{text}' is {_a(_DIMENSION[written])}, expected {_a(_DIMENSION[unit])} in {unit}"
         raise QuantityError(message, _example(match["number"], unit))

@@ -7,7 +7,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Literal
 
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Mapping, Node, Scalar, Sequence, path_of
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Parameter
@@ -32,9 +32,9 @@ class Value:
 class ValueProblem(Exception):
     """A written value does not fit its parameter."""
 
-    def __init__(self, span: Span, rule: str, message: str, hint: str = "") -> None:
+    def __init__(self, span: Span, rule: str, message: str, hint: str = "", fix: Fix | None = None) -> None:
         super().__init__(message)
-        self.diagnostic = Diagnostic(span, rule, message, hint)
+        self.diagnostic = Diagnostic(span, rule, message, hint, fix=fix)
 
 
 def convert(parameter: Parameter, node: Node, root: Path) -> Value:
@@ -77,7 +77,8 @@ def _number(parameter: Parameter, node: Node, _: Path) -> Value:
         try:
             number = quantity.convert(scalar.text, parameter.unit)
         except quantity.QuantityError as error:
-            raise ValueProblem(scalar.span, "wrong-unit", f"{_name(parameter)}: {error}", error.hint) from error
+            message = f"{_name(parameter)}: {error}"
+            raise ValueProblem(scalar.span, "wrong-unit", message, error.hint, error.fix) from error
     else:
         number = _bare_number(parameter, scalar)
     return _bounded(parameter, scalar, number)
@@ -116,7 +117,8 @@ def _text(parameter: Parameter, node: Node, _: Path) -> Value:
     _check_text(parameter, scalar)
     if parameter.choices and scalar.text not in parameter.choices:
         message = f"{_name(parameter)} is '{scalar.text}', expected one of {', '.join(parameter.choices)}"
-        raise ValueProblem(scalar.span, "wrong-value", message, did_you_mean(scalar.text, parameter.choices))
+        hint, fix = did_you_mean(scalar.text, parameter.choices), only_fix(scalar.text, parameter.choices)
+        raise ValueProblem(scalar.span, "wrong-value", message, hint, fix)
     return Value(scalar.text)
 
 

@@ -36,10 +36,16 @@ def test_missing_files(tmp_path: Path) -> None:
         ("[python, $A]", []),
         ("[./drive]", []),
         ("[build/drive, drive.py]", []),
+        ("[pyhton, here.py]", ["there is no program 'pyhton'"]),
+        ("[rosrun, here.py]", []),
+        ("[./here.py]", ["'./here.py' is not executable"]),
+        ("[./there]", ["there is no program './there'"]),
+        ("[./three]", []),
     ],
 )
-def test_missing_scripts(process: str, expected: list[str], tmp_path: Path) -> None:
+def test_missing_programs(process: str, expected: list[str], tmp_path: Path) -> None:
     (tmp_path / "here.py").touch()
+    (tmp_path / "three").touch(0o755)
     service = f"a: {{image: x, command: --cid=1, x-dodo-process: {process}}}"
     assert messages(service, tmp_path) == expected
 

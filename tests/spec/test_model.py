@@ -35,6 +35,22 @@ def test_a_spec(tmp_path: Path) -> None:
     assert spec.span("rig").line == 1
 
 
+@pytest.mark.parametrize(
+    ("record", "frames"),
+    [
+        ("", ("on-failure", None)),
+        ("record: {limit: 5 MB}", ("on-failure", None)),
+        ("record: {frames: never}", ("never", None)),
+        ("record: {rate: 5 Hz}", ("on-failure", 5.0)),
+        ("record: {frames: always, rate: 5 Hz}", ("always", 5.0)),
+        ("record: {frames: 5 Hz}", ("always", 5.0)),
+    ],
+)
+def test_when_pictures_are_kept(tmp_path: Path, record: str, frames: tuple[str, float | None]) -> None:
+    (spec,), problems = loaded(tmp_path, f"{examples.SPEC}{record}\n")
+    assert (problems, (spec.frames, spec.frames_hz)) == ([], frames)
+
+
 def test_instances(tmp_path: Path) -> None:
     specs, problems = loaded(tmp_path, examples.SPEC.replace("finish line.", "${matrix.a}") + "matrix: {a: [x, y]}\n")
     assert problems == []

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.source import MAX_PROBLEMS, Scalar, Sequence
 
 
@@ -26,4 +26,5 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
 def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:
     if name and name not in context.messages:
         hint = did_you_mean(name, context.messages) or "add the files of your own messages under 'messages' in dodo.yml"
-        yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint)
+        fix = only_fix(name, context.messages)
+        yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint, fix=fix)

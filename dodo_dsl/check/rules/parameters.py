@@ -7,7 +7,7 @@
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, only_fix
 from dodo_dsl.slips.keys import meant, slip_in_key
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.arguments import ResolvedService
@@ -30,7 +30,8 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
             slip = slip_in_key(name, known, is_empty=_is_empty(entry))
             message = slip.message if slip else f"service '{service.manifest.name}' has no parameter '{name}'"
             hint = slip.hint if slip else did_you_mean(name, known)
-            yield Diagnostic(entry.key, "unknown-parameter", message, hint)
+            fix = slip.fix if slip else only_fix(name, known, service.use.parameters)
+            yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
         elif argument.problem:
             yield argument.problem
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, only_fix
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 
@@ -46,7 +46,8 @@ def _among(service: ResolvedService, argument: Argument, entry: Entry) -> Iterat
     for item in items[:MAX_PROBLEMS]:
         if isinstance(item, Scalar) and item.text not in names and not _ATTEMPT.search(item.text):
             message = f"'{item.text}' is not among the {key} of {file.parent.name}/{file.name}"
-            yield Diagnostic(item.span, "unknown-name", message, did_you_mean(item.text, names))
+            hint, fix = did_you_mean(item.text, names), only_fix(item.text, names)
+            yield Diagnostic(item.span, "unknown-name", message, hint, fix=fix)
 
 
 def _file(argument: Argument) -> Path | None:

@@ -6,7 +6,7 @@
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, only_fix
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
@@ -14,7 +14,8 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
     for use in context.spec.uses:
         if use.uses.text not in context.manifests:
             hint = did_you_mean(use.uses.text, context.manifests)
-            yield Diagnostic(use.uses.span, "unknown-service", f"unknown service '{use.uses.text}'", hint)
+            message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
+            yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
         if use.name == "sandbox" or use.name.startswith("dodo-"):
             message = f"the name '{use.name}' is reserved for DoDo's own services"
             hint = "choose another name; 'sandbox' and 'dodo-...' are reserved"

@@ -12,9 +12,10 @@ from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec.deployment import rig
+from dodo_dsl.spec.deployment.given_limits import sandbox_limits
 from dodo_dsl.spec.deployment.rig import Rig
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits, sandbox_limits
-from dodo_dsl.spec.schema import validate
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.schema.validation import validate
 
 _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"

@@ -13,7 +13,7 @@ from pathlib import Path
 from dodo_dsl.diagnostics import format_text
 from dodo_dsl.source import Mapping, parse, plain
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.schema import validate
+from dodo_dsl.spec.schema.validation import validate
 
 FILE = Path("/etc/dodo/rigs.yml")
 UNITS = {"x": "m", "y": "m", "yaw": "deg", "speed": "m/s", "yaw-rate": "rad/s"}

@@ -8,6 +8,9 @@ from dodo_dsl.source import Entry, Mapping, Node, Scalar, parse
 
 EMULATED = "emulated"
 EMULATED_FILE = "the emulated rig"
+RPICAM = "rpicam"
+"""The source of a camera of a Raspberry Pi."""
+CAMERA_SOURCE = "camera.source"
 PORT = "serial"
 """The key of a rig's port. A service whose manifest takes a parameter from it moves the rig."""
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Mapping, Node, Scalar, Sequence
-from dodo_dsl.spec.instances.placeholders import Placeholders
+from dodo_dsl.spec.instances.placeholders import MATRIX, Placeholders
 
-KEY = "matrix"
+KEY = MATRIX
 MAX_INSTANCES = 2_000
 MAX_SLUG = 180
 

@@ -9,6 +9,12 @@ from dataclasses import dataclass
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
 
+MATRIX = "matrix"
+
+
+def without(node: Mapping, key: str) -> Mapping:
+    return Mapping(node.span, {name: entry for name, entry in node.entries.items() if name != key}, node.tag)
+
 
 @dataclass(frozen=True)
 class Placeholders:
@@ -59,8 +65,17 @@ class Placeholders:
                 yield Diagnostic(scalar.span, rule, self.lacks.format(match["name"]), hint)
 
     def filled(self, node: Node, values: Values[str, Scalar]) -> Node:
-        """The node with values for the placeholders; nodes without placeholders stay the same objects."""
-        return self._filled(node, values) if values else node
+        """The node with values for the placeholders; nodes without placeholders stay the same objects.
+
+        A spec's matrix, which may be large, stays as it is: its values are filled where they are used.
+        """
+        if not values or not isinstance(node, Mapping) or MATRIX not in node.entries:
+            return self._filled(node, values) if values else node
+        rest = without(node, MATRIX)
+        filled = self._filled(rest, values)
+        assert isinstance(filled, Mapping)
+        entries = {key: filled.entries.get(key, entry) for key, entry in node.entries.items()}
+        return node if filled is rest else Mapping(node.span, entries, node.tag)
 
     def _filled(self, node: Node, values: Values[str, Scalar]) -> Node:
         if isinstance(node, Scalar):

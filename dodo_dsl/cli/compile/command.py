@@ -6,23 +6,30 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.compile import fixes
+from dodo_dsl.cli.compile.formats import FORMATS, rendered
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.cli.formats import FORMATS, rendered
+from dodo_dsl.cli.numbers import patience, positive
 from dodo_dsl.compiler import Checked, NoApplication, plan
-from dodo_dsl.diagnostics import Diagnostic, format_text, has_errors, ordered
+from dodo_dsl.diagnostics import Diagnostic, forget_lines, format_text, has_errors, ordered
 from dodo_dsl.emit.output_folder import differences, stale_folders, write
+from dodo_dsl.plan.model import Suite
 
 EXAMPLES = """examples:
   dodo compile                             all tests of the deployment, into generated/
   dodo compile tests/my-test -o out        one folder of tests
   dodo compile --check                     problems of all tests; writes nothing
+  dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
   dodo compile --check --format gitlab     the same as a code quality report; sarif and junit are others
+  dodo compile --forecast 4 --times dodo-report    how long the pipeline takes with four runners
 """
 
 
+_OVERHEAD_S = 10.0  # from when GitLab gives a job to a runner until its test begins, and at its end
 _SHORT_DIFF = 30  # lines that are shown without --diff
 _MOST_NAMES = 8
+_MOST_PASSES = 5
 _MOST_PROBLEMS = 1000
 
 
@@ -37,16 +44,41 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
     parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
+    parser.add_argument("--fix", action="store_true",
+                        help="with --check: correct names, units and spaces where there is one way to")  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="text", help="format of the diagnostics (default: text)")
+    parser.add_argument("--forecast", type=positive, metavar="R", help="say how long the pipeline takes with R runners")
+    parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
+                        help="results or report with times; repeatable (default: the history here)")  # fmt: skip
+    parser.add_argument("--overhead", type=patience, default=_OVERHEAD_S, metavar="S",
+                        help="seconds that a runner needs to begin a job (default: %(default)g)")  # fmt: skip
     selection.add_application(parser)
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if options.forecast and options.check:
+        raise UsageError("--forecast needs the pipeline, which --check does not write: call dodo compile without it")
+    if options.fix and not options.check:
+        raise UsageError("--fix applies to --check")
     checked = selection.select(options.path, (), options.application)
+    if options.fix:
+        checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
     (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
     if options.check:
         return _check(checked, options, stdout, stderr)
-    return _write(checked, options, stdout)
+    return _write(checked, options, stdout, stderr)
+
+
+def _fixed(checked: Checked, options: argparse.Namespace, out: TextIO) -> Checked:
+    """The tests as they are with all fixes, one of which may bring the next to light."""
+    for _ in range(_MOST_PASSES):
+        diff = fixes.apply(checked.diagnostics, checked.deployment.root)
+        if not diff:
+            break
+        out.write(diff)
+        forget_lines()
+        checked = selection.select(options.path, (), options.application)
+    return checked
 
 
 def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: TextIO) -> None:
@@ -94,7 +126,7 @@ def _names(names: Sequence[str]) -> str:
     return ", ".join(names[:_MOST_NAMES]) + more
 
 
-def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int:
+def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if not checked.ok:
         _show(list(checked.diagnostics), options.format, checked, stdout)
         return Exit.USAGE
@@ -106,13 +138,24 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO) -> int
     _show(diagnostics, options.format, checked, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
+    expected = _forecast(made.compiled.suite, options)
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output)
     if options.format == "text":
         stdout.write(f"{_count(len(made.compiled.suite.plans))} compiled into {options.output}\n")
         if gone:
             stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
+    (stdout if options.format == "text" else stderr).write(expected)
     return Exit.OK
+
+
+def _forecast(suite: Suite, options: argparse.Namespace) -> str:
+    """How long the pipeline takes, if that is wanted; raises UsageError for what has no times."""
+    if not options.forecast or not suite.plans:
+        return ""
+    from dodo_dsl.cli.compile.forecast import forecast_text
+
+    return forecast_text(suite, options.forecast, options.times, options.overhead)
 
 
 def _count(number: int, what: str = "test") -> str:

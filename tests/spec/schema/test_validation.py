@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.spec.schema import validate
+from dodo_dsl.spec.schema.validation import validate
 from tests.check import examples
 from tests.source.nodes import mapping
 

@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from dodo_dsl import package_data
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.consequences import unindented, without_consequences
+from dodo_dsl.spec.schema.consequences import unindented, without_consequences
 
 _UNIT = "x-unit"
+_WORDS = "x-words"
+"""Allowed in place of a quantity."""
 _HINT = "x-hint"
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
@@ -32,16 +34,28 @@ def _validator(name: str) -> Any:
     from jsonschema import Draft202012Validator, ValidationError
     from jsonschema.validators import extend
 
-    def is_quantity(_: Any, unit: str, instance: object, __: object) -> Iterator[Any]:
-        with_unit = isinstance(instance, str)
+    def is_quantity(_: Any, unit: str, instance: object, schema: dict[str, Any]) -> Iterator[Any]:
+        with_unit = isinstance(instance, str) and instance not in schema.get(_WORDS, ())
         try:
             quantity.convert(instance, unit) if with_unit else None
         except quantity.QuantityError as error:
             yield ValidationError(str(error))
 
+    valid: set[tuple[int, str]] = set()
+
+    def properties(validator: Any, known: dict[str, Any], instance: Any, _: Any) -> Iterator[Any]:
+        """The keyword ``properties``; a value that was valid once is not looked at again, as instances have many."""
+        for key, schema in known.items() if isinstance(instance, dict) else ():
+            if key in instance and (known_as := (id(schema), repr(instance[key]))) not in valid:
+                error = None
+                for error in validator.descend(instance[key], schema, path=key, schema_path=key):
+                    yield error
+                if error is None:
+                    valid.add(known_as)
+
     schema = json.loads((package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
     schema.get("$defs", {}).get("use", {}).pop("allOf", None)  # for editors; the rules give better messages
-    return extend(Draft202012Validator, {_UNIT: is_quantity})(schema)  # type: ignore[no-untyped-call]
+    return extend(Draft202012Validator, {_UNIT: is_quantity, "properties": properties})(schema)  # type: ignore[no-untyped-call]
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
@@ -116,9 +130,10 @@ def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
     for name in itertools.islice(unknown, MAX_PROBLEMS):
         found = slip_in_key(name, known, is_empty=error.instance[name] is None)
         if found:
-            yield Diagnostic(place.key(name), "unknown-key", found.message, found.hint)
+            yield Diagnostic(place.key(name), "unknown-key", found.message, found.hint, fix=found.fix)
         elif name not in beside:
-            yield Diagnostic(place.key(name), "unknown-key", f"unknown key {_shown(name)}", did_you_mean(name, known))
+            message, fix = f"unknown key {_shown(name)}", only_fix(name, known, error.instance)
+            yield Diagnostic(place.key(name), "unknown-key", message, did_you_mean(name, known), fix=fix)
         elif name == next(key for key in beside if beside[key] == beside[name]):
             message = f"{_shown(name)} stands beside '{beside[name]}', which is empty"
             hint = f"indent what belongs to '{beside[name]}'"
@@ -167,10 +182,16 @@ def _kind(value: object) -> str:
 
 
 def _quantity(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    words = error.schema.get(_WORDS, ())
+    if words and isinstance(error.instance, str) and error.instance[:1].isalpha():
+        message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(words)}"
+        hint = did_you_mean(error.instance, words)
+        yield Diagnostic(place.span, "wrong-value", message, hint if hint.startswith("did") else "")
+        return
     try:
         quantity.convert(place.node.text if isinstance(place.node, Scalar) else None, error.schema[_UNIT])
     except quantity.QuantityError as problem:
-        yield Diagnostic(place.span, "wrong-unit", f"{place.name}: {problem}", problem.hint)
+        yield Diagnostic(place.span, "wrong-unit", f"{place.name}: {problem}", problem.hint, fix=problem.fix)
 
 
 def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -178,9 +199,10 @@ def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(choices)}"
     hint = did_you_mean(str(error.instance), choices)
     hint = hint if hint.startswith("did") else ""
+    fix = only_fix(str(error.instance), choices)
     if "#" in str(error.instance):
-        hint = "a comment begins with ' #', after a space"
-    yield Diagnostic(place.span, "wrong-value", message, hint)
+        hint, fix = "a comment begins with ' #', after a space", None
+    yield Diagnostic(place.span, "wrong-value", message, hint, fix=fix)
 
 
 def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:

@@ -1,0 +1,48 @@
+"""The parser of a command line, which suggests what a mistyped word may mean below the usage of its command."""
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+_CHOICE = re.compile(r"argument (?P<what>.+?): invalid choice: (?P<word>.+?) \(choose from (?P<known>.*)\)", re.DOTALL)
+_NAMES = {"COMMAND": "command", "ACTION": "action"}
+
+
+class Arguments(argparse.ArgumentParser):
+    """Like argparse's parser, but the subcommand itself reports its unknown options."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(self._unknown(unknown[0]))
+        return found, unknown
+
+    def error(self, message: str) -> NoReturn:
+        choice = _CHOICE.fullmatch(message)
+        super().error(_wrong_choice(choice) if choice else message)
+
+    def _unknown(self, word: str) -> str:
+        option = word.partition("=")[0]
+        if not option.startswith("-"):
+            return f"'{word}' is one word too many"
+        options = [known for action in self._actions for known in action.option_strings if known.startswith("--")]
+        return f"unknown option '{option}'" + _hint(option, options)
+
+
+def _wrong_choice(choice: re.Match[str]) -> str:
+    word, known = choice["word"].strip("'\""), [name.strip("' ") for name in choice["known"].split(",")]
+    what = choice["what"]
+    if what in _NAMES:
+        return f"unknown {_NAMES[what]} '{word}'" + _hint(word, known)
+    return f"{what}: '{word}' is not one of {', '.join(known)}" + _hint(word, known, only_near=True)
+
+
+def _hint(word: str, known: Sequence[str], *, only_near: bool = False) -> str:
+    """A suggestion; the hyphens before an option make no word like another."""
+    from dodo_dsl.diagnostics import closest
+
+    names = {option.lstrip("-"): option for option in known}
+    if near := closest(word.lstrip("-"), names):
+        return "; did you mean " + " or ".join(f"'{names[name]}'" for name in near) + "?"
+    return "" if only_near else "; --help shows what there is"

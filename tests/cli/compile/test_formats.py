@@ -1,0 +1,94 @@
+"""Formats of diagnostics, as their readers read them."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from junitparser import JUnitXml
+
+from dodo_dsl.check import catalogue
+from dodo_dsl.cli.compile.formats import FORMATS
+from tests.check import examples
+from tests.emit.readers import run
+
+WRONG = examples.SPEC.replace("name: example", "name: bad one").replace(
+    "goal: finish", "goal: \\u00e9nd, matx-time: 1 s"
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A test without problems, one with two errors, and one with a warning."""
+    examples.write("", tmp_path)
+    for name, text in (
+        ("bad one", WRONG),
+        ("warned", examples.SPEC.replace("example", "warned") + "matrix: {a: [1]}\n"),
+    ):
+        (tmp_path / "tests" / name).mkdir()
+        (tmp_path / "tests" / name / f"{name}.dodo.yml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def sarif() -> dict[str, Any]:
+    code, out, err = run("compile", "--check", "--format", "sarif")
+    assert (code, err) == (2, "")
+    (found,) = json.loads(out)["runs"]
+    assert isinstance(found, dict)
+    return found
+
+
+def test_sarif(folder: Path) -> None:
+    found = sarif()
+    rules = [rule["id"] for rule in found["tool"]["driver"]["rules"]]
+    results = {result["ruleId"]: result for result in found["results"]}
+    assert set(rules) == set(results)
+    assert all(rules[result["ruleIndex"]] == result["ruleId"] for result in results.values())
+    unknown = results["unknown-parameter"]
+    assert unknown["level"] == "error"
+    assert unknown["message"]["text"].endswith(
+        "has no parameter 'matx-time' (did you mean 'max-time' or 'max-silence'?)"
+    )
+    (place,) = unknown["locations"]
+    column = WRONG.splitlines()[-1].index("matx-time") + 1
+    assert place["physicalLocation"] == {
+        "artifactLocation": {"uri": "tests/bad%20one/bad%20one.dodo.yml"},
+        "region": {"startLine": 13, "startColumn": column, "endColumn": column + len("matx-time")},
+    }
+    assert results["matrix-unused"]["level"] == "warning"
+
+
+def test_fingerprints_stay_when_lines_move(folder: Path) -> None:
+    before = [result["partialFingerprints"] for result in sarif()["results"]]
+    bad = folder / "tests/bad one/bad one.dodo.yml"
+    bad.write_text(f"# a comment\n{WRONG}")
+    assert [result["partialFingerprints"] for result in sarif()["results"]] == before
+    assert len({mark["dodo/v1"] for mark in before}) == len(before)
+
+
+def test_junit(folder: Path) -> None:
+    code, out, err = run("compile", "--check", "--format", "junit")
+    assert (code, err) == (2, "")
+    document = JUnitXml.fromstring(out.encode())
+    assert (document.tests, document.failures) == (4, 1)
+    cases = {case.name: case for suite in document for case in suite}
+    assert list(cases) == [f"tests/{name}/{name}.dodo.yml" for name in ("bad one", "base", "example", "warned")]
+    (failure,) = cases["tests/bad one/bad one.dodo.yml"].result
+    assert failure.text.count("error[") == 3
+    assert failure.type == failure.text.partition("error[")[2].partition("]")[0]
+    assert not cases["tests/example/example.dodo.yml"].result
+    assert "warning[matrix-unused]" in cases["tests/warned/warned.dodo.yml"].system_out
+    assert not cases["tests/warned/warned.dodo.yml"].result
+
+
+@pytest.mark.parametrize("style", [style for style in FORMATS if style != "text"])
+def test_nothing_else_is_on_standard_output(folder: Path, style: str) -> None:
+    _, out, _ = run("compile", "--check", "--format", style)
+    assert out[0] in "<[{"
+    assert out.rstrip()[-1] in ">]}"
+
+
+def test_every_rule_has_a_page(folder: Path) -> None:
+    """As SARIF's descriptions of rules are made of them."""
+    assert {result["ruleId"] for result in sarif()["results"]} <= set(catalogue.pages())
