@@ -4,9 +4,10 @@ It shows everything without its script, which searches, filters and sorts.
 """
 
 import base64
+import functools
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import jinja2
@@ -14,7 +15,7 @@ from markupsafe import Markup
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report import matrix_grid
+from dodo_dsl.report import check_history, matrix_grid
 from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.comparison import KINDS, Comparison
 from dodo_dsl.report.machine_line import machine_line
@@ -29,7 +30,10 @@ class ReportPicture(NamedTuple):
 
 @dataclass(frozen=True)
 class ReportFiles:
-    """The files beside the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty."""
+    """The files beside the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty.
+
+    ``past`` are earlier values of checks.
+    """
 
     pictures: Mapping[str, Sequence[ReportPicture]]
     logs: Mapping[str, Sequence[str]]
@@ -37,6 +41,7 @@ class ReportFiles:
     specs: Mapping[str, str]
     drives: Mapping[str, str]
     times: str = ""
+    past: check_history.Past = field(default_factory=dict)
 
 
 MEANINGS = {
@@ -58,21 +63,16 @@ _DIRECTIONS = ("worse", "better", "different")
 def render(outcomes: Sequence[Outcome], files: ReportFiles, comparison: Comparison | None = None) -> str:
     """The page; with a comparison, what changed since the report that it names."""
     folder = package_data.templates()
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        finalize=_harmless,
-    )
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
     script, style = ((folder / "report" / name).read_text(encoding="utf-8") for name in ("suite.js", "suite.css"))
-    return environment.get_template("report.html.j2").render(
+    return _template().render(
         outcomes=outcomes,
         files=files,
         meanings=MEANINGS,
         counts=counts,
         version=__version__,
         machine_line=machine_line,
+        curve=check_history.curve,
         grids=matrix_grid.grids(outcomes),
         decisive_value=matrix_grid.decisive_value,
         comparison=comparison,
@@ -85,6 +85,17 @@ def render(outcomes: Sequence[Outcome], files: ReportFiles, comparison: Comparis
         style=style,
         hash=_source_hash,
     )
+
+
+@functools.cache
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(package_data.templates()),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
+        finalize=_harmless,
+    )
+    return environment.get_template("report.html.j2")
 
 
 def _source_hash(text: str) -> str:

@@ -1,7 +1,7 @@
 """``junit.xml`` as GitLab reads it: failed is a failure, error an error, the class name is the level."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +11,20 @@ from dodo_dsl.outcome import Outcome
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def write(path: Path, outcomes: Sequence[Outcome], attachments: dict[str, str]) -> None:
-    """Writes the file; ``attachments`` are paths of pictures by slug, relative to the working folder."""
+def write(path: Path, outcomes: Sequence[Outcome], attachments: Mapping[str, str], links: Mapping[str, str]) -> None:
+    """Writes the file; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder."""
     from junitparser import JUnitXml, TestSuite
 
     suite = TestSuite("dodo")
     for outcome in outcomes:
-        suite.add_testcase(_case(outcome, attachments.get(outcome.slug)))
+        suite.add_testcase(_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)))
     document = JUnitXml("dodo")
     document.add_testsuite(suite)
     document.update_statistics()  # type: ignore[no-untyped-call]
     document.write(str(path), pretty=True)
 
 
-def _case(outcome: Outcome, attachment: str | None) -> Any:
+def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
     from junitparser import Error, Failure, TestCase
 
     case = TestCase(xml_text(outcome.name), classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
@@ -32,8 +32,10 @@ def _case(outcome: Outcome, attachment: str | None) -> Any:
     if outcome.outcome != "passed":
         kind = Failure if outcome.outcome == "failed" else Error
         result = kind(xml_text(outcome.reason), outcome.outcome)
-        result.text = xml_text("\n".join([outcome.reason, *outcome.last_lines]))
+        replay = [f"replay: {link}"] if link else []
+        result.text = xml_text("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
+    # GitLab shows the text of a failure in place of this, and takes the attachment from here
     lines = [check_line(check) for check in outcome.checks] + [f"note: {note}" for note in outcome.notes]
     if attachment:
         lines.append(f"[[ATTACHMENT|{attachment}]]")

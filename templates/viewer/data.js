@@ -20,18 +20,19 @@ dodo.data = (function () {
     return low - 1;
   }
 
-  function channel(raw) {
+  function unpacked(raw) {
     const fields = raw.fields.map((field) => ({ name: field.name, values: unpack(field.values) }));
-    return { message: raw.message, sender: raw.sender, every: raw.every, times: unpack(raw.times), fields };
+    return { ...raw, times: unpack(raw.times), fields };
   }
 
   const test = window.dodoTest;
-  const channels = test.channels.map(channel);
+  const channels = test.channels.map(unpacked);
 
   return {
     test,
     channels,
     unpack,
+    unpacked,
     at,
     channel: (message, sender) => channels.find((c) => c.message === message && c.sender === sender),
     field: (found, name) => found && found.fields.find((f) => f.name === name),

@@ -18,7 +18,7 @@ dodo.map = (function () {
 
   // Equal axes around way and lines; far cones may fall outside.
   function fit(width, height) {
-    const points = way.poses.map((pose) => [pose.x, pose.y]);
+    const points = [...way.poses, ...way.before].map((pose) => [pose.x, pose.y]);
     for (const each of test.scene.lines) for (const [a, b, c, d] of each.lines) points.push([a, b], [c, d]);
     const [xs, ys] = [0, 1].map((n) => points.map((point) => point[n]));
     const [left, right, low, high] = [Math.min, Math.max].flatMap((f) => [xs, ys].map((all) => all.reduce((a, b) => f(a, b))))
@@ -81,11 +81,20 @@ dodo.map = (function () {
     context.stroke();
   }
 
-  function vehicle(context, pose) {
+  // What the same test did in the report that this one is compared with.
+  function earlier(context, time) {
+    if (!way.before.length) return;
+    context.setLineDash([5, 4]);
+    driven(context, way.before, "before", 2);
+    context.setLineDash([]);
+    vehicle(context, way.poseBefore(time), "before");
+  }
+
+  function vehicle(context, pose, colour) {
     const ring = dodo.geometry.corners(pose, way.length || 0.36, way.width || 0.16);
     trace(context, ring.map(([x, y]) => view.to(x, y)));
     context.closePath();
-    context.fillStyle = dodo.canvas.colour("vehicle");
+    context.fillStyle = dodo.canvas.colour(colour);
     context.globalAlpha = 0.35;
     context.fill();
     context.globalAlpha = 1;
@@ -133,16 +142,23 @@ dodo.map = (function () {
     const time = dodo.cursor.time();
     view = look(width, height);
     ground(context);
+    earlier(context, time);
     driven(context, way.poses, "faint", 2);
     driven(context, way.poses.slice(0, dodo.data.at(way.times, time) + 1), "way", 2.5);
     if (test.test.outcome !== "passed") failure(context);
-    vehicle(context, way.pose(time));
+    vehicle(context, way.pose(time), "vehicle");
     scaleBar(context, height);
+  }
+
+  function apart(time) {
+    const [a, b] = [way.pose(time), way.poseBefore(time)];
+    return `; dashed: before (${window.dodoBefore.outcome}), ${Math.hypot(a.x - b.x, a.y - b.y).toFixed(2)} m apart`;
   }
 
   function label(time) {
     const pose = way.pose(time);
-    return `x ${pose.x.toFixed(2)} m, y ${pose.y.toFixed(2)} m, heading ${((pose.heading * 180) / Math.PI).toFixed(0)}°`;
+    const rest = way.before.length ? apart(time) : "";
+    return `x ${pose.x.toFixed(2)} m, y ${pose.y.toFixed(2)} m, heading ${((pose.heading * 180) / Math.PI).toFixed(0)}°${rest}`;
   }
 
   function add(parent, name, look) {

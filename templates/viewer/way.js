@@ -6,6 +6,7 @@ dodo.way = (function () {
   const { frame, length, width } = test.scene;
   const found = channel(frame.message, frame.sender) || dodo.data.channels.find((c) => c.message === frame.message);
   const poses = found ? read(found) : [];
+  const before = window.dodoBefore ? read(dodo.data.unpacked(window.dodoBefore)) : [];
 
   function read(source) {
     const [x, y, qx, qy, qz, qw] = ["x", "y", "qx", "qy", "qz", "qw"].map((name) => field(source, name).values);
@@ -17,12 +18,15 @@ dodo.way = (function () {
     return list;
   }
 
-  const times = Float32Array.from(poses, (pose) => pose.time);
+  const timesOf = (list) => Float32Array.from(list, (pose) => pose.time);
+  const [times, timesBefore] = [timesOf(poses), timesOf(before)];
+  const pose = (time) => between(poses, times, time);
+  const poseBefore = (time) => between(before, timesBefore, time);
 
   // The pose at a time, between those that were sent.
-  function pose(time) {
+  function between(list, times, time) {
     const n = Math.max(at(times, time), 0);
-    const [a, b] = [poses[n], poses[Math.min(n + 1, poses.length - 1)]];
+    const [a, b] = [list[n], list[Math.min(n + 1, list.length - 1)]];
     if (a === b || time <= a.time) return a;
     const share = Math.min(1, (time - a.time) / (b.time - a.time));
     const turn = Math.atan2(Math.sin(b.heading - a.heading), Math.cos(b.heading - a.heading));
@@ -51,5 +55,5 @@ dodo.way = (function () {
     return best && best.time;
   }
 
-  return { poses, times, pose, speeds, margins, nearest, length, width };
+  return { poses, times, pose, before, poseBefore, speeds, margins, nearest, length, width };
 })();

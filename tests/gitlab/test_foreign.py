@@ -16,7 +16,13 @@ pytestmark = pytest.mark.slow
 DEPLOYMENT = "  - local: .gitlab/dodo/deployment.gitlab-ci.yml\n"
 APPLICATION = "  - local: .gitlab/dodo/application.gitlab-ci.yml\n"
 Jobs = dict[str, str]
-COMMON = {"dodo-check": "", "compile": "dodo-images", "dodo-pipeline": "compile", "dodo-tests": "dodo-pipeline"}
+COMMON = {
+    "dodo-check": "",
+    "compile": "dodo-images",
+    "dodo-pipeline": "compile",
+    "dodo-tests": "dodo-pipeline",
+    "dodo-report": "dodo-tests",
+}
 """Each job with what it needs."""
 IMAGES = {"dodo-images": ""}
 STAGES = """\

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import pytest
 
 from dodo_dsl import package_data
+from tests.report.joined.gitlab_api import serving
 
 pytestmark = pytest.mark.slow
 
@@ -80,7 +81,11 @@ def artifact(folder: Path, job: str, name: str) -> Path:
 def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> None:
     written = repository / ".gitlab/dodo/deployment.gitlab-ci.yml"
     assert written.read_bytes() == (package_data.templates() / "gitlab/deployment.gitlab-ci.yml").read_bytes()
-    result = pipeline(repository)
+    with serving(repository / ".gitlab-ci-local/artifacts") as api:
+        variables = api.environment(CI_JOB_URL="https://gitlab.example.org/-/jobs/5").items()
+        result = pipeline(
+            repository, *(word for name, value in variables for word in ("--variable", f"{name}={value}"))
+        )
     assert result.returncode == 0, result.stdout[-4000:] + result.stderr[-2000:]
     assert (repository / "gl-code-quality-report.json").read_text().strip() == "[]"
     assert artifact(repository, "dodo-pipeline", "generated/child.gitlab-ci.yml").is_file()
@@ -96,6 +101,10 @@ def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> 
             -4000:
         ]
         assert artifact(repository, name, "dodo-report/metrics.txt").is_file()
+    joined = artifact(repository, "dodo-report", "dodo-report")
+    cases = ElementTree.parse(joined / "junit.xml").iter("testcase")
+    assert [case.get("name") for case in cases] == list(TESTS), result.stdout[-4000:]
+    assert all((joined / name / "drive.html").is_file() for name in TESTS)
 
 
 def test_a_failing_application_fails_its_job(repository: Path) -> None:

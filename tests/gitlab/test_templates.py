@@ -68,7 +68,7 @@ def test_jobs_of_both_templates_are_the_same() -> None:
     """A pipeline that includes both has each of them once, whatever the order: GitLab merges jobs of one name."""
     first, second = (yaml.safe_load(template.read_text()) for template in TEMPLATES)
     shared = first.keys() & second.keys() - {"variables"}
-    assert shared == {".dodo", ".dodo-rules", "dodo-check", "compile", "dodo-pipeline", "dodo-tests"}
+    assert shared == {".dodo", ".dodo-rules", "dodo-check", "compile", "dodo-pipeline", "dodo-tests", "dodo-report"}
     assert {name: first[name] for name in shared} == {name: second[name] for name in shared}
     variables = (template["variables"] for template in (first, second))
     assert all(
@@ -153,7 +153,11 @@ def test_a_build_without_images_fails(tmp_path: Path, change: tuple[str, str], s
 def test_the_page_s_variables_are_those_of_the_templates() -> None:
     page = (Path(__file__).parents[2] / "docs/gitlab.md").read_text()
     templates = "".join(template.read_text() for template in TEMPLATES)
-    for variable in set(re.findall(r"DODO_[A-Z_]+[A-Z]", page)) - {"DODO_IMAGE", "DODO_IMAGE_LANE_FINDER"}:
+    for variable in set(re.findall(r"DODO_[A-Z_]+[A-Z]", page)) - {
+        "DODO_IMAGE",
+        "DODO_IMAGE_LANE_FINDER",
+        "DODO_API_TOKEN",
+    }:
         assert f"  {variable}:" in templates, variable
     (block,) = [b for b in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "include:" in b]
     (included,) = yaml.safe_load(block)["include"]

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.plan.recorder_service import RECORDING, SNAPSHOT
+from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING, SNAPSHOT
 from dodo_dsl.report.report_folder import ATTEMPTS, SANDBOX_LOG, TRAJECTORY
 from dodo_dsl.report.viewer import names as viewer
 
@@ -18,7 +18,7 @@ MOST_BYTES = 16 << 30
 MOST_FILES = 2000
 """In a folder; further ones are left out."""
 _PART = 1 << 20
-_FILES = {RECORDING, SNAPSHOT, TRAJECTORY, SANDBOX_LOG, *viewer.VIDEOS}
+_FILES = {RECORDING, PICTURES_FILE, SNAPSHOT, TRAJECTORY, SANDBOX_LOG, *viewer.VIDEOS}
 _LOG = re.compile(r"[^/\0]+\.(log|times)")
 _ATTEMPT = re.compile(r"[1-9][0-9]{0,3}")
 

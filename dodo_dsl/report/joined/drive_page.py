@@ -21,7 +21,7 @@ def copy_page(source: Path, target: Path, outcome: Outcome, room: Room) -> bool:
     """Writes the page of a test, by its new name, where ``source`` has one; raises NotCopied and OSError."""
     if not (source / DATA).exists() and not (source / DATA).is_symlink():
         return False
-    document = _document(source / DATA)
+    document = read_document(source / DATA)
     document["test"] = {**document["test"], "name": shown(outcome.name), "slug": shown(outcome.slug)}
     try:
         text = script(document)
@@ -36,7 +36,8 @@ def copy_page(source: Path, target: Path, outcome: Outcome, room: Room) -> bool:
     return True
 
 
-def _document(path: Path) -> dict[str, Any]:
+def read_document(path: Path) -> dict[str, Any]:
+    """The value that a ``drive.js`` assigns; raises NotCopied for anything else, and OSError."""
     with opened(path) as file:
         data = file.read(regular_file.MOST_BYTES + 1)
     if len(data) > regular_file.MOST_BYTES:

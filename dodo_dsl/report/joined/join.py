@@ -11,7 +11,7 @@ from dodo_dsl.report.distinct import JoinedTest, distinct
 from dodo_dsl.report.given_report import GivenReport
 from dodo_dsl.report.joined.copies import NotCopied, Room, copy_test, is_folder, left_out
 from dodo_dsl.report.joined.drive_page import copy_page
-from dodo_dsl.report.report_folder import TIMES, forget
+from dodo_dsl.report.report_folder import OF_MACHINE, forget
 from dodo_dsl.report.viewer import page
 from dodo_dsl.report.viewer.names import DATA, SHARED
 
@@ -30,7 +30,8 @@ def join(reports: Sequence[GivenReport], out: Path) -> tuple[list[Outcome], list
         (stage / results.FILE_NAME).write_text(results.to_json(outcomes), encoding="utf-8")
         if earlier is not None:
             forget(out, [])
-            (out / TIMES).unlink(missing_ok=True)  # of one run on one machine
+            for name in OF_MACHINE:
+                (out / name).unlink(missing_ok=True)
     return outcomes, sentences
 
 
