@@ -45,8 +45,8 @@ class Call(NamedTuple):
 
 
 def write_specs(folder: Path, name: str, number: int, matrix: bool) -> None:
-    """A registry of so many instances; each has its own yaw."""
-    yaws = [f"{80 + 10 * i / number:.6f} deg" for i in range(number)]
+    """A registry of so many instances; each has its own yaw, within the range that the spec varies it in."""
+    yaws = [f"{80 + 8 * i / number:.6f} deg" for i in range(number)]
     text = SPEC.read_text()
     specs = {}
     if matrix:

@@ -62,10 +62,9 @@ def rows_of(alone: list[float], minutes: list[float]) -> list[Row]:
 
 def speeds(folder: Path, budget: Budget) -> None:
     """The tests one after the other in lockstep."""
-    chosen = tuple(GOALS) if budget.limited else LEVELS
     rounds = []
     for number in budget.rounds(ROUNDS):
-        rounds.append(run(folder / str(number), *chosen, "--clock", "lockstep", "-j", "1"))
+        rounds.append(run(folder / str(number), *LEVELS, "--clock", "lockstep", "-j", "1"))
         for slug in rounds[0][0]:
             ours = [tests[slug] for tests, _ in rounds]
             both = [t["execution_s"] for t in ours], "real time", [t["sim_s"] for t in ours]
@@ -81,15 +80,28 @@ def speeds(folder: Path, budget: Budget) -> None:
     print(f"all of them, one after the other: {statistics.median(seconds for _, seconds in rounds):.1f} s in lockstep")
 
 
+def speeds_in_turn(folder: Path, budget: Budget) -> None:
+    """The tests with a goal in lockstep, each by itself, so that those that came to an end have rows."""
+    found: dict[str, list[tuple[float, float]]] = {slug: [] for slug in GOALS}
+    for _ in budget.rounds(ROUNDS):
+        for slug, times in found.items():
+            test = next(iter(run(folder / "speeds", slug, "--clock", "lockstep")[0].values()))  # the first of a matrix
+            times.append((test["execution_s"], test["sim_s"]))
+            ours, theirs = (list(column) for column in zip(*times, strict=True))
+            report(speed_row(slug, ours, "real time", theirs))
+            print(f"{slug:24s} {ours[-1]:7.2f} s, {theirs[-1] / ours[-1]:5.1f} times real time", flush=True)
+
+
 def one_and_more(folder: Path, budget: Budget) -> None:
-    """A short test alone, and again and again in one command."""
+    """A short test alone, and again and again in one command; fewer rounds and repetitions within a budget."""
     alone: list[float] = []
     minutes: list[float] = []
-    for _ in budget.rounds(ROUNDS, until=0.4):
+    rounds, repeats = (1, 4) if budget.limited else (ROUNDS, REPEATS)
+    for _ in range(rounds):
         alone.append(run(folder / "one", SHORT)[1])
         report(rows_of(alone, minutes)[0])
-        more = run(folder / "more", SHORT, "--repeat", str(REPEATS), "-j", "2")[1]
-        minutes.append(60 * (REPEATS - 1) / (more - alone[-1]))
+        more = run(folder / "more", SHORT, "--repeat", str(repeats), "-j", "2")[1]
+        minutes.append(60 * (repeats - 1) / (more - alone[-1]))
         report(*rows_of(alone, minutes))
     print(f"{SHORT}: {statistics.median(alone):.2f} s, {statistics.median(minutes):.0f} further ones a minute")
 
@@ -99,8 +111,10 @@ def main() -> int:
     plan(*(speed_row(slug, []) for slug in GOALS), *rows_of([], []))
     with tempfile.TemporaryDirectory() as name:
         one_and_more(Path(name), budget)
-        speeds(Path(name), budget)
-        if not budget.limited:
+        if budget.limited:
+            speeds_in_turn(Path(name), budget)
+        else:
+            speeds(Path(name), budget)
             tests, seconds = run(Path(name) / "realtime", *LEVELS, "--clock", "realtime", "-j", "1")
             for slug, test in tests.items():
                 print(f"{slug:24s} {test['execution_s']:7.1f} s in real time")

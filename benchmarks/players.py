@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 _MEASURE = """
 import os, sys, time
 begin = time.perf_counter()
-child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=[(os.POSIX_SPAWN_OPEN, 1, os.devnull, 1, 0)])
+child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=[(os.POSIX_SPAWN_DUP2, 2, 1)])
 _, status, usage = os.wait4(child, 0)
 print(time.perf_counter() - begin, usage.ru_maxrss / 1024, os.waitstatus_to_exitcode(status))
 """
@@ -35,7 +35,7 @@ class Measured:
 
 
 def cost_of(command: Sequence[str | Path], folder: Path) -> tuple[float, float]:
-    """Seconds of a program by its path, and its peak memory in MiB; raises RuntimeError when it fails.
+    """Seconds of a program by its path, and its peak memory in MiB; raises RuntimeError with its output when it fails.
 
     A small process starts it, as Linux counts the memory of the one that starts a program as the program's own.
     """
@@ -43,7 +43,7 @@ def cost_of(command: Sequence[str | Path], folder: Path) -> tuple[float, float]:
     found = subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True)
     seconds, memory, code = map(float, found.stdout.split())
     if code:
-        raise RuntimeError(f"{' '.join(map(str, command))} ended with {code:.0f}: {found.stderr.strip()[-300:]}")
+        raise RuntimeError(f"{' '.join(map(str, command))} ended with {code:.0f}: {found.stderr.strip()[:500]}")
     return seconds, memory
 
 

@@ -112,9 +112,10 @@ def load(
 
 
 def at_values(checked: Checked, spec: Spec, values: Mapping[str, Values]) -> Checked:
-    """The tests that an instance with ranges is at other values, each under its own name, such as ``run-7``."""
+    """The tests that an instance is at other values of its ranges, each under its own name, such as ``run-7``."""
     names = {name: Choice((*spec.choice.values, ("run", Scalar(spec.span("name"), name, name)))) for name in values}
-    specs = (applied(varied(spec, values[name], choice), checked.settings) for name, choice in names.items())
+    made = {n: varied(spec, values[n], c) if spec.ranges else replace(spec, choice=c) for n, c in names.items()}
+    specs = (applied(one, checked.settings) for one in made.values())
     tests = tuple(resolve(specs, checked.manifests, checked.deployment, checked.application))
     return replace(checked, tests=tests, diagnostics=())
 

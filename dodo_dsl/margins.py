@@ -25,16 +25,18 @@ def worst_margin(outcome: Outcome) -> float | None:
 
     None for an error, -1 for a failed test without a failing check that has a value. A check that holds with nothing
     to spare does not count, as three gates of three or no broken sample: it cannot be better. Nor does the time of
-    answers, which differs from run to run. 0 where no check is left of a passed test.
+    answers, which differs from run to run. 0 where no check is left of a passed test. A check that fails at its limit,
+    as a wall that is touched, does not say by how much, and counts only where no other check that failed does.
     """
     if outcome.outcome == "error":
         return None
     is_failed = outcome.outcome == "failed"
-    shares = (
-        check.get("margin_share")
+    counting = [
+        check
         for check in outcome.checks
         if check["ok"] is not is_failed and (is_failed or check["name"] != SLOW_ANSWERS)
-    )
+    ]
+    shares = (check.get("margin_share") for check in counting if not is_failed or (check.get("margin") or 0.0) < 0)
     return min((share for share in shares if share), default=-1.0 if is_failed else 0.0)
 
 

@@ -272,7 +272,8 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
     failure = Failure(text, problem, (mark.line, mark.column), context, began, _LOADER)
     if found := slip(failure):
         rule = "yaml-tab" if found.is_tab else "yaml-syntax"
-        return Diagnostic(Span(file, found.line + 1, found.column + 1), rule, found.message, found.hint)
+        place = Span(file, found.line + 1, found.column + 1)
+        return Diagnostic(place, rule, found.message, found.hint, fix=found.fix)
     if begin and mark.line >= len(failure.lines):  # what is never closed is shown where it is opened
         mark = begin
     if "simple key" in context and begin:

@@ -27,6 +27,7 @@ FAULTS = (
     "The application logs 10,000 lines a second",
     "The application logs a line of 5 MB",
 )
+BACKENDS = ("process", "docker", "mixed")
 TOP = """# Faults
 
 The outcome of a test when something around it goes wrong, and the message with which DoDo reports it. *Failed* blames
@@ -71,14 +72,14 @@ def normal(sentence: str) -> str:
 def read() -> list[Row]:
     """The rows of the committed page."""
     text = PAGE.read_text(encoding="utf-8") if PAGE.is_file() else ""
-    found = re.findall(r"^\| (.+) \| (process|docker) \| (\w+) \| (.+) \|$", text, re.MULTILINE)
+    found = re.findall(r"^\| (.+) \| (process|docker|mixed) \| (\w+) \| (.+) \|$", text, re.MULTILINE)
     return [Row(*cells) for cells in found]
 
 
 def page(rows: Iterable[Row]) -> str:
     """The page of rows, in the order of FAULTS, without rows of other faults."""
     known = [row for row in set(rows) if row.fault in FAULTS]
-    ordered = sorted(known, key=lambda row: (FAULTS.index(row.fault), row.backend != "process"))
+    ordered = sorted(known, key=lambda row: (FAULTS.index(row.fault), BACKENDS.index(row.backend)))
     return TOP + "".join(row.markdown() for row in ordered)
 
 

@@ -13,7 +13,7 @@ import yaml
 
 from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.cli.selection import select
-from dodo_dsl.report.trajectory import read_ground
+from dodo_dsl.report.pictures.trajectory import read_ground
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

@@ -96,6 +96,8 @@ def test_the_worst_of_a_failed_test_is_negative() -> None:
     late, close = check(None, False, max=40.0), check(0.03, False, min=0.05)
     assert worst_margin(outcome(FAILED, late, close, check(1.0, max=4.0))) == pytest.approx(-2 / 7)
     assert worst_margin(outcome(FAILED, late, check(0.0, False, min=0.0))) == -1.0
+    touched, rest = check(0.0, False, min=0.0), check(3.0, False, max=0.0)
+    assert worst_margin(outcome(FAILED, late, touched, rest)) == pytest.approx(-3 / 4)
     assert worst_margin(outcome(FAILED, late)) == -1.0
     assert worst_margin(outcome(FAILED, check(1.0, max=4.0))) == -1.0
     assert worst_margin(outcome(FAILED, check(0.5, False, name=SLOW_ANSWERS, max=0.1))) == pytest.approx(-0.8)

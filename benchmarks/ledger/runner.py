@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.ledger import budget, row
@@ -18,12 +19,12 @@ SECONDS = {
     "bench_bus": 36,
     "bench_camera": 37,
     "bench_compile": 85,
-    "bench_docker": 70,
-    "bench_lockstep": 60,
+    "bench_docker": 60,
+    "bench_lockstep": 75,
     "bench_parallel": 75,
     "bench_pull": 25,
     "bench_rec": 38,
-    "bench_recorder": 40,
+    "bench_recorder": 36,
     "bench_replay": 45,
     "bench_services": 37,
 }
@@ -33,6 +34,8 @@ RESERVE = 0.85
 """Of its budget a benchmark plans with this part, so that it ends by itself."""
 GRACE = 10.0
 """Seconds to clean up for one that did not end."""
+MOST_LETTERS = 300
+"""Of the reason why a benchmark failed."""
 
 
 def scripts(checkout: Path) -> list[Path]:
@@ -40,10 +43,13 @@ def scripts(checkout: Path) -> list[Path]:
 
 
 def run(script: Path, seconds: float) -> Bench:
-    """One benchmark of the checkout that the script is in; one that does not end in time is ended."""
+    """One benchmark of the checkout that the script is in; one that does not end in time is ended.
+
+    The rows that it did not come to say why, if it failed or was ended.
+    """
     checkout = script.parents[1]
     with tempfile.TemporaryDirectory() as folder:
-        rows = Path(folder) / "rows.jsonl"
+        rows, errors = Path(folder) / "rows.jsonl", Path(folder) / "stderr"
         environment = {
             **os.environ,
             "PYTHONPATH": str(checkout),
@@ -51,15 +57,30 @@ def run(script: Path, seconds: float) -> Bench:
             budget.VARIABLE: str(seconds * RESERVE),
         }
         begin, load = time.monotonic(), os.getloadavg()[0]
-        with _started([sys.executable, str(script)], checkout, environment) as process:
+        with _started([sys.executable, str(script)], checkout, environment, errors) as process:
             code = _wait(process, seconds)
         took = time.monotonic() - begin
-        found = tuple(row.read_rows(rows))
-    trouble = f"did not end in {seconds:.3g} s, and was ended" if code is None else f"ended with {code}" if code else ""
+        said = errors.read_text(errors="replace")
+        sys.stderr.write(said)
+        trouble = _trouble(code, seconds, said)
+        found = tuple(
+            replace(one, note=trouble) if trouble and one.note == row.NOT_REACHED else one
+            for one in row.read_rows(rows)
+        )
     if not found:
         trouble = trouble or "reported no row"
         found = (row.Row(script.stem, "", note=trouble),)
     return Bench(script.stem, found, round(took, 1), seconds, (load, os.getloadavg()[0]), trouble, bool(code))
+
+
+def _trouble(code: int | None, seconds: float, said: str) -> str:
+    """Why a benchmark ended badly, with the first line of the exception that ended it; empty for one that did not."""
+    if code is None:
+        return f"did not end in {seconds:.3g} s, and was ended"
+    if not code:
+        return ""
+    reasons = [line for line in said.splitlines() if line[:1].strip() and not line.startswith("Traceback")]
+    return f"ended with {code}" + (f": {reasons[0][:MOST_LETTERS]}" if reasons else "")
 
 
 def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> int | None:
@@ -76,12 +97,15 @@ def _interruptible() -> None:
 
 
 @contextmanager
-def _started(command: list[str], folder: Path, environment: dict[str, str]) -> Iterator["subprocess.Popen[bytes]"]:
+def _started(
+    command: list[str], folder: Path, environment: dict[str, str], errors: Path
+) -> Iterator["subprocess.Popen[bytes]"]:
     """A process with a group of its own, all of which is gone after the block; first they may clean up."""
-    process = subprocess.Popen(
-        command, cwd=folder, env=environment, start_new_session=True,
-        preexec_fn=_interruptible,  # noqa: PLW1509 - the ledger has one thread
-    )  # fmt: skip
+    with errors.open("wb") as stream:
+        process = subprocess.Popen(
+            command, cwd=folder, env=environment, start_new_session=True, stderr=stream,
+            preexec_fn=_interruptible,  # noqa: PLW1509 - the ledger has one thread
+        )  # fmt: skip
     try:
         yield process
     finally:

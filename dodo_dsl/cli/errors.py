@@ -52,6 +52,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.rec.frames import FramesError
     from dodo_dsl.rec.outputs import OutputExists
     from dodo_dsl.rec.truth import TruthError
+    from dodo_dsl.report.joined.child_jobs import NoChildJobs
     from dodo_dsl.report.results import ResultsError
     from dodo_dsl.spec.registry import RegistryTooLarge
 
@@ -66,7 +67,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
         NotAFile,
         NotReplaceable,
     )
-    return (*recordings, FilesError, NoSuchImage, ResultsError, RegistryTooLarge)
+    return (*recordings, FilesError, NoSuchImage, ResultsError, NoChildJobs, RegistryTooLarge)
 
 
 def _machine_errors() -> tuple[type[Exception], ...]:

@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import NamedTuple, TextIO
 
 from dodo_dsl import __version__
+from dodo_dsl.cli.arguments import Arguments
 from dodo_dsl.cli.errors import exit_code, sentence
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.terminal import harmless_stream
@@ -25,9 +26,10 @@ class Subcommand(NamedTuple):
 
 
 COMMANDS = {
-    "compile": Subcommand("compile", "check tests and write their compose files and child pipeline"),
+    "compile": Subcommand("compile.command", "check tests and write their compose files and child pipeline"),
     "run": Subcommand("run.command", "run tests and judge the application"),
     "search": Subcommand("search.command", "look for the conditions under which the application fails a test"),
+    "tune": Subcommand("tune.command", "find values of the application's parameters with which it passes by more"),
     "list": Subcommand("list", "list the tests and services"),
     "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
     "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),
@@ -54,7 +56,7 @@ _EXAMPLES = """examples:
 
 def parser(called: Collection[str] = tuple(COMMANDS)) -> argparse.ArgumentParser:
     """The command line, with the arguments of the commands that are ``called``."""
-    top = argparse.ArgumentParser(
+    top = Arguments(
         prog="dodo",
         description="Declarative integration tests for robots and vehicles made of microservices.",
         epilog=_EXAMPLES,

@@ -1,7 +1,10 @@
 """dodo report: draw reports again, join them into one, and show what changed."""
 
 import argparse
-from collections.abc import Sequence
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -18,6 +21,7 @@ from dodo_dsl.terminal import printable
 EXAMPLES = """examples:
   dodo report dodo-report            index.html, junit.xml and metrics.txt from its results.json
   dodo report jobs/* -o joined       the reports of several jobs as one, with all their files
+  dodo report --gitlab -o joined     in a job of GitLab: those of the child pipelines' jobs, from its API
   dodo report --against ../main/dodo-report    what changed since that report, also on the page and in changes.md
 
 exit codes: 0 drawn, 2 wrong usage or no report; with --against 1 some tests failed, 3 some ended in error
@@ -29,24 +33,48 @@ REPORT = Path("dodo-report")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", metavar="DIR", type=Path, nargs="*", default=[REPORT],
+    parser.add_argument("folder", metavar="DIR", type=Path, nargs="*", default=[],
                         help="folders of reports, or their results.json (default: dodo-report)")  # fmt: skip
     parser.add_argument("-o", "--output", metavar="OUT", type=Path,
                         help="join the reports into this folder: a new or empty one, or an earlier report")  # fmt: skip
+    parser.add_argument("--gitlab", action="store_true",
+                        help="in a job of GitLab: join the reports of the pipeline's child pipelines")  # fmt: skip
     parser.add_argument("--against", metavar="OTHER", type=Path,
                         help="show what changed since another report: its folder or results.json")  # fmt: skip
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    reports = [read(path) for path in options.folder]
     other = read(options.against) if options.against else None
-    target, outcomes = _drawn(reports, options.output, stdout)
+    with _child_reports(options.gitlab, stdout) as fetched:
+        folders = [*options.folder, *fetched] or [REPORT]
+        output = options.output or (REPORT if options.gitlab else None)
+        target, outcomes = _drawn([read(path) for path in folders], output, stdout)
+    from dodo_dsl.report.joined import other_ways
+
     comparison = compare(outcomes, other) if other else None
     write_summaries(target, outcomes, comparison)
+    other_ways.write(target, comparison, other)
     if comparison:
         stdout.writelines(f"{line}\n" for line in text.lines(comparison))
     stdout.write(f"report: {target / 'index.html'}\n")
     return of_outcomes(outcome.outcome for outcome in outcomes) if comparison else Exit.OK
+
+
+@contextlib.contextmanager
+def _child_reports(is_job: bool, stdout: TextIO) -> Iterator[list[Path]]:
+    """The reports of child pipelines in a folder that lasts as long as this."""
+    if not is_job:
+        yield []
+        return
+    from dodo_dsl.report.joined import child_jobs
+
+    with tempfile.TemporaryDirectory() as folder:
+        found = list(child_jobs.fetch(child_jobs.of_job(os.environ), Path(folder)))
+        stdout.writelines(f"job '{printable(job)}' has no report\n" for job, report in found if report is None)
+        reports = [report for _, report in found if report is not None]
+        if not reports:
+            raise UsageError("no job of a child pipeline has a report")
+        yield reports
 
 
 def _drawn(reports: Sequence[GivenReport], out: Path | None, stdout: TextIO) -> tuple[Path, Sequence[Outcome]]:

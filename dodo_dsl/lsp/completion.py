@@ -11,10 +11,10 @@ from dodo_dsl.lsp.incomplete import Cursor, cursor
 from dodo_dsl.lsp.scene import USES, WITH, Scene
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.deployment.rig import EMULATED
-from dodo_dsl.spec.editor_schema import is_offered, written
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import LAYERS
+from dodo_dsl.spec.schema.editor_schema import is_offered, written
 
 _KEY, _SERVICE, _VALUE, _UNIT = (
     types.CompletionItemKind.Property,

@@ -8,8 +8,8 @@ from dodo_dsl.check.wiring import End, Wiring
 from dodo_dsl.lsp import schema_keys
 from dodo_dsl.lsp.scene import USES, Scene
 from dodo_dsl.lsp.tree import Place, find
-from dodo_dsl.spec.editor_schema import description, written
 from dodo_dsl.spec.manifest import Manifest, Parameter
+from dodo_dsl.spec.schema.editor_schema import description, written
 from dodo_dsl.terminal import printable
 
 

@@ -74,6 +74,7 @@ def look(
 
     ``problem`` gets a sentence about what cannot be decoded at all.
     """
+    streams = _streams(recording, messages)  # before the times are copied, for the sake of memory
     times = recording.index["time"]
     stamped = times[times != 0]
     known = _together(stamped)
@@ -86,25 +87,30 @@ def look(
         apart=len(stamped) - len(known),
         untimed=int((recording.index["sampled"] == 0).sum()),
         message_set=message_set,
-        streams=_streams(recording, messages),
+        streams=streams,
         frames=_frames(recording, progress, problem),
     )
 
 
 def _together(times: Numbers) -> Numbers:
     """The times in us, in their order, of the largest group without a gap of a day; the earliest of such groups."""
+    if not len(times) or times.max() - times.min() <= _DAY:
+        return times
     ordered = np.sort(times)
     groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _DAY) + 1)
     largest = max(groups, key=len)
-    return times[(times >= largest[0]) & (times <= largest[-1])] if len(largest) else times
+    together: Numbers = times[(times >= largest[0]) & (times <= largest[-1])]
+    return together
 
 
 def _streams(recording: Recording, messages: MessageSet) -> list[MessageStream]:
     index, known = recording.index, messages.ids()
     keys = index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]
     order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    cuts = np.flatnonzero(keys[1:] != keys[:-1]) + 1
     found = []
-    for rows in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1) if len(order) else ():
+    for rows in np.split(order, cuts) if len(order) else ():
         id_, stamp = int(index["data_type"][rows[0]]), int(index["sender_stamp"][rows[0]])
         size = int(index["size"][rows].sum(dtype=np.int64))
         name = messages.name(id_) if id_ in known else None

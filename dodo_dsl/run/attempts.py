@@ -1,13 +1,16 @@
 """The attempts at one test: again after an error, if wanted, with the reports of earlier ones kept."""
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.recorder_service import PICTURES_FILE
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
+from dodo_dsl.run.standing import Standing
 
 Phase = Callable[[str, str], None]
 """Shows what a test does, by its slug."""
@@ -16,11 +19,19 @@ Phase = Callable[[str, str], None]
 class Attempts:
     """Runs jobs on backends, and again up to ``retries`` times after an error, unless ``stopped``."""
 
-    def __init__(self, backends: Backends, phase: Phase, retries: int, keep: bool, stopped: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        backends: Backends,
+        phase: Phase,
+        retries: int,
+        keep: bool,
+        stopped: Callable[[], bool],
+        standing: Callable[[str, Standing], None],
+    ) -> None:
         self.kept: list[str] = []
         """Sentences on the tests that were left running."""
         self._backends, self._phase, self._retries, self._keep = backends, phase, retries, keep
-        self._stopped = stopped
+        self._stopped, self._standing = stopped, standing
         self._made: dict[str, int] = {}
 
     async def outcome(self, job: Job, begun: Callable[[], None] = lambda: None, alone: bool = False) -> Outcome:
@@ -57,9 +68,12 @@ class Attempts:
         def say(text: str) -> None:
             self._phase(slug, text)
 
+        def stands(standing: Standing) -> None:
+            self._standing(slug, standing)
+
         try:
             async with self._backends.open(job, say, self._keep) as backend:
-                outcome, kept = await Engine(job.plan, backend, say, begun).run(self._keep)
+                outcome, kept = await Engine(job.plan, backend, say, begun, stands).run(self._keep)
                 self.kept.extend(kept)
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
             if outcome is None:
@@ -67,6 +81,9 @@ class Attempts:
             return replace(
                 outcome, notes=(*outcome.notes, f"not all of the test was taken down: {describe(error, job.report)}")
             )
+        if outcome.outcome == "passed" and not self._keep:
+            with contextlib.suppress(OSError):
+                (job.report / PICTURES_FILE).unlink(missing_ok=True)
         return outcome
 
 

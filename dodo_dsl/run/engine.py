@@ -9,8 +9,9 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run.load.meter import LoadMeter, add_up
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Foreign, Late, Noted, Overrun
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Foreign, Late, Noted, Overrun, Time, VerdictEvent
 from dodo_dsl.run.run_state import Ended, RunState
+from dodo_dsl.run.standing import Standing, standing
 
 READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
@@ -21,7 +22,7 @@ BEGIN_PATIENCE_S = 2.0
 class Engine:
     """Drives one backend through one Plan. ``say`` is called with each phase, for live progress.
 
-    ``begun`` is called when set-up is over and the test begins.
+    ``begun`` is called when set-up is over and the test begins, ``stands`` with how far it is.
 
     All times are of the running event loop's clock, in s.
     """
@@ -30,6 +31,7 @@ class Engine:
     backend: Backend
     say: Callable[[str], None]
     begun: Callable[[], None] = lambda: None
+    stands: Callable[[Standing], None] = lambda _: None
     state: RunState = field(init=False)
     _now: Callable[[], float] = field(init=False)
     _meter: LoadMeter = field(init=False)
@@ -129,12 +131,15 @@ class Engine:
         began = self.state.began = self._now()
         await self._begin()
         self.say("running")
+        self.stands(standing(self.state))
         lockstep = self.plan.lockstep
         deadline = began + (lockstep.wall_timeout_s if lockstep else self.plan.timeout_s)
         while not self.state.all_evaluators_ended():
             event = await self._next(min(deadline, self._next_begin()))
             if event is not None:
                 self.state.take(event)
+                if isinstance(event, Time | VerdictEvent):
+                    self.stands(standing(self.state))
             elif self._now() < deadline:
                 await self._begin()
             elif lockstep:

@@ -1,4 +1,4 @@
-"""How long tests took on this machine, kept over runs: for forecasts, and for the plot of set-up and execution."""
+"""How long tests took on this machine, and what their checks measured, kept over runs: for forecasts and the report."""
 
 import contextlib
 import json
@@ -6,9 +6,11 @@ import math
 import os
 import statistics
 import time
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
@@ -17,6 +19,7 @@ from dodo_dsl.state_folder import NoStateFolder, state_path
 
 _MAX_BYTES = 4_000_000
 _RECENT = 5
+_SHOWN = 20
 PATH_VARIABLE = "DODO_HISTORY"
 
 
@@ -35,6 +38,8 @@ class PastRun:
     execution_s: float
     cores: float | None = None
     """Processor seconds a second of execution, of application and services; None where it was not measured."""
+    checks: Mapping[str, float] = field(default_factory=dict)
+    """Values by name, of names that one check has."""
 
 
 def default_path() -> Path:
@@ -77,12 +82,18 @@ class History:
                 found.setdefault(name, []).append((r.setup_s, r.execution_s))
         return found
 
+    def checks(self, spec: str, test: str, backend: str, clock: str) -> list[dict[str, Any]]:
+        """The latest runs of a test: when they ended, with what, and their checks' values."""
+        key = (spec, test, backend, clock)
+        runs = [r for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key and r.checks]
+        return [{"when": r.when, "outcome": r.outcome, "checks": dict(r.checks)} for r in runs[-_SHOWN:]]
+
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
         """Adds pairs of a test's name and its outcome; errors are left out, as they say nothing about its time."""
         self.runs += [
             PastRun(
                 int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s,
-                _cores_used(o.machine),
+                _cores_used(o.machine), _values(o.checks),
             )
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
@@ -110,6 +121,11 @@ def _cores_used(load: MachineLoad | None) -> float | None:
     return round((load.application.ran_s + load.services.ran_s) / load.duration_s, 3)
 
 
+def _values(checks: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    names = Counter(check["name"] for check in checks)
+    return {c["name"]: c["value"] for c in checks if names[c["name"]] == 1 and c["value"] is not None}
+
+
 def _read(path: Path) -> Iterator[PastRun]:
     """The valid lines; one that a killed run left unfinished is skipped."""
     try:
@@ -117,9 +133,10 @@ def _read(path: Path) -> Iterator[PastRun]:
     except OSError:
         return
     for line in text.splitlines():
-        with contextlib.suppress(ValueError, TypeError, RecursionError):
+        with contextlib.suppress(ValueError, TypeError, AttributeError, RecursionError):
             run = PastRun(**json.loads(line))
             texts = (run.spec, run.test, run.level, run.backend, run.clock, run.outcome)
             times = (run.setup_s, run.execution_s, run.cores or 0.0)
-            if all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):
+            is_measured = all(isinstance(value, int | float) and math.isfinite(value) for value in run.checks.values())
+            if is_measured and all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):
                 yield run

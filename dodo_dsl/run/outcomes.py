@@ -145,7 +145,8 @@ def flooded(plan: Plan, event: Flooded) -> Finding:
 def _may_send(service: PlannedService, message: str) -> bool:
     """Whether a service's manifest has the message; that of a deployment's own service is not known here."""
     if service.name == RECORDER:
-        return message == FRAMES and any(flag.name == "frames" for flag in service.flags)
+        names = {flag.name for flag in service.flags}
+        return message == FRAMES and "frames" in names and "pictures" not in names
     manifest = load_manifests()[0].get(service.uses)
     ports = manifest.messages.outputs if manifest else (ANYTHING,)
     return any(port.rstrip("?").partition("/")[0] in (message, ANYTHING) for port in ports)

@@ -7,6 +7,7 @@ from typing import Any
 from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.plan.recorder_service import RECORDER
 from dodo_dsl.run.load.judgement import consider
 from dodo_dsl.run.load.response import judged
 from dodo_dsl.run.outcomes import Facts, Finding, decide, flooded, how_it_ended, lost_messages, memory_taken, outcome_of
@@ -196,13 +197,14 @@ class RunState:
         if self.began is None or self.finished is None or self.plan.clock != "realtime":
             return None
         pictured = pictured_by(self.plan)
-        shares = {name: late.late / late.updates for name, late in self.late.items()}
+        late = {name: each for name, each in self.late.items() if name != RECORDER}  # of which no verdict depends
+        shares = {name: each.late / each.updates for name, each in late.items()}
         load = self.load or MachineLoad(self.finished - self.began)
         return replace(
             load,
             late_pictures_share=max((share for name, share in shares.items() if name in pictured), default=0.0),
             late_updates_share=max((share for name, share in shares.items() if name not in pictured), default=0.0),
-            lateness_s=max((late.worst_s for late in self.late.values()), default=0.0),
+            lateness_s=max((each.worst_s for each in late.values()), default=0.0),
         )
 
     def _service_rows(self) -> list[dict[str, Any]]:

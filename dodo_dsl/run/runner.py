@@ -12,8 +12,9 @@ from dodo_dsl.run.attempts import Attempts, is_undecided
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.outcomes import error_outcome, error_reason
 from dodo_dsl.run.schedule import CorePool, Schedule
+from dodo_dsl.run.standing import Standing
 
-BackendName = Literal["process", "docker"]
+BackendName = Literal["process", "docker", "mixed"]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -27,6 +28,8 @@ class Progress(Protocol):
     def note(self, text: str) -> None: ...
 
     def phase(self, slug: str, text: str) -> None: ...
+
+    def standing(self, slug: str, standing: Standing) -> None: ...
 
     def done(self, outcome: Outcome) -> None: ...
 
@@ -66,7 +69,9 @@ class Runner:
         self._cores = CorePool(schedule.capacity)
         self._waiting: list[Job] = []
         self._began: dict[str, tuple[Job, float]] = {}
-        self._attempts = Attempts(backends, progress.phase, policy.retries, keep, lambda: self.interrupted)
+        self._attempts = Attempts(
+            backends, progress.phase, policy.retries, keep, lambda: self.interrupted, progress.standing
+        )
         self._undecided: dict[str, tuple[Job, Outcome]] = {}
         self._stop = False
 

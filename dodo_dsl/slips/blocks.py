@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 
+from dodo_dsl.diagnostics import Fix
 from dodo_dsl.slips.failure import Failure, Slip, indent, shortened
 
 _NO_BLANK = re.compile(r"\s*(?:- )?(?P<key>[A-Za-z_][\w.-]*):(?P<value>(?!//)[^\s:].*)")
@@ -27,7 +28,9 @@ def no_blank_after_colon(failure: Failure) -> Iterator[Slip]:
     if found and ": " not in failure.line(number):
         key, value = found["key"], found["value"].strip()
         hint = f"write '{key}: {shortened(value)}'"
-        yield Slip(number, found.end("key"), f"a space is missing after the colon of '{key}'", hint)
+        is_clear = not value.startswith("#") and _PLAIN_KEY.fullmatch(key)  # and no text that goes on: 'Note:this'
+        fix = Fix(":", ": ") if is_clear else None
+        yield Slip(number, found.end("key"), f"a space is missing after the colon of '{key}'", hint, fix=fix)
 
 
 def no_colon(failure: Failure) -> Iterator[Slip]:

@@ -6,19 +6,25 @@ from typing import Any
 
 import yaml
 
+from dodo_dsl.diagnostics import Fix
+
 Mark = tuple[int, int]
 """Line and column, from 0."""
 
 
 @dataclass(frozen=True)
 class Slip:
-    """A mistake in a text: its place, counted from 0, and words about it; ``is_tab`` for indentation with a tab."""
+    """A mistake in a text: its place, counted from 0, and words about it; ``is_tab`` for indentation with a tab.
+
+    ``fix`` is for the one character at the place, where there is exactly one fix.
+    """
 
     line: int
     column: int
     message: str
     hint: str = ""
     is_tab: bool = False
+    fix: Fix | None = None
 
 
 @dataclass(frozen=True)

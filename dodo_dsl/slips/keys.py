@@ -1,10 +1,10 @@
 """Slips within keys that are YAML nonetheless: ``{uses:camera}``, ``level:: sil``, ``{freq 10 Hz}``."""
 
-import difflib
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from dodo_dsl.diagnostics import Fix, closest
 from dodo_dsl.slips.failure import shortened
 
 _COLON = re.compile(r"(?P<key>[^:\s]+):(?P<value>.*)", re.DOTALL)
@@ -18,6 +18,7 @@ class KeySlip:
     key: str
     message: str
     hint: str
+    fix: Fix | None = None
 
 
 def slip_in_key(word: str, known: Collection[str], *, is_empty: bool) -> KeySlip | None:
@@ -26,7 +27,8 @@ def slip_in_key(word: str, known: Collection[str], *, is_empty: bool) -> KeySlip
     if found and found["key"] in known:
         key, value = found["key"], found["value"].strip()
         if value:
-            return KeySlip(key, f"a space is missing after the colon of '{key}'", _write(key, value))
+            message = f"a space is missing after the colon of '{key}'"
+            return KeySlip(key, message, _write(key, value), Fix(word, f"{key}: {value}"))
         return KeySlip(key, f"there is one colon too many after '{key}'", f"write '{key}: ...'")
     found = _BLANK.fullmatch(word) if is_empty else None
     if found and found["key"] in known:
@@ -43,4 +45,4 @@ def meant(word: str, known: Collection[str], *, is_empty: bool) -> str:
     """The known key that an unknown one most likely means; empty when there is none."""
     if found := slip_in_key(word, known, is_empty=is_empty):
         return found.key
-    return next(iter(difflib.get_close_matches(word.lower(), sorted(known), n=1)), "")
+    return next(iter(closest(word, known)), "")

@@ -4,11 +4,13 @@
 
 Hears the detections of perception.py: those with one sampleId are a frame, which is complete when its
 ImageReadingShm comes. Answers each frame with one GroundSteeringRequest and one PedalPositionRequest that
-carry the frame's sample time. `--reverse` steers the other way, for those who want to see a test fail.
+carry the frame's sample time. `dodo tune` finds values of the three variables STEERING_GAIN, LANE_WIDTH and
+PEDAL. `--reverse` steers the other way, for those who want to see a test fail.
 """
 
 import argparse
 import math
+import os
 import signal
 import sys
 from typing import Any, NamedTuple
@@ -23,8 +25,9 @@ WHEELBASE = 0.224  # m
 REQUEST_PER_ANGLE = 0.290888 / 0.6  # the car turns its wheel further than it is asked to
 STEERING_LIMIT = 0.290888  # rad
 
-TRACK_WIDTH = 0.5  # m, assumed where only one side is seen
-PEDAL = 0.08  # 0.52 m/s
+STEERING_GAIN = float(os.environ.get("STEERING_GAIN", "1"))  # above 1 it steers more than the circle needs
+TRACK_WIDTH = float(os.environ.get("LANE_WIDTH", "0.5"))  # m, assumed where only one side is seen
+PEDAL = float(os.environ.get("PEDAL", "0.08"))  # 0.52 m/s
 PEDAL_BLIND = 0.05
 FRAMES_BLIND = 10  # then stop
 ASKS, LISTENS = 1, 2  # sender stamps of perception's question and of the answer
@@ -70,7 +73,7 @@ def aim_point(yellow: list[Point], blue: list[Point]) -> Point | None:
 def steering_towards(aim: Point) -> float:
     """The request in rad that leads onto the circle through the aim point (pure pursuit)."""
     curvature = 2 * aim.left / (aim.ahead**2 + aim.left**2)
-    request = REQUEST_PER_ANGLE * math.atan(WHEELBASE * curvature)
+    request = STEERING_GAIN * REQUEST_PER_ANGLE * math.atan(WHEELBASE * curvature)
     return max(-STEERING_LIMIT, min(STEERING_LIMIT, request))
 
 

@@ -36,7 +36,7 @@ class SteppedApplication:
         self.processes = ApplicationProcesses(())
         """To be set when they are known."""
         self._patience, self._link, self._stopped = patience, link, stopped
-        self._began, self._before = 0.0, NOTHING
+        self._began, self._before, self._own_before = 0.0, NOTHING, 0.0
         self._shown, self._own_wait = 0.0, 0.0
         """When all pictures were there, and how long the clock itself had waited for a processor until then."""
         self._cid = cid
@@ -58,7 +58,7 @@ class SteppedApplication:
     def show(self, shown: Sequence[StepResult], now: int) -> None:
         """Announce new pictures as soon as readers wait for them; raises ApplicationSilent and ApplicationFloods."""
         self.frames += 1
-        self._began, self._before = time.monotonic(), self.processes.snapshot()
+        self._began, self._before, self._own_before = time.monotonic(), self.processes.snapshot(), own_wait_s()
         again = self._began + _AGAIN_S
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
@@ -112,7 +112,14 @@ class SteppedApplication:
 
     @property
     def _left(self) -> float:
-        return self._began + self._limit - time.monotonic()
+        """Seconds of patience; what the application, or the clock, waited for a processor does not count."""
+        left = self._began + self._limit - time.monotonic()
+        return left if left > 0 else left + self._starved
+
+    @property
+    def _starved(self) -> float:
+        own = own_wait_s() - self._own_before
+        return max(self.processes.snapshot().longest_wait(self._before), own) if self.processes else own
 
     def _repeat_first(self, again: float) -> float:
         """An application that starts late gets what was sent before its first picture, as in real time."""

@@ -39,6 +39,7 @@ class Stepper:
     reached: int = EPOCH
     """The last step that the evaluators have finished."""
     _judging: list[str] = field(default_factory=list)
+    _watching: list[str] = field(default_factory=list)
     _judging_at: int = EPOCH
     _backlog: dict[str, list[EncodedEnvelope]] = field(default_factory=dict)
     _consumed: dict[str, frozenset[int]] = field(default_factory=dict)
@@ -69,30 +70,34 @@ class Stepper:
         while not self.stopped():
             if not self._memories:
                 self.application.expect_at(self.now)
-            shown = [
-                result
-                for name in (*self.roles.advance, *self.roles.sense)
-                for result in self._go((name,), self.now)
-                if result.pictures
-            ]
+            going = self._go_each((*self.roles.advance, *self.roles.sense))
+            shown = [result for result in going if result.pictures]
             if self._is_over():
                 return
             awaits_answer = bool(shown) or not self._memories
             if awaits_answer:
                 self.application.show(shown, self.now)
             self._judge()
-            if awaits_answer and not self._is_answered():
-                return
+            try:
+                if awaits_answer and not self._is_answered():
+                    return
+            finally:
+                self._watch()
             if self.now - EPOCH >= self.timeout and not self._is_over():
                 raise TimeOver
             self._deliver([encode(envelope) for envelope in self.application.collect()], "")
             self._go_on()
 
     def _judge(self) -> None:
-        """Watchers and evaluators begin this step, while others go on already."""
-        self._judging = [name for name in (*self.roles.watch, *self.roles.judge) if name not in self._ended]
+        """Evaluators begin this step, while others go on already."""
+        self._judging = [name for name in self.roles.judge if name not in self._ended]
         self._judging_at = self.now
         self._send(self._judging, self.now)
+
+    def _watch(self) -> None:
+        """Watchers begin this step: its pictures are there now, and stay until the next ones are shown."""
+        self._watching = [name for name in self.roles.watch if name not in self._ended]
+        self._send(self._watching, self.now)
 
     def _is_answered(self) -> bool:
         """Wait for the answer; a missing one does not matter when the test is over. Raises ApplicationSilent."""
@@ -105,12 +110,18 @@ class Stepper:
         return True
 
     def _is_over(self) -> bool:
-        """Whether all evaluators have ended with the last step that they were given; waits for them."""
+        """Whether all evaluators have ended with the last step that they were given; waits for them and watchers."""
+        watching, self._watching = self._watching, []
+        self._await(watching)
         judging, self._judging = self._judging, []
         if judging:
             self._await(judging)
             self.reached = self._judging_at
         return set(self.roles.judge) <= self._ended
+
+    def _go_each(self, names: Sequence[str]) -> list[StepResult]:
+        """Let services go on to this step, one after the other; raises ServiceSilent."""
+        return [result for name in names for result in self._go((name,), self.now)]
 
     def _go(self, names: Sequence[str], until: int) -> list[StepResult]:
         """Let services go on to a time (us); raises ServiceSilent."""

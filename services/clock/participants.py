@@ -72,7 +72,10 @@ class Roles:
 
 @dataclass
 class Patience:
-    """Wall time in s that the application has for the first frame, and for each other one."""
+    """Wall time in s that the application has for the first frame, and for each other one.
+
+    What it waited for a processor meanwhile does not count: others are to blame for that.
+    """
 
     first: float
     others: float

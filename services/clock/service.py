@@ -82,7 +82,7 @@ class ClockService(Service):
             self._stepper.run(begin._replace(sample_time=EPOCH, received=0))
         except TestEnded as problem:
             kind, reason = problem.kind, str(problem)
-        spent = sorted(self._stepper.spent.items(), key=lambda item: -item[1])
+        spent = sorted(((n, s) for n, s in self._stepper.spent.items() if n), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
         if self._channel.foreign:
             _log.warning("%d datagrams to the clock were not from services of the test", self._channel.foreign)

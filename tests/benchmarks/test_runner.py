@@ -64,6 +64,15 @@ def test_one_that_fails_is_told(folder: Path) -> None:
     assert (bench.rows, bench.trouble, bench.failed) == ((ROW,), "ended with 3", True)
 
 
+def test_one_that_fails_says_why_in_the_rows_that_it_did_not_come_to(folder: Path) -> None:
+    planned = "from benchmarks.ledger.row import plan, rate_row; plan(rate_row('b', '1/s', []))"
+    (folder / "bench_a.py").write_text(f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{REPORTS}\n{planned}\nint('x')")
+    bench = run(folder / "bench_a.py", 60)
+    why = "ended with 1: ValueError: invalid literal for int() with base 10: 'x'"
+    assert bench.rows == (ROW, Row("b", "1/s", note=why))
+    assert (bench.trouble, bench.failed) == (why, True)
+
+
 def test_one_that_hangs_is_ended_with_its_children_and_keeps_its_rows(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

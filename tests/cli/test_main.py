@@ -25,7 +25,9 @@ def test_help_loads_no_command() -> None:
     shown += "print([name for name in sys.modules if name.startswith('dodo_dsl.') or name in ('numpy', 'jinja2')])"
     done = subprocess.run([sys.executable, "-c", shown], capture_output=True, text=True, check=True)
     loaded = set(ast.literal_eval(done.stdout.splitlines()[-1]))
-    assert loaded <= {f"dodo_dsl.{name}" for name in ("cli", "cli.errors", "cli.exits", "cli.main", "terminal")}
+    assert loaded <= {
+        f"dodo_dsl.{name}" for name in ("cli", "cli.arguments", "cli.errors", "cli.exits", "cli.main", "terminal")
+    }
 
 
 @pytest.mark.parametrize("words", [[], ["lst"], ["run", "--jobs"], ["rec", "info"]])

@@ -7,6 +7,7 @@ import pytest
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.report import results
+from tests.report.joined.gitlab_api import serving
 from tests.report.joined.reports import named, tree, write
 
 
@@ -84,3 +85,23 @@ def test_a_missing_report_to_compare_with_changes_nothing(here: Path) -> None:
     before = tree(here)
     assert report("new", "-o", "out", "--against", "main") == (2, "", "dodo report: there is no main/results.json\n")
     assert tree(here) == before
+
+
+def test_the_reports_of_a_child_pipeline_are_joined(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(here / "jobs" / "a" / "dodo-report", [named("a", outcome="failed")])
+    write(here / "jobs" / "b" / "dodo-report", [named("b")])
+    (here / "jobs" / "c").mkdir()
+    with serving(here / "jobs") as api:
+        for name, value in api.environment(CI_JOB_URL="https://git.example/-/jobs/5").items():
+            monkeypatch.setenv(name, value)
+        assert report("--gitlab") == (0, "job 'c' has no report\nreport: dodo-report/index.html\n", "")
+    assert [o.slug for o in results.load(here / "dodo-report" / "results.json")] == ["a", "b"]
+    junit = (here / "dodo-report" / "junit.xml").read_text()
+    assert "[[ATTACHMENT|dodo-report/a/trajectory.png]]" in junit
+    assert junit.count("replay: https://git.example/-/jobs/5/artifacts/file/dodo-report/a/drive.html") == 1
+
+
+def test_outside_gitlab_there_are_no_child_pipelines(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("CI_API_V4_URL", "CI_PROJECT_ID", "CI_PIPELINE_ID"):
+        monkeypatch.delenv(name, raising=False)
+    assert report("--gitlab")[::2] == (2, "dodo report: CI_API_V4_URL is not set; --gitlab is for jobs of GitLab\n")

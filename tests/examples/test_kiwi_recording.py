@@ -21,6 +21,7 @@ SEEN = {
     500: [("blue", 0.264, 0.78), ("blue", 0.605, 0.945)],
 }
 """Cones that a person sees in these frames: colour, and a place inside, as fractions of the picture."""
+EVERY = 10  # frames that are looked at; all are decoded, as each rests on those before
 
 
 @pytest.fixture
@@ -40,6 +41,8 @@ def test_it_finds_what_a_person_sees(perception: Any, shared_data: Callable[[str
         reading: Any = messages.decode(envelope.data_type, envelope.payload)
         frame = decoder.decode(reading.data)
         assert frame is not None
+        if number % EVERY:
+            continue
         cones = perception.find_cones(np.ascontiguousarray(frame.pixels("bgr")))
         counts.append(len(cones))
         for colour, x, y in SEEN.get(number, ()):
@@ -50,6 +53,6 @@ def test_it_finds_what_a_person_sees(perception: Any, shared_data: Callable[[str
                 y,
                 cones,
             )
-    assert len(counts) == 591
-    assert counts.count(0) < 6
+    assert len(counts) == 60
+    assert 0 not in counts
     assert np.mean(counts) < 12

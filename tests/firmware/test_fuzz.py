@@ -49,7 +49,7 @@ def test_only_valid_commands_move_the_core(bench: Bench, data: bytes) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None, suppress_health_check=ONE_BENCH)
+@settings(max_examples=25, deadline=None, suppress_health_check=ONE_BENCH)
 @given(runs=st.lists(st.tuples(speeds, speeds, speeds, st.floats(0.05, 3)), min_size=1, max_size=6))
 def test_no_sequence_of_runs_leaves_the_workspace(bench: Bench, runs: list[tuple[float, ...]]) -> None:
     """Each RUN is repeated as a master does, so that the rig gets fast and meets its edges."""

@@ -31,7 +31,7 @@ from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.run.outcomes import Finding
 from dodo_dsl.run.protocol import Flooded, MemoryTaken, Noted
 from dodo_dsl.run.run_state import MOST_NOTES, Ended, RunState
-from dodo_dsl.run.service_protocol import read_line
+from dodo_dsl.run.services.service_protocol import read_line
 from dodo_dsl.spec import registry
 from dodo_dsl.spec.registry import RegistryTooLarge, locate
 from services.camera.files import FileCamera

@@ -14,6 +14,7 @@ from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedSe
 from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.standing import Standing
 
 READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
 PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'
@@ -53,6 +54,7 @@ class Recorded:
     notes: list[str] = field(default_factory=list)
     phases: list[tuple[str, str]] = field(default_factory=list)
     rests: list[tuple[float, int]] = field(default_factory=list)
+    standings: list[tuple[str, Standing]] = field(default_factory=list)
 
     def __enter__(self) -> "Recorded":
         return self
@@ -65,6 +67,9 @@ class Recorded:
 
     def phase(self, slug: str, text: str) -> None:
         self.phases.append((slug, text))
+
+    def standing(self, slug: str, standing: Standing) -> None:
+        self.standings.append((slug, standing))
 
     def done(self, outcome: Outcome) -> None:
         self.phases.append((outcome.slug, outcome.outcome))

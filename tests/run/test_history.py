@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
@@ -115,3 +116,29 @@ def test_a_user_without_a_home_folder_has_no_history(monkeypatch: pytest.MonkeyP
     found.add([took(1.0, 2.0)])
     found.save()
     assert History().runs == []
+
+
+def test_the_values_of_checks_in_the_latest_runs(tmp_path: Path) -> None:
+    path = tmp_path / "history.jsonl"
+    path.write_text(json.dumps(LINE) + "\n")
+    found = History(path, lambda: 7.0)
+
+    def measured(value: float | None, outcome: Literal["passed", "error"] = "passed") -> tuple[str, Outcome]:
+        values = {"margin": value, "twice": 1.0, "none": None}
+        checks = [{"name": name, "value": each} for name, each in (*values.items(), ("twice", 2.0))]
+        return "a", replace(took(1.0, 2.0)[1], checks=tuple(checks), outcome=outcome)
+
+    found.add([measured(float(n)) for n in range(30)] + [measured(99.0, "error"), measured(None)])
+    found.save()
+    key = ("a/a.dodo.yml", "a", "process", "realtime")
+    runs = History(path).checks(*key)
+    assert runs == found.checks(*key)
+    assert runs == [{"when": 7, "outcome": "passed", "checks": {"margin": float(n)}} for n in range(10, 30)]
+    assert History(path).checks("s", "t", "process", "realtime") == []
+
+
+@pytest.mark.parametrize("checks", [3, {"a": "x"}, {"a": math.inf}, [1.0], None])
+def test_damaged_values_of_checks_are_no_run(tmp_path: Path, checks: object) -> None:
+    path = tmp_path / "history.jsonl"
+    path.write_text(json.dumps({**LINE, "checks": checks}) + "\n")
+    assert History(path).runs == []

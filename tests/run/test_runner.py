@@ -144,6 +144,18 @@ def test_an_error_is_retried_and_both_attempts_are_kept(logged: Scene) -> None:
     assert ("a", f"retrying after error: {CRASHED}") in logged.progress.phases
 
 
+@pytest.mark.parametrize(
+    ("verdict", "keep", "left"), [(PASSED, False, False), (PASSED, True, True), (FAILED, False, True)]
+)
+def test_pictures_stay_unless_the_test_passed(scene: Scene, verdict: VerdictEvent, keep: bool, left: bool) -> None:
+    pictures = scene.folder / "report" / "a" / "frames.rec"
+    pictures.parent.mkdir(parents=True)
+    pictures.write_bytes(b"pictures")
+    scene.backends.make = by_slug(a=drives(1.0, verdict))
+    scene.run(plan("a"), keep=keep)
+    assert pictures.exists() == left
+
+
 def test_without_retries_an_error_stays(logged: Scene) -> None:
     (outcome,) = logged.run(plan("a"))
     assert endings([outcome]) == [("a", "error", CRASHED)]

@@ -34,7 +34,8 @@ def compare(service: str, checks: Iterable[Check]) -> None:
 
 def test_collision() -> None:
     measures = DriveMeasures()
-    drive = (measures.goal_check(1.0), measures.wall_check(0.0), measures.gate_check(0, 1), *measures.drive_checks())
+    goals = (measures.goal_check(1.0), measures.rest_check(0.0), measures.gate_check(0, 1))
+    drive = (*goals, measures.wall_check(0.0), *measures.drive_checks())
     compare("collision", (*drive, *Requests(max_silence=2.0).checks()))
 
 

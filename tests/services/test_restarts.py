@@ -117,4 +117,4 @@ def test_an_evaluator_survives_a_restart_of_what_moves_the_vehicle(cid: int, tmp
             out, err = judge.communicate(timeout=PATIENCE)
     verdict = json.loads(out.splitlines()[-1])
     assert (judge.returncode, verdict["outcome"], err) == (0, "passed", "")
-    assert verdict["checks"][1]["name"] == "gates" and verdict["checks"][1]["value"] == 1
+    assert {check["name"]: check["value"] for check in verdict["checks"]}["gates"] == 1

@@ -6,7 +6,6 @@ from typing import TextIO
 
 from dodo_dsl import atomic
 from dodo_dsl.cli.progress_bar import progress_bar
-from dodo_dsl.cli.rec import exports
 from dodo_dsl.cli.rec.job import Job, tell
 from dodo_dsl.cli.rec.message_sets import messages_for
 from dodo_dsl.opendlv.recordings.recording import Recording
@@ -29,6 +28,8 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
         elif options.action == "cut":
             _cut(job)
         else:
+            from dodo_dsl.cli.rec import exports
+
             exports.EXPORTS[options.format](job)
 
 

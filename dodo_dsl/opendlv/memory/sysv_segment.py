@@ -135,7 +135,15 @@ def _made(status: os.stat_result, size: int) -> tuple[sysv_ipc.SharedMemory, sys
 
 
 def _clear(path: Path, status: os.stat_result, existed: bool) -> bool:
-    """Remove what a dead creator left; False where the keys belong to a memory under another name."""
+    """Remove what a dead creator left; False where the keys belong to a memory of another name or another user."""
+    try:
+        return _remove_leftover(path, status, existed)
+    except sysv_ipc.PermissionsError:
+        return False
+
+
+def _remove_leftover(path: Path, status: os.stat_result, existed: bool) -> bool:
+    """As above; raises sysv_ipc.PermissionsError for what belongs to another user."""
     with suppress(sysv_ipc.ExistentialError):
         memory = sysv_ipc.SharedMemory(token_file.key(status, MEMORY))
         users = memory.number_attached - 1

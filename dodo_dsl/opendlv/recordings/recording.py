@@ -22,8 +22,8 @@ from dodo_dsl.opendlv.recordings.scan import Batch, Scanner
 
 __all__ = ["Batch", "Damage", "Recording", "RecordingError", "read_envelopes"]
 
-BATCH_FRAMES = 1 << 15
-BATCH_BYTES = 16 << 20
+BATCH_FRAMES = 1 << 12
+BATCH_BYTES = 4 << 20
 _NEAR = 1 << 16  # bytes between frames that are read rather than jumped over
 
 _INDEX = np.dtype(
@@ -169,7 +169,7 @@ class Recording:
 
 def _indexed(stream: BinaryIO, progress: Callable[[int], None] | None) -> tuple[Damage, NDArray[np.void]]:
     scanner = Scanner(stream)
-    parts = [np.zeros(0, _INDEX)]
+    index = bytearray()  # grows in place, so that there is never a second one
     for batch in scanner.batches():
         part = np.empty(len(batch), _INDEX)
         table = batch.table
@@ -179,7 +179,7 @@ def _indexed(stream: BinaryIO, progress: Callable[[int], None] | None) -> tuple[
         sent, received, sampled = batch.times
         part["sampled"] = sampled
         part["time"] = np.where(sampled, sampled, np.where(received, received, sent))
-        parts.append(part)
+        index += part.tobytes()
         if progress is not None:
             progress(scanner.position)
-    return scanner.damage, np.concatenate(parts)
+    return scanner.damage, np.frombuffer(index, _INDEX)

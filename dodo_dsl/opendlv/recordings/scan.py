@@ -16,8 +16,8 @@ from dodo_dsl.opendlv.recordings import frame_table
 from dodo_dsl.opendlv.recordings.damage import Damage
 from dodo_dsl.opendlv.recordings.frame_table import PADDING, Fact, Table
 
-CHUNK_BYTES = 4 << 20
-MAX_FRAMES = 1 << 16
+CHUNK_BYTES = 1 << 20
+MAX_FRAMES = 1 << 12
 
 _WORD = struct.Struct("<I")
 _CUT, _GARBAGE, _NO_ENVELOPE = "a frame that is cut short", "no frame begins here", "a frame that holds no envelope"

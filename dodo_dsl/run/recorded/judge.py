@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dodo_dsl.plan.model import Plan, PlannedService
-from dodo_dsl.run import service_protocol
 from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Malformed, Noted, VerdictEvent
 from dodo_dsl.run.recorded.test_recording import TestRecording
+from dodo_dsl.run.services import service_protocol
 
 NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG")
 _TAIL_LINES, _TAIL_WIDTH = 8, 300

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
-from dodo_dsl.run.announce import heartbeat
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.health_check import examine
 from dodo_dsl.run.rigs.permission import refuse_test, refuse_unattended
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in, leased
+from dodo_dsl.run.services.announce import heartbeat
 from dodo_dsl.spec.deployment.rig import EMULATED
 
 

@@ -1,6 +1,6 @@
 """What a service that observes the bus gets in lockstep: each message once, in the step that it belongs to."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
@@ -13,6 +13,7 @@ LONGEST = 2 * 86_400_000_000
 """Longest test, in microseconds."""
 
 _REMEMBERED = 50
+_Key = tuple[int, bytes, int, int, int]
 
 
 class Observer:
@@ -26,8 +27,10 @@ class Observer:
     def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:
         self._marked = marked
         self._collected: list[Envelope] = []
-        self._first: set[Envelope] = set()
-        self._relayed: deque[set[Envelope]] = deque(maxlen=_REMEMBERED)
+        self._first: set[_Key] = set()
+        self._relayed: deque[set[_Key]] = deque()
+        self._counts: Counter[_Key] = Counter()
+        """In how many of the sets each key is."""
 
     def collect(self, envelope: Envelope) -> None:
         """An envelope that was on the bus."""
@@ -42,7 +45,7 @@ class Observer:
         keys = {_key(envelope) for envelope in own}
         if len(self._first) < len(keys) and until <= EPOCH:
             self._first = keys  # the clock repeats these for applications that start late
-        self._relayed.append(keys)
+        self._remember(keys)
         collected, self._collected = self._collected, []
         for envelope in collected:
             if until <= envelope.sample_time <= EPOCH + LONGEST:
@@ -59,10 +62,19 @@ class Observer:
                 inbox.observe(envelope)
         self._collected = []
 
-    def _is_known(self, key: Envelope) -> bool:
-        return key in self._first or any(key in keys for keys in self._relayed)
+    def _remember(self, keys: set[_Key]) -> None:
+        self._relayed.append(keys)
+        self._counts.update(keys)
+        if len(self._relayed) > _REMEMBERED:
+            for key in self._relayed.popleft():
+                self._counts[key] -= 1
+                if not self._counts[key]:
+                    del self._counts[key]
+
+    def _is_known(self, key: _Key) -> bool:
+        return key in self._first or key in self._counts
 
 
-def _key(envelope: Envelope) -> Envelope:
+def _key(envelope: Envelope) -> _Key:
     """The same for every copy of a message."""
-    return envelope._replace(received=0)
+    return envelope.data_type, envelope.payload, envelope.sent, envelope.sample_time, envelope.sender_stamp

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sysv_ipc
 
 from dodo_dsl.opendlv.memory import token_file
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from tests.opendlv.conftest import Peer
 
 SIZE = 64 * 48 * 4
+NOBODY = 65534
 TIME = 1_715_000_000_123_456
 
 
@@ -147,6 +149,29 @@ def test_colliding_keys_are_avoided(memory_name: str) -> None:
                 assert reader.buffer[0] == 1
     finally:
         twin.unlink()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs another user")
+def test_what_another_user_left_under_these_keys_is_avoided(memory_name: str) -> None:
+    token = Path("/tmp", memory_name)
+    token.touch()
+    os.chown(token, NOBODY, NOBODY)
+    left = sysv_ipc.SharedMemory(token_file.key(token.stat(), 1), sysv_ipc.IPC_CREX, size=10, mode=0o666)
+    left.detach()
+    try:
+        creator = multiprocessing.get_context("fork").Process(target=create_as_nobody, args=(memory_name,))
+        creator.start()
+        creator.join()
+        assert creator.exitcode == 0
+    finally:
+        left.remove()
+        token.unlink(missing_ok=True)
+
+
+def create_as_nobody(name: str) -> None:
+    os.setuid(NOBODY)
+    with SharedMemory.create(name, 20) as memory:
+        assert memory.size == 20
 
 
 def test_arrays_stay_valid_after_the_end(mode: str, memory_name: str) -> None:

@@ -10,11 +10,12 @@ import pytest
 
 from dodo_dsl.opendlv.bus.session import Session
 from services.base.lockstep import channel, clock_client
+from services.base.lockstep.announced_memory import AnnouncedMemory
 from services.base.lockstep.lockstep_clock import EPOCH
 from services.clock import exchange, model
 from services.clock.model import Stepper
 from services.clock.participants import ApplicationSilent, Patience, ServiceSilent, TimeOver
-from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Forger, Mover, ToyEvaluator, Toys
+from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Forger, Mover, ToyEvaluator, Toys, Watcher
 
 Way = list[tuple[int, float]]
 
@@ -64,6 +65,22 @@ def test_manners_change_nothing(toys: Toys, manner: str) -> None:
     assert len(application.seen) in (20, 21), "every picture once"
     most = 21 * (application.times - 1)
     assert most - 2 <= stepper.application.answers.surplus <= most
+
+
+def test_who_watches_sees_each_picture(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a camera is kept from showing it at once, after it has said that it will."""
+    show = AnnouncedMemory.announce
+
+    def late(memory: AnnouncedMemory) -> None:
+        time.sleep(0.02)
+        show(memory)
+
+    monkeypatch.setattr(AnnouncedMemory, "announce", late)
+    watcher = Watcher(toys.memory_name())
+    toys.cast, toys.watch = {**DRIVE, "watcher": lambda *_: watcher}, ("watcher",)
+    toys.run(toys.application())
+    steps = [EPOCH + number * STEP for number in range(21)]
+    assert watcher.seen[:20] == [(now, now) for now in steps[:20]]
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -108,6 +108,23 @@ class ToyEvaluator(Service):
         return ()
 
 
+class Watcher(Service):
+    """Looks at a memory in each step without being one of its readers: the step's time, and that of the picture."""
+
+    period = STEP
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self.seen: list[tuple[int, int]] = []
+
+    def update(self, now: int) -> Iterable[Any]:
+        memory = SharedMemory.attach(self._name)
+        with memory.lock():
+            self.seen.append((now, memory.sample_time()))
+        memory.close()
+        return ()
+
+
 @dataclass
 class ToyApplication:
     """Steers by what it sees. ``copies`` its sample time, says it ``times`` often, ``pause`` waits before it does.
@@ -209,7 +226,7 @@ DRIVE: dict[str, Maker] = {"mover": lambda s, _: Mover(s), "eye": lambda _, memo
 
 @dataclass
 class Toys:
-    """Runs the test: a mover goes on, others sense; the ``evaluator`` looks."""
+    """Runs the test: a mover goes on, others sense but for those who ``watch``; the ``evaluator`` looks."""
 
     cid: int
     seconds: float = 2.0
@@ -219,6 +236,7 @@ class Toys:
     timeout: int = 60_000_000
     readers: int = 1
     cast: dict[str, Maker] = field(default_factory=lambda: DRIVE)
+    watch: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self.evaluator = ToyEvaluator(self.seconds)
@@ -244,7 +262,8 @@ class Toys:
                 answers = Answers(filters(self.answers, ids), filters(self.relayed, ids))
                 exchange = Exchange(session, channel, answers.take)
                 advance = tuple(name for name in self.cast if name == "mover")
-                roles = Roles(advance, tuple(name for name in self.cast if name not in advance), ("judge",))
+                sense = tuple(name for name in self.cast if name not in (*advance, *self.watch))
+                roles = Roles(advance, sense, ("judge",), self.watch)
                 application = SteppedApplication(answers, self.patience, exchange, stop.is_set, ResponseTimes())
                 stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
                 try:

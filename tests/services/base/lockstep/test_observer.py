@@ -95,3 +95,17 @@ def test_the_first_messages_said_again_much_later() -> None:
     observer.collect(sent(b"a", EPOCH, 9))
     observer.deliver(inbox, EPOCH + 200 * STEP, [])
     assert inbox.seen == [(b"a", EPOCH)]
+
+
+def test_what_services_sent_long_ago_is_forgotten() -> None:
+    """Fifty steps later a copy counts, unless a service sent the same again meanwhile; none is that late."""
+    observer, inbox = Observer(), Seen()
+    observer.deliver(inbox, EPOCH, [sent(b"first", EPOCH)])
+    for step in range(1, 53):
+        again = [sent(b"again", 88)] if step in (1, 40) else []
+        observer.deliver(inbox, EPOCH + step * STEP, [sent(b"once", 77), *again] if step == 1 else again)
+    inbox.seen.clear()
+    for payload, time in ((b"once", 77), (b"again", 88), (b"first", EPOCH)):
+        observer.collect(sent(payload, time, 9))
+    observer.deliver(inbox, EPOCH + 53 * STEP, [])
+    assert inbox.seen == [(b"once", 77)]
