@@ -142,17 +142,18 @@ async def lease_any(
     waiting: Callable[[str], None],
     shared: bool = False,
     patience_s: float = DEFAULT_PATIENCE_S,
+    attempt: Callable[[str, dict[str, Any], bool], Lease | None] = try_lease,
 ) -> Lease:
     """The first of the leases that is free; waits for one, calls ``waiting`` once with a sentence, raises LeaseTimeout.
 
-    Times are of the event loop's clock, in s.
+    ``attempt`` takes one. Times are of the event loop's clock, in s.
     """
     now = asyncio.get_running_loop().time
     deadline = now() + patience_s
     is_announced = False
     while True:
         for name in names:
-            if lease := try_lease(name, about, shared):
+            if lease := attempt(name, about, shared):
                 return lease
         if now() > deadline:
             raise LeaseTimeout(f"no {_kind(names)} came free within {patience_s:g} s; {holder(names[0])} holds one")

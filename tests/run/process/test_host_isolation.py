@@ -71,6 +71,31 @@ def test_foreign_traffic_is_an_error_that_names_its_sender(cid: int, traffic: in
 
 
 @pytest.mark.slow
+def test_a_cid_is_held_against_other_lease_folders(
+    cid: int, tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As those of two users of one machine, who share its bus."""
+    said: list[str] = []
+
+    async def wait() -> int:
+        async with host_slot(plan(cid=cid), (cid,), said.append, alone=False) as slot:
+            return slot.cid
+
+    async def scene() -> int:
+        async with host_slot(plan(cid=cid), (cid,), print, alone=False):
+            monkeypatch.setenv("DODO_LEASES", str(tmp_path / "other"))
+            second = asyncio.create_task(wait())
+            while not said:
+                await asyncio.sleep(0)
+            monkeypatch.setenv("DODO_LEASES", str(folder))
+        monkeypatch.setenv("DODO_LEASES", str(tmp_path / "other"))
+        return await second
+
+    assert asyncio.run(scene()) == cid
+    assert said == ["waiting for another process"]
+
+
+@pytest.mark.slow
 def test_a_slot_has_names_of_its_own_unless_it_is_alone(cid: int, folder: Path) -> None:
     slots = [leased(cid), leased(cid), leased(cid, alone=True)]
     assert all(leftovers.SLOT_NAME.fullmatch(slot.name) for slot in slots)
