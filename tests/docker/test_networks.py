@@ -55,9 +55,10 @@ def networks(outside: bool) -> object:
 
 
 def host() -> str:
-    """An address of the engine's machine on another of its networks."""
-    words = ["docker", "network", "inspect", "bridge", "--format", "{{(index .IPAM.Config 0).Gateway}}"]
-    return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    """An address of the engine's machine on another of its networks; a new engine names only that network's subnet."""
+    words = ["docker", "network", "inspect", "bridge", "--format", "{{json (index .IPAM.Config 0)}}"]
+    found = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
+    return str(found.get("Gateway") or next(ipaddress.ip_network(found["Subnet"]).hosts()))
 
 
 def up(folder: Path, project: str, outside: bool) -> subprocess.CompletedProcess[str]:
