@@ -71,9 +71,14 @@ class Attempts:
         def stands(standing: Standing) -> None:
             self._standing(slug, standing)
 
+        def forget_pictures() -> None:
+            with contextlib.suppress(OSError):
+                (job.report / PICTURES_FILE).unlink(missing_ok=True)
+
         try:
             async with self._backends.open(job, say, self._keep) as backend:
-                outcome, kept = await Engine(job.plan, backend, say, begun, stands).run(self._keep)
+                engine = Engine(job.plan, backend, say, begun, stands, forget_pictures)
+                outcome, kept = await engine.run(self._keep)
                 self.kept.extend(kept)
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
             if outcome is None:
@@ -82,8 +87,7 @@ class Attempts:
                 outcome, notes=(*outcome.notes, f"not all of the test was taken down: {describe(error, job.report)}")
             )
         if outcome.outcome == "passed" and not self._keep:
-            with contextlib.suppress(OSError):
-                (job.report / PICTURES_FILE).unlink(missing_ok=True)
+            forget_pictures()
         return outcome
 
 

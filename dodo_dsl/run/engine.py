@@ -22,7 +22,8 @@ BEGIN_PATIENCE_S = 2.0
 class Engine:
     """Drives one backend through one Plan. ``say`` is called with each phase, for live progress.
 
-    ``begun`` is called when set-up is over and the test begins, ``stands`` with how far it is.
+    ``begun`` is called when set-up is over and the test begins, ``stands`` with how far it is, ``passed`` before a test
+    is taken down that has passed.
 
     All times are of the running event loop's clock, in s.
     """
@@ -32,6 +33,7 @@ class Engine:
     say: Callable[[str], None]
     begun: Callable[[], None] = lambda: None
     stands: Callable[[Standing], None] = lambda _: None
+    passed: Callable[[], None] = lambda: None
     state: RunState = field(init=False)
     _now: Callable[[], float] = field(init=False)
     _meter: LoadMeter = field(init=False)
@@ -59,6 +61,8 @@ class Engine:
         finally:
             if self.state.finished is None:
                 self.state.finished = self._now()
+            if not keep and self.state.outcome(self.backend).outcome == "passed":
+                self.passed()
             self.say("taking down")
             kept = await self._close(keep)
             await self._collect_losses()

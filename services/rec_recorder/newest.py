@@ -40,6 +40,11 @@ class NewestPictures:
             self.is_on = False
             _log.warning("no more pictures are recorded: %s", error)
 
+    @property
+    def is_wanted(self) -> bool:
+        """Whether the file is still there: who runs a test removes it as soon as the test has passed."""
+        return self.is_on and self._path.exists()
+
     def close(self) -> None:
         """End the recording."""
         self._writer.close()

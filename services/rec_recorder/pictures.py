@@ -2,9 +2,10 @@
 
 import logging
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.memory import pixels
@@ -28,6 +29,15 @@ class Quality:
     fast: bool = False
 
 
+class Taken(NamedTuple):
+    """A picture that is not encoded yet: ``picture`` as ``pixels.view`` has it, times in microseconds."""
+
+    picture: pixels.Picture
+    layout: tuple[str, int, int]
+    sample_time: int
+    sent: int
+
+
 class RecordedCamera:
     """One memory's pictures, encoded; `sender_stamp` tells the memories of a recording apart."""
 
@@ -38,21 +48,27 @@ class RecordedCamera:
         self._layout = ("", 0, 0)
         self._encoder: VideoEncoder | None = None
 
-    def envelope(self, now: int) -> Envelope | None:
-        """The message of a new picture, if there is one; raises SourceError or VideoError when that fails."""
+    def take(self, now: int) -> Taken | None:
+        """A new picture, if there is one; raises SourceError."""
         taken = self._source.take(now)
         if taken is None:
             return None
         data, sample_time = taken
         layout = self._source.spec.layout(len(data))
-        if self._encoder is None or layout != self._layout:
+        return Taken(pixels.view(data, *layout), layout, sample_time, time.time_ns() // 1000)
+
+    def envelope(self, taken: Taken) -> Envelope:
+        """The message of a picture, which follows the one before in the video; raises VideoError."""
+        if self._encoder is None or taken.layout != self._layout:
             quality = self._quality
-            self._encoder = VideoEncoder(*layout, quality.key_interval, quality.quality, quality.lossless, quality.fast)
-            self._layout = layout
-        message = self._message(self._encoder.encode(pixels.view(data, *layout)))
-        sent = time.time_ns() // 1000
-        payload = self._messages.encode(message)
-        return Envelope(self._messages.id(MESSAGE), payload, sent, sent, sample_time, self._sender_stamp)
+            self._encoder = VideoEncoder(
+                *taken.layout, quality.key_interval, quality.quality, quality.lossless, quality.fast
+            )
+            self._layout = taken.layout
+        payload = self._messages.encode(self._message(self._encoder.encode(taken.picture)))
+        return Envelope(
+            self._messages.id(MESSAGE), payload, taken.sent, taken.sent, taken.sample_time, self._sender_stamp
+        )
 
     def restart(self) -> None:
         """Begin with a key frame at the next picture, as those before are not in the recording."""
@@ -70,8 +86,49 @@ class RecordedCamera:
         return self._messages.type(MESSAGE)(**fields)
 
 
+Store = Callable[[RecordedCamera, Taken], None]
+
+
+class Later:
+    """Pictures that are encoded when they have more than ``max_size`` bytes, or at the end, if ``is_wanted`` then.
+
+    So those of a short test that passes cost hardly any time.
+    """
+
+    def __init__(self, write: Callable[[Envelope], None], is_wanted: Callable[[], bool], max_size: int) -> None:
+        self._write, self._is_wanted, self._max_size = write, is_wanted, max_size
+        self._waiting: deque[tuple[RecordedCamera, Taken]] = deque()
+        self._size = 0
+
+    def add(self, camera: RecordedCamera, taken: Taken) -> None:
+        """Keep a picture, in the room that i420 takes; raises VideoError, also for an earlier picture."""
+        kind, width, height = taken.layout
+        try:
+            picture = pixels.to_i420(taken.picture, kind)
+        except pixels.PixelError as error:
+            raise VideoError(str(error)) from None
+        self._waiting.append((camera, taken._replace(picture=picture, layout=("i420", width, height))))
+        self._size += picture.nbytes
+        while self._size > self._max_size:
+            self._encode()
+
+    def close(self) -> None:
+        """Encode what is left, if it is wanted."""
+        try:
+            while self._waiting and self._is_wanted():
+                self._encode()
+        except VideoError as error:
+            _log.warning("not all pictures are recorded: %s", error)
+        self._waiting.clear()
+
+    def _encode(self) -> None:
+        camera, taken = self._waiting.popleft()
+        self._size -= taken.picture.nbytes
+        self._write(camera.envelope(taken))
+
+
 class Cameras:
-    """All memories that are recorded: each picture goes to `write` while `is_on`.
+    """All memories that are recorded: each picture goes to `store` while `is_on`.
 
     Where pictures are not ``required``, a camera whose pictures cannot be encoded is logged and left out.
     """
@@ -79,11 +136,11 @@ class Cameras:
     def __init__(
         self,
         cameras: Sequence[RecordedCamera],
-        write: Callable[[Envelope], None],
+        store: Store,
         is_on: Callable[[], bool],
         required: bool = True,
     ) -> None:
-        self._cameras, self._write, self._is_on, self._required = list(cameras), write, is_on, required
+        self._cameras, self._store, self._is_on, self._required = list(cameras), store, is_on, required
         self._was_on = True
 
     def update(self, now: int) -> None:
@@ -94,21 +151,19 @@ class Cameras:
         for camera in tuple(self._cameras):
             if not self._was_on:
                 camera.restart()
-            envelope = self._taken(camera, now)
-            if envelope is not None:
-                self._write(envelope)
+            self._take(camera, now)
         self._was_on = True
 
-    def _taken(self, camera: RecordedCamera, now: int) -> Envelope | None:
+    def _take(self, camera: RecordedCamera, now: int) -> None:
         try:
-            return camera.envelope(now)
+            if taken := camera.take(now):
+                self._store(camera, taken)
         except (SourceError, VideoError) as error:
             if self._required:
                 raise
             _log.warning("no pictures are recorded: %s", error)
             self._cameras.remove(camera)
             camera.close()
-            return None
 
     def close(self) -> None:
         """Detach from all memories."""

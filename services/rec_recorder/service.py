@@ -12,13 +12,15 @@ from services.rec_recorder.source import MemorySpec, Source, parse
 from services.rec_recorder.traffic import Traffic
 
 if TYPE_CHECKING:
-    from services.rec_recorder.pictures import Cameras
+    from services.rec_recorder.pictures import Cameras, RecordedCamera
     from services.rec_recorder.snapshot import SnapshotWriter
 
 LOOKS_HZ, SNAPSHOT_LOOKS_HZ = 200.0, 20.0
 """Times a second at most that memories are looked at."""
 FAST_LOOKS = 4
 """Looks a picture at most where the newest pictures are kept, of which none has to be exactly in time."""
+WAITING = 32_000_000
+"""Bytes of pictures that wait to be encoded: 69 of 640 x 480 pixels, which take a third of a second at the end."""
 COMMAND = "cluon.data.RecorderCommand"
 MEGABYTE = 1_000_000
 
@@ -119,23 +121,31 @@ def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "SnapshotWrit
 
 
 def _cameras(context: Context, sources: list[Source], recording: RecordingFile) -> "Cameras":
-    from services.rec_recorder.newest import NewestPictures
     from services.rec_recorder.pictures import Cameras, Quality, RecordedCamera
 
     flags = context.flags
-    newest = None
-    if flags["pictures"]:
-        newest = NewestPictures(Path(flags["pictures"]), round(flags["pictures-size"] * MEGABYTE))
-        context.resources.callback(newest.close)
-    quality = Quality(flags["key-interval"], flags["quality"], flags["lossless"], fast=newest is not None)
-    cameras = Cameras(
-        [
-            RecordedCamera(source, quality, context.messages, flags["id"] + number)
-            for number, source in enumerate(sources)
-        ],
-        newest.write if newest else recording.write,
-        lambda: recording.is_on and (newest is None or newest.is_on),
-        required=newest is None,
+    is_alone = bool(flags["pictures"])
+    quality = Quality(flags["key-interval"], flags["quality"], flags["lossless"], fast=is_alone)
+    each = [
+        RecordedCamera(source, quality, context.messages, flags["id"] + number) for number, source in enumerate(sources)
+    ]
+    cameras = (
+        _pictures_alone(context, each, recording)
+        if is_alone
+        else Cameras(each, lambda camera, taken: recording.write(camera.envelope(taken)), lambda: recording.is_on)
     )
     context.resources.callback(cameras.close)
     return cameras
+
+
+def _pictures_alone(context: Context, cameras: "list[RecordedCamera]", recording: RecordingFile) -> "Cameras":
+    """Pictures in a recording of their own, of which the newest stay."""
+    from services.rec_recorder.newest import NewestPictures
+    from services.rec_recorder.pictures import Cameras, Later
+
+    size = round(context.flags["pictures-size"] * MEGABYTE)
+    newest = NewestPictures(Path(context.flags["pictures"]), size)
+    context.resources.callback(newest.close)
+    later = Later(newest.write, lambda: newest.is_wanted, WAITING)
+    context.resources.callback(later.close)
+    return Cameras(cameras, later.add, lambda: recording.is_on and newest.is_on, required=False)

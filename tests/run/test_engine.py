@@ -58,6 +58,15 @@ def test_layers_start_in_order_and_times_are_measured() -> None:
     ]
 
 
+@pytest.mark.parametrize("verdict", [PASSED, FAILED])
+@pytest.mark.parametrize("keep", [False, True])
+def test_that_it_has_passed_is_told_before_it_is_taken_down(verdict: VerdictEvent, keep: bool) -> None:
+    backend = ScriptedBackend(plan(), {**READY, "begin": [(1.0, verdict), (1.0, ENDED)]})
+    told: list[str] = []
+    run(Engine(backend.plan, backend, lambda _: None, passed=lambda: told.append(backend.calls[-1])).run(keep))
+    assert told == (["begin"] if verdict is PASSED and not keep else [])
+
+
 def test_how_far_a_test_is_is_told_as_it_goes_on() -> None:
     def check(name: str, value: float, share: float | None) -> dict[str, object]:
         return {"name": name, "value": value, "unit": "m", "margin": 0.25, "margin_share": share, "ok": True}

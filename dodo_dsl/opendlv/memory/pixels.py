@@ -55,6 +55,14 @@ def to_bgr(picture: Picture, format_: str) -> Picture:
     return _converted(picture, {"argb": "COLOR_BGRA2BGR", "i420": "COLOR_YUV2BGR_I420"}.get(format_))
 
 
+def to_i420(picture: Picture, format_: str) -> Picture:
+    """A picture as i420, shaped as ``view`` has it; raises PixelError where width or height are odd."""
+    if format_ == "i420":
+        return picture.copy()
+    size("i420", picture.shape[1], picture.shape[0])
+    return _converted(picture, {"argb": "COLOR_BGRA2YUV_I420", "bgr": "COLOR_BGR2YUV_I420"}[format_])
+
+
 def from_bgr(picture: Picture, format_: str) -> Picture:
     """A picture of blue, green, red in another format, shaped as ``view`` has it; alpha is 255."""
     return _converted(picture, {"argb": "COLOR_BGR2BGRA", "i420": "COLOR_BGR2YUV_I420"}.get(format_))

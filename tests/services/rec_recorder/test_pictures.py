@@ -16,6 +16,8 @@ from dodo_dsl.opendlv.memory import pixels
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.opendlv.video.decoder import VideoDecoder
+from dodo_dsl.opendlv.video.encoder import VideoEncoder
+from services.rec_recorder import service
 from services.rec_recorder.service import Recorder
 from services.rec_recorder.source import SourceError
 from tests.services.built import MESSAGES, built, refusal
@@ -171,6 +173,43 @@ def test_pictures_alone_are_in_a_recording_of_their_own(tmp_path: Path) -> None:
     frames = [decoder.decode(MESSAGES.decode(IMAGE, e.payload).data) for e in read_envelopes(pictures)]
     error = frames[-1].pixels("i420").astype(float) - scene(COUNT - 1, "i420")  # type: ignore[union-attr]
     assert 10 * np.log10(255**2 / (error**2).mean()) > 34  # PSNR in dB
+
+
+def test_pictures_of_a_test_that_has_passed_are_not_encoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its runner removes their file; of a long test the oldest were encoded before."""
+    encoded: list[int] = []
+    encode = VideoEncoder.encode
+
+    def counted(self: VideoEncoder, picture: pixels.Picture) -> bytes:
+        encoded.append(len(encoded))
+        return encode(self, picture)
+
+    monkeypatch.setattr(VideoEncoder, "encode", counted)
+    monkeypatch.setattr(service, "WAITING", 3 * pixels.size("i420", WIDTH, HEIGHT))
+    pictures = tmp_path / "frames.rec"
+    with staged(tmp_path / "drive.rec", "argb", f"--pictures={pictures}") as stage:
+        for number in range(COUNT):
+            stage.show(number)
+        assert len(encoded) == COUNT - 3
+        assert recorded(pictures) == list(range(COUNT - 3))
+        pictures.unlink()
+    assert len(encoded) == COUNT - 3
+    assert not pictures.exists()
+
+
+def test_pictures_of_odd_size_are_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Of 161 x 120 pixels, which h264 cannot have."""
+    size = f"--memories=odd-{os.getpid()}.argb:161x120"
+    with SharedMemory.create(f"odd-{os.getpid()}.argb", 161 * 120 * 4) as memory:
+        words = (f"--rec={tmp_path / 'drive.rec'}", f"--pictures={tmp_path / 'frames.rec'}", "--frames=20", size)
+        with built("rec_recorder", *words) as recorder:
+            recorder.update(1)
+            with memory.lock():
+                memory.stamp(T0)
+            recorder.update(2)
+    assert [r.getMessage() for r in caplog.records] == [
+        "no pictures are recorded: i420 needs an even width and height, not 161 x 120"
+    ]
 
 
 def test_what_cannot_be_encoded_ends_only_the_pictures_that_decide_nothing(
