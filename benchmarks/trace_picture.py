@@ -16,7 +16,8 @@ WIDTH, LEFT, RIGHT, LANE, GAP = 960, 160, 20, 26, 34
 """Pixels: of the picture, beside the bars, of a lane, and above each trace."""
 LETTER = 6.2
 COLOURS = (
-    "#4878cf", "#6acc65", "#d65f5f", "#b47cc7", "#c4ad66", "#77bedb", "#8c8c8c", "#e08030", "#5a9e8f", "#3d7a5c", "#a05a2c",
+    "#4878cf", "#6acc65", "#d65f5f", "#b47cc7", "#c4ad66", "#77bedb",
+    "#8c8c8c", "#e08030", "#5a9e8f", "#3d7a5c", "#a05a2c",
 )  # fmt: skip
 
 

@@ -71,7 +71,7 @@ SERVICE: Rows = {
     "label_file": ("removed", "labels do nothing in a test"),
     "labels": ("kept", "without those of compose and DoDo"),
     "links": ("kept", "names of services"),
-    "logging": ("rewritten", "keeps json-file and local, which DoDo reads"),
+    "logging": ("rewritten", "keeps json-file and local, which DoDo reads; 100 MB of a log without a max-size"),
     "mac_address": ("removed", "the engine gives one"),
     "mem_limit": ("rewritten", "that of `sandbox` in dodo.yml at most"),
     "mem_reservation": ("removed", "a test has limits only"),

@@ -10,6 +10,8 @@ DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
 
 What a program that starts as root needs to give up root, it keeps.
 """
+LOGS = {"max-size": "50m", "max-file": "2"}
+"""What is kept of a service's log: two files of 50 MB."""
 _DRIVERS = ("json-file", "local")
 _NUMBERS = ("pids_limit", "mem_limit", "cpus", "pids", "memory")
 _UNLIMITED = ("", "0", "-1")
@@ -31,6 +33,7 @@ def confine(copy: ServiceCopy) -> None:
     logging = copy.filled(copy.service.get("logging"))
     if isinstance(logging, dict) and logging.get("driver", "json-file") not in _DRIVERS:
         copy.remove("logging", "DoDo reads the logs")
+    _limit_logs(copy)
     _own_labels(copy)
 
 
@@ -62,6 +65,17 @@ def put(written: Any, excess: Excess) -> None:
             written[step] = {}
         written = written[step]
     written[last] = excess.allowed
+
+
+def _limit_logs(copy: ServiceCopy) -> None:
+    """The newest part of a log, unless the file itself says how much: an engine keeps all."""
+    logging = copy.service.get("logging")
+    logging = logging if isinstance(logging, dict) else {}
+    options = logging.get("options")
+    options = options if isinstance(options, dict) else {}
+    if str(copy.filled(options.get("max-size") or "")).strip() in _UNLIMITED:
+        driver = logging.get("driver") or _DRIVERS[0]
+        copy.service["logging"] = {**logging, "driver": driver, "options": {**options, **LOGS}}
 
 
 def _limit(copy: ServiceCopy, key: str, word: str, default: float) -> None:

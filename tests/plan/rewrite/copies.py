@@ -11,6 +11,7 @@ CONFINED: dict[str, Any] = {
     "ulimits": {"core": 0, "fsize": 1_000_000_000, "nofile": 1024},
     "cap_drop": ["AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"],
     "security_opt": ["no-new-privileges:true"],
+    "logging": {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}},
 }
 """What confines a service that sets nothing."""
 

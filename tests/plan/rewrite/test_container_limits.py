@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.plan.rewrite.container_limits import confine
+from dodo_dsl.plan.rewrite.container_limits import LOGS, confine
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from tests.plan.rewrite.copies import CONFINED, copy
 
@@ -73,7 +73,11 @@ from tests.plan.rewrite.copies import CONFINED, copy
         ),
         ({"security_opt": ["no-new-privileges:false"]}, {"security_opt": ["no-new-privileges:false"]}),
         ({"security_opt": ["${N:-no-new-privileges}"]}, {"security_opt": ["${N:-no-new-privileges}"]}),
-        ({"logging": {"driver": "json-file"}}, {"logging": {"driver": "json-file"}}),
+        ({"logging": {"driver": "local"}}, {"logging": {"driver": "local", "options": LOGS}}),
+        ({"logging": {"options": {"tag": "x"}}}, {"logging": {"driver": "json-file", "options": {"tag": "x", **LOGS}}}),
+        ({"logging": {"driver": "json-file", "options": {"max-size": "-1"}}}, {}),
+        ({"logging": None}, {}),
+        ({"logging": {"options": {"max-size": "1m"}}}, {"logging": {"options": {"max-size": "1m"}}}),
         ({"logging": {"driver": "${D:-syslog}"}}, {}),
         ({"labels": {"dodo.test": "x", "team": "a"}}, {"labels": {"team": "a"}}),
         ({"labels": ["com.docker.compose.project=x"]}, {}),
