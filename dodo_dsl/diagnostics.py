@@ -13,6 +13,8 @@ from typing import Literal
 from dodo_dsl.terminal import json_text, printable
 
 Severity = Literal["error", "warning"]
+Piece = tuple[str, str]
+"""A part of a text, and its style by name; empty for none."""
 
 _MAX_FRAME_LINE = 160
 _MAX_FILE = 1 << 20
@@ -121,29 +123,36 @@ def _source_line(span: Span) -> str | None:
     return lines[span.line - 1] if 0 < span.line <= len(lines) else None
 
 
-def _code_frame(span: Span) -> list[str]:
+def _code_frame(span: Span) -> Iterator[Piece]:
     line = _source_line(span) if span.length else None
     if line is None:
-        return []
+        return
     start = max(0, span.column - 1 - _MAX_FRAME_LINE // 2) if len(line) > _MAX_FRAME_LINE else 0
     part = printable(line[start : start + _MAX_FRAME_LINE])
     offset = span.column - 1 - start
-    marks = "^" * max(1, min(span.length, len(part) - offset))
     gutter = str(span.line)
-    return [f"  {gutter} | {part}", f"  {' ' * len(gutter)} | {' ' * offset}{marks}"]
+    yield f"  {gutter} | ", "gutter"
+    yield f"{part}\n", ""
+    yield f"  {' ' * len(gutter)} | ", "gutter"
+    yield " " * offset, ""
+    yield "^" * max(1, min(span.length, len(part) - offset)), "mark"
+    yield "\n", ""
 
 
-def _text(diagnostic: Diagnostic) -> str:
+def pieces(diagnostic: Diagnostic) -> Iterator[Piece]:
+    """The lines of a diagnostic in parts."""
     span = diagnostic.span
-    head = f"{printable(shown_path(span.file))}:{span.line}:{span.column}: {diagnostic.severity}[{diagnostic.rule}]: "
-    lines = [head + printable(diagnostic.message), *_code_frame(span)]
+    yield f"{printable(shown_path(span.file))}:{span.line}:{span.column}: ", "place"
+    yield f"{diagnostic.severity}[{diagnostic.rule}]", diagnostic.severity
+    yield f": {printable(diagnostic.message)}\n", ""
+    yield from _code_frame(span)
     if diagnostic.hint:
-        lines.append(f"  hint: {printable(diagnostic.hint)}")
-    return "\n".join(lines)
+        yield "  hint: ", "hint"
+        yield f"{printable(diagnostic.hint)}\n", ""
 
 
 def format_text(diagnostics: Sequence[Diagnostic]) -> str:
-    return "".join(_text(d) + "\n" for d in diagnostics)
+    return "".join(text for d in diagnostics for text, _ in pieces(d))
 
 
 def format_json(diagnostics: Sequence[Diagnostic]) -> str:

@@ -17,6 +17,9 @@ settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCh
 settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
 settings.load_profile("dodo")  # how fast a machine is decides no test; `make check` chooses the other
 
+for variable in ("NO_COLOR", "FORCE_COLOR"):  # tests say themselves when there are colours
+    os.environ.pop(variable, None)
+
 REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"
 

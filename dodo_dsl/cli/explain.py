@@ -8,9 +8,10 @@ from typing import TextIO
 from dodo_dsl.check import catalogue
 from dodo_dsl.check.explanation import ArgumentExplained, Asked, Explanation, Line, explain
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.diagnostics import did_you_mean, format_text
+from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -44,7 +45,8 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         raise UsageError(f"{error}" + (f"; or the rule: {near}" if near else "")) from None
     found = [explain(test) for test in checked.tests]
     stdout.write(json_text([asdict(e) for e in found]) if options.json else _text(found))
-    stderr.write(selection.left_out(checked) + format_text(checked.diagnostics))
+    stderr.write(selection.left_out(checked))
+    write_diagnostics(stderr, checked.diagnostics)
     return Exit.OK if checked.ok else Exit.USAGE
 
 

@@ -8,11 +8,12 @@ from typing import TextIO
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.compile import fixes
 from dodo_dsl.cli.compile.formats import FORMATS, rendered
+from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import patience, positive
 from dodo_dsl.compiler import Checked, NoApplication, plan
-from dodo_dsl.diagnostics import Diagnostic, forget_lines, format_text, has_errors, ordered
+from dodo_dsl.diagnostics import Diagnostic, forget_lines, has_errors, ordered
 from dodo_dsl.emit.output_folder import differences, stale_folders, write
 from dodo_dsl.plan.model import Suite
 
@@ -85,7 +86,7 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
     if style != "text":
         stdout.write(rendered(style, diagnostics, [str(spec.path) for spec in checked.specs]))
     elif diagnostics:
-        stdout.write(format_text(diagnostics[:_MOST_PROBLEMS]))
+        write_diagnostics(stdout, diagnostics[:_MOST_PROBLEMS])
         if len(diagnostics) > _MOST_PROBLEMS:
             stdout.write(f"... {len(diagnostics) - _MOST_PROBLEMS} more problems\n")
         rules = {diagnostic.rule for diagnostic in diagnostics}

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.display import colours
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.judge.known_run import KnownRun, known_run
-from dodo_dsl.cli.judge.output import as_json, as_text
+from dodo_dsl.cli.judge.output import as_json, as_pieces
 from dodo_dsl.cli.run.jobs import compile_tests, load_compiled
 from dodo_dsl.outcome import Result
 from dodo_dsl.plan.model import Plan
@@ -53,7 +54,10 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         (work / "files").mkdir()
         cid = run.cid if run and run.slug == plan.slug else plan.cid
         judgement = judge(plan, folder, recording, cid, work / "files")
-    stdout.write((as_json if options.json else as_text)(plan, recording, judgement, run))
+    if options.json:
+        stdout.write(as_json(plan, recording, judgement, run))
+    else:
+        colours.write(stdout, as_pieces(plan, recording, judgement, run))
     return _EXITS[judgement.finding.result]
 
 

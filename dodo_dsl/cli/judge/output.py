@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from typing import Any
 
+from dodo_dsl.cli.display import colours
 from dodo_dsl.cli.judge.known_run import KnownRun
+from dodo_dsl.diagnostics import Piece
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import VerdictEvent
 from dodo_dsl.run.recorded.judge import Judgement
@@ -15,18 +17,24 @@ VERSION = 1
 
 def as_text(plan: Plan, recording: TestRecording, judgement: Judgement, run: KnownRun | None) -> str:
     """The verdict as ``dodo run`` prints it, with all checks, and how it differs from the run's."""
+    return "".join(text for text, _ in as_pieces(plan, recording, judgement, run))
+
+
+def as_pieces(plan: Plan, recording: TestRecording, judgement: Judgement, run: KnownRun | None) -> Iterator[Piece]:
+    """The same text in parts, for colours."""
     finding = judgement.finding
     clock = "lockstep" if recording.clock == "lockstep" else "real time"
+    yield f"{recording.path}: {recording.duration_s:.1f} s in {clock}\n", ""
+    yield f"{finding.result.upper():<7}", colours.OF_OUTCOMES[finding.result]
     lines = [
-        f"{recording.path}: {recording.duration_s:.1f} s in {clock}",
-        f"{finding.result.upper():<7} {plan.name}  {printable(finding.reason)}",
+        f" {plan.name}  {printable(finding.reason)}",
         *(f"        note: {printable(note)}" for note in _notes(plan, judgement, run)),
         *(f"        | {printable(line)}" for line in judgement.last_lines),
     ]
     for verdict in judgement.verdicts:
         lines += ["", f"{printable(verdict.service)} {'passed' if verdict.passed else 'failed'}", *_checks(verdict)]
         lines += [f"  {key:<16} {_text(value)}" for key, value in verdict.evidence.items()]
-    return "\n".join(lines) + "\n"
+    yield "\n".join(lines) + "\n", ""
 
 
 def as_json(plan: Plan, recording: TestRecording, judgement: Judgement, run: KnownRun | None) -> str:

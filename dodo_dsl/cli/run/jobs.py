@@ -8,9 +8,10 @@ from typing import TextIO
 
 from dodo_dsl import atomic
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.compiler import NoApplication, plan
-from dodo_dsl.diagnostics import format_text, has_errors, ordered
+from dodo_dsl.diagnostics import has_errors, ordered
 from dodo_dsl.emit.output_folder import PLAN_FILE, write
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.model import Plan
@@ -52,7 +53,7 @@ def load_compiled(folder: Path, settings: Settings) -> Plan:
 def _deployment(stdout: TextIO) -> Deployment:
     """The deployment that the command is called in, for its CIDs and subnets."""
     deployment, problems = load_deployment(find_deployment(Path.cwd()))
-    stdout.write(format_text(problems))
+    write_diagnostics(stdout, problems)
     if has_errors(problems):
         raise UsageError("dodo.yml has errors, so its CIDs and subnets are unknown")
     return deployment
@@ -103,14 +104,14 @@ def compile_tests(
     if settings.clock:
         stdout.write(_kept_clock([s.title for s in checked.specs if s.clock != settings.clock]))
     if not checked.ok:
-        stdout.write(format_text(checked.diagnostics))
+        write_diagnostics(stdout, checked.diagnostics)
         raise UsageError("the tests above cannot be compiled")
     try:
         made = plan(checked, folder)
     except NoApplication:
         raise UsageError(NO_APPLICATION) from None
     problems = ordered([*checked.diagnostics, *made.problems])
-    stdout.write(format_text(problems))
+    write_diagnostics(stdout, problems)
     if has_errors(problems):
         raise UsageError("the tests above cannot be compiled")
     write(made.compiled, made.pipeline, folder)

@@ -9,11 +9,12 @@ from rich.console import Console
 from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextColumn
 from rich.text import Text
 
-from dodo_dsl.cli.run.progress import STYLES, about, count
+from dodo_dsl.cli.run.progress import about, count
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.standing import Standing
 from dodo_dsl.terminal import printable, unescaped
 
+_STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
 _FIELDS = {"state": "", "pace": None, "nearest": ""}
 
 
@@ -87,7 +88,7 @@ class LiveProgress:
 
     def done(self, outcome: Outcome) -> None:
         name = f"{printable(outcome.slug):<{self._width}}  "
-        self._progress.console.print(Text.assemble(name, (outcome.outcome, STYLES[outcome.outcome])))
+        self._progress.console.print(Text.assemble(name, (outcome.outcome, _STYLES[outcome.outcome])))
         if (task := self._tasks.pop(outcome.slug, None)) is not None:
             self._progress.remove_task(task)
 

@@ -4,20 +4,21 @@ import time
 from collections.abc import Sequence
 from typing import Self, TextIO
 
+from dodo_dsl.cli.display import colours
+from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.runner import Progress
 from dodo_dsl.run.standing import Standing
 from dodo_dsl.terminal import printable
 
-STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
 
-
-def summary_line(outcome: Outcome, width: int) -> str:
-    """One line about a finished test."""
+def summary_line(outcome: Outcome, width: int) -> list[Piece]:
+    """One line about a finished test, in parts."""
     times = ""
     if outcome.setup_s is not None and outcome.execution_s is not None:
         times = f" (set-up {outcome.setup_s:.1f} s, ran {outcome.execution_s:.1f} s)"
-    return f"{outcome.outcome.upper():<6}  {printable(outcome.name):<{width}}  {printable(outcome.reason)}{times}"
+    verdict = (f"{outcome.outcome.upper():<6}", colours.OF_OUTCOMES[outcome.outcome])
+    return [verdict, (f"  {printable(outcome.name):<{width}}  {printable(outcome.reason)}{times}\n", "")]
 
 
 class PlainProgress:
@@ -39,13 +40,19 @@ class PlainProgress:
         self.stream.flush()
 
     def phase(self, slug: str, text: str) -> None:
-        self.note(f"[{time.monotonic() - self.start:6.1f} s] {slug:<{self.width}}  {text}")
+        self.note(self._head(slug) + text)
 
     def standing(self, slug: str, standing: Standing) -> None:
         """How far a test is takes no line of its own."""
 
     def done(self, outcome: Outcome) -> None:
-        self.phase(outcome.slug, outcome.outcome)
+        verdict = (outcome.outcome, colours.OF_OUTCOMES[outcome.outcome])
+        colours.write(self.stream, [(self._head(outcome.slug), ""), verdict, ("\n", "")])
+        self.stream.flush()
+
+    def _head(self, slug: str) -> str:
+        """The begin of a line about a test."""
+        return f"[{time.monotonic() - self.start:6.1f} s] {printable(slug):<{self.width}}  "
 
     def rest(self, seconds: float, tests: int) -> None:
         self.note(f"[{time.monotonic() - self.start:6.1f} s] {count(tests)} to go, {about(seconds)}")
@@ -61,7 +68,7 @@ def about(seconds: float) -> str:
 
 
 def choose(stream: TextIO, slugs: Sequence[str]) -> Progress:
-    if not stream.isatty():
+    if not colours.commands_terminal(stream):
         return PlainProgress(stream, slugs)
     from dodo_dsl.cli.run.live import LiveProgress
 

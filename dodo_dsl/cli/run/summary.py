@@ -1,13 +1,13 @@
 """The summary at the end of a run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TextIO
 
+from dodo_dsl.cli.display import colours
 from dodo_dsl.cli.run.progress import count, summary_line
+from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.terminal import printable
-
-_KINDS = ("passed", "failed", "error")
 
 
 def write(stream: TextIO, outcomes: Sequence[Outcome], tests: Mapping[str, str], skipped: Sequence[str]) -> None:
@@ -15,19 +15,27 @@ def write(stream: TextIO, outcomes: Sequence[Outcome], tests: Mapping[str, str],
     stream.write("\n")
     width = max((len(outcome.name) for outcome in outcomes), default=0)
     for outcome in outcomes:
-        stream.write(summary_line(outcome, width) + "\n")
+        colours.write(stream, summary_line(outcome, width))
         stream.writelines(f"        note: {printable(note)}\n" for note in outcome.notes)
         if outcome.outcome != "passed":
             stream.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
     stream.write("\n")
     if len(set(tests.values())) < len(tests):
         stream.writelines(f"{line}\n" for line in _rates(outcomes, tests))
-    counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in _KINDS}
-    stream.write(f"{counts['passed']} passed, {counts['failed']} failed, {counts['error']} in error\n")
+    colours.write(stream, _counts(outcomes))
     if skipped:
         stream.write(
             f"{count(len(skipped))} not started: {printable(', '.join(skipped[:5]))}{' ...' * (len(skipped) > 5)}\n"
         )
+
+
+def _counts(outcomes: Sequence[Outcome]) -> Iterator[Piece]:
+    """How many tests passed, failed and ended in error; what there is, in colour."""
+    for between, kind, word in (("", "passed", "passed"), (", ", "failed", "failed"), (", ", "error", "in error")):
+        number = sum(outcome.outcome == kind for outcome in outcomes)
+        yield between, ""
+        yield f"{number} {word}", colours.OF_OUTCOMES[kind] if number else ""
+    yield "\n", ""
 
 
 def _rates(outcomes: Sequence[Outcome], tests: Mapping[str, str]) -> list[str]:

@@ -4,11 +4,11 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TextIO
 
+from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.stats import reuse, thesis
 from dodo_dsl.compiler import load
-from dodo_dsl.diagnostics import format_text
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.terminal import json_text, printable
 
@@ -33,7 +33,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     checked = load([])
-    stderr.write(format_text([found for found in checked.diagnostics if found.severity == "error"]))
+    write_diagnostics(stderr, [found for found in checked.diagnostics if found.severity == "error"])
     tests = _services(checked.specs)
     if not tests:
         raise UsageError("the registry has no test that uses a service")

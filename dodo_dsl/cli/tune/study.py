@@ -13,10 +13,11 @@ from dodo_dsl import compiler
 from dodo_dsl.application.tunables import tunables
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.search.study import digests
 from dodo_dsl.compiler import Checked
-from dodo_dsl.diagnostics import format_text, has_errors, ordered
+from dodo_dsl.diagnostics import has_errors, ordered
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.run.runner import default_backend
 from dodo_dsl.search.space import Space, space_of, sweep, texts
@@ -57,7 +58,7 @@ def tune_study(options: argparse.Namespace, work: Path, stdout: TextIO) -> TuneS
     except compiler.NoApplication:
         raise UsageError(NO_APPLICATION) from None
     problems = ordered([*checked.diagnostics, *(made.problems if made else ())])
-    stdout.write(format_text(problems))
+    write_diagnostics(stdout, problems)
     if made is None or has_errors(problems):
         raise UsageError("the above cannot be compiled")
     space = Space(tunables(checked.application) if checked.application else ())
