@@ -8,14 +8,17 @@ from typing import TextIO
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.compile import fixes
 from dodo_dsl.cli.compile.formats import FORMATS, rendered
+from dodo_dsl.cli.display import verbosity
 from dodo_dsl.cli.display.colours import write_diagnostics
+from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import patience, positive
 from dodo_dsl.compiler import Checked, NoApplication, plan
-from dodo_dsl.diagnostics import Diagnostic, forget_lines, has_errors, ordered
+from dodo_dsl.diagnostics import Diagnostic, forget_lines, has_errors, ordered, shown_path
 from dodo_dsl.emit.output_folder import differences, stale_folders, write
 from dodo_dsl.plan.model import Suite
+from dodo_dsl.terminal import printable
 
 EXAMPLES = """examples:
   dodo compile                             all tests of the deployment, into generated/
@@ -45,6 +48,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
     parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
+    verbosity.add(parser, "print only problems, and what is stale", "print the name of each test, too")
     parser.add_argument("--fix", action="store_true",
                         help="with --check: correct names, units and spaces where there is one way to")  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="text", help="format of the diagnostics (default: text)")
@@ -64,7 +68,8 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     checked = selection.select(options.path, (), options.application)
     if options.fix:
         checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
-    (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
+    if options.verbosity is not Verbosity.QUIET:
+        (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
     if options.check:
         return _check(checked, options, stdout, stderr)
     return _write(checked, options, stdout, stderr)
@@ -108,10 +113,19 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         stdout.write(_difference(stale, options.output, options.diff))
         warnings = [_count(len(diagnostics), "warning")] if diagnostics else []
         state = ", ".join([*warnings, *([outdated] if stale else [])])
-        stdout.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
+        _list(options, stdout, "checked", [(spec.title, shown_path(str(spec.path))) for spec in checked.specs])
+        if options.verbosity is not Verbosity.QUIET or stale:
+            stdout.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
     elif stale:
         stderr.write(f"{outdated}\n")
     return Exit.PROBLEMS if stale else Exit.OK
+
+
+def _list(options: argparse.Namespace, stdout: TextIO, done: str, tests: Sequence[tuple[str, str]]) -> None:
+    """What was done with each test, by name and path, if that is wanted."""
+    if options.verbosity is Verbosity.VERBOSE:
+        width = max((len(name) for name, _ in tests), default=0)
+        stdout.writelines(f"{done} {printable(f'{name:<{width}}  {path}')}\n" for name, path in tests)
 
 
 def _difference(stale: Mapping[str, str], out: Path, in_full: bool) -> str:
@@ -142,8 +156,10 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     expected = _forecast(made.compiled.suite, options)
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output)
-    if options.format == "text":
-        stdout.write(f"{_count(len(made.compiled.suite.plans))} compiled into {options.output}\n")
+    if options.format == "text" and options.verbosity is not Verbosity.QUIET:
+        plans = made.compiled.suite.plans
+        _list(options, stdout, "compiled", [(plan.name, str(options.output / plan.slug)) for plan in plans])
+        stdout.write(f"{_count(len(plans))} compiled into {options.output}\n")
         if gone:
             stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
     (stdout if options.format == "text" else stderr).write(expected)

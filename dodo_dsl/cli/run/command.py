@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TextIO, cast
 
 from dodo_dsl.cli import selection
+from dodo_dsl.cli.display import verbosity
+from dodo_dsl.cli.display.verbosity import Verbosity, chatter
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit, of_outcomes
 from dodo_dsl.cli.numbers import positive, seconds, seed
@@ -23,6 +25,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.report_folder import Drawable, forget, write_report
+from dodo_dsl.report.viewer.names import LOGS
 from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.history import History
 from dodo_dsl.run.mixed.choice import choose
@@ -41,6 +44,7 @@ EXAMPLES = """examples:
   dodo run --application ../app/docker-compose.yml --level sil
   dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
   dodo run sil-closed-straight --watch         again whenever spec, map or application are saved
+  dodo run -q                                  only what did not pass, and the counts
   dodo run --compiled generated/sil-closed-straight --report dodo-report
 
 exit codes: 0 all passed, 1 some failed, 2 wrong usage or spec, 3 some ended in error, 130 interrupted
@@ -76,6 +80,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
     parser.add_argument("--watch", action="store_true",
                         help="run again, in lockstep, what a saved file affects, and show the change")  # fmt: skip
+    verbosity.add(
+        parser,
+        "print only what did not pass, and a last line with the counts",
+        "print each test's phases, checks, and the errors and warnings in the logs of its services",
+    )
     parser.add_argument("--profile", action="store_true", help="show where the time went, and write DIR/profile.json")
     selection.add_application(parser)
 
@@ -93,11 +102,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         return watch.main(options, stdout)
     with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
         profile.enter(COMMAND, "compile")
-        jobs, deployment = prepare(options, folder.path, stdout)
-        _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-        runner = runner_of(options, jobs, deployment, stdout, load, profile)
+        with chatter(stdout, options.verbosity) as quietly:
+            jobs, deployment = prepare(options, folder.path, quietly)
+            _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
+            runner = runner_of(options, jobs, deployment, quietly, load, profile)
         with reserved(options.report, stdout):
-            outcomes, is_reported = run(runner, jobs, options.report, stdout, profile)
+            outcomes, is_reported = run(runner, jobs, options.report, stdout, profile, said=options.verbosity)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
@@ -136,7 +146,7 @@ def runner_of(
     order = schedule(options.jobs, expectation(backend), usage(backend))
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{forecast(order, jobs, backend)}\n")
-    shown = ProfiledProgress(progress.choose(stdout, [p.slug for p in plans]), profile)
+    shown = ProfiledProgress(progress.choose(stdout, [p.slug for p in plans], options.verbosity), profile)
     backends = _backends(options, backend, plans, deployment, load)
     return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
 
@@ -175,6 +185,7 @@ def run(
     stdout: TextIO,
     profile: Profile,
     others: Sequence[Outcome] = (),
+    said: Verbosity = Verbosity.NORMAL,
 ) -> tuple[list[Outcome], bool]:
     """The outcomes, and whether the report holds all of them; they are printed in any case.
 
@@ -185,7 +196,8 @@ def run(
     with runner.progress:
         outcomes = asyncio.run(runner.run(jobs))
     tests = {job.plan.slug: job.test for job in jobs}
-    summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped])
+    logs = {job.plan.slug: job.report / LOGS for job in jobs}
+    summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped], said, logs)
     stdout.flush()
     profile.enter(COMMAND, "report")
     with undisturbed():
@@ -203,7 +215,10 @@ def run(
         history.save()
     stdout.writelines(f"{printable(problem)}\n" for problem in problems)
     instead = f"; it replaces an earlier one with {progress.count(gone, 'other test')}" if gone else ""
-    stdout.write(f"{unwritten}\n" if unwritten else f"report: {report / 'index.html'}{instead}\n")
+    if unwritten:
+        stdout.write(f"{unwritten}\n")
+    elif said is not Verbosity.QUIET:
+        stdout.write(f"report: {report / 'index.html'}{instead}\n")
     return outcomes, not unwritten
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Self, TextIO
 
 from dodo_dsl.cli.display import colours
+from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.runner import Progress
@@ -58,6 +59,31 @@ class PlainProgress:
         self.note(f"[{time.monotonic() - self.start:6.1f} s] {count(tests)} to go, {about(seconds)}")
 
 
+class NoProgress:
+    """Shows nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def note(self, text: str) -> None:
+        pass
+
+    def phase(self, slug: str, text: str) -> None:
+        pass
+
+    def standing(self, slug: str, standing: Standing) -> None:
+        pass
+
+    def done(self, outcome: Outcome) -> None:
+        pass
+
+    def rest(self, seconds: float, tests: int) -> None:
+        pass
+
+
 def count(number: int, what: str = "test") -> str:
     return f"{number} {what}{'s' * (number != 1)}"
 
@@ -67,8 +93,10 @@ def about(seconds: float) -> str:
     return f"about {seconds / 60:.0f} min" if seconds > 180 else f"about {seconds:.0f} s"
 
 
-def choose(stream: TextIO, slugs: Sequence[str]) -> Progress:
-    if not colours.commands_terminal(stream):
+def choose(stream: TextIO, slugs: Sequence[str], verbosity: Verbosity = Verbosity.NORMAL) -> Progress:
+    if verbosity is Verbosity.QUIET:
+        return NoProgress()
+    if verbosity is Verbosity.VERBOSE or not colours.commands_terminal(stream):
         return PlainProgress(stream, slugs)
     from dodo_dsl.cli.run.live import LiveProgress
 

@@ -1,25 +1,48 @@
 """The summary at the end of a run."""
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli.display import colours
+from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.cli.run.progress import count, summary_line
 from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.report.junit import check_line
 from dodo_dsl.terminal import printable
 
+_MOST_COMPLAINTS = 20
+"""Of one service of a test."""
 
-def write(stream: TextIO, outcomes: Sequence[Outcome], tests: Mapping[str, str], skipped: Sequence[str]) -> None:
-    """One line per test with its explanation, then the counts; ``tests`` has each slug's name without repetition."""
-    stream.write("\n")
-    width = max((len(outcome.name) for outcome in outcomes), default=0)
-    for outcome in outcomes:
+
+def write(
+    stream: TextIO,
+    outcomes: Sequence[Outcome],
+    tests: Mapping[str, str],
+    skipped: Sequence[str],
+    verbosity: Verbosity = Verbosity.NORMAL,
+    logs: Mapping[str, Path] | None = None,
+) -> None:
+    """One line per test with its explanation, then the counts; ``tests`` has each slug's name without repetition.
+
+    ``logs`` are the folders with the logs of tests by their slugs, of which errors and warnings are shown if verbose.
+    """
+    is_quiet = verbosity is Verbosity.QUIET
+    shown = [outcome for outcome in outcomes if not is_quiet or outcome.outcome != "passed"]
+    blank = "" if is_quiet else "\n"
+    stream.write(blank)
+    width = max((len(outcome.name) for outcome in shown), default=0)
+    for outcome in shown:
         colours.write(stream, summary_line(outcome, width))
         stream.writelines(f"        note: {printable(note)}\n" for note in outcome.notes)
+        if verbosity is Verbosity.VERBOSE:
+            stream.writelines(f"        {printable(check_line(check))}\n" for check in outcome.checks)
+            colours.write(stream, _complaints((logs or {}).get(outcome.slug)))
         if outcome.outcome != "passed":
             stream.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
-    stream.write("\n")
+    stream.write(blank)
     if len(set(tests.values())) < len(tests):
         stream.writelines(f"{line}\n" for line in _rates(outcomes, tests))
     colours.write(stream, _counts(outcomes))
@@ -27,6 +50,21 @@ def write(stream: TextIO, outcomes: Sequence[Outcome], tests: Mapping[str, str],
         stream.write(
             f"{count(len(skipped))} not started: {printable(', '.join(skipped[:5]))}{' ...' * (len(skipped) > 5)}\n"
         )
+
+
+def _complaints(logs: Path | None) -> Iterator[Piece]:
+    """The errors and warnings of each service of a test, the last ones."""
+    if logs is None:
+        return
+    from dodo_dsl.report.viewer.log_lines import complaints
+
+    for service, lines in itertools.groupby(complaints(logs), lambda line: line.service):
+        found = list(lines)
+        if len(found) > _MOST_COMPLAINTS:
+            yield f"        {service}: {len(found) - _MOST_COMPLAINTS} earlier errors and warnings\n", ""
+        for line in found[-_MOST_COMPLAINTS:]:
+            yield f"        {service}: ", line.level
+            yield f"{printable(line.text)}\n", ""
 
 
 def _counts(outcomes: Sequence[Outcome]) -> Iterator[Piece]:

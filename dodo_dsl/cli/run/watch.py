@@ -108,7 +108,8 @@ class Watch:
             slugs = {job.plan.slug for job in jobs} - {job.plan.slug for job in chosen}
             others = [outcome for slug, outcome in self.outcomes.items() if slug in slugs]
             with reserved(self._options.report, self._stdout):
-                outcomes, _ = command.run(runner, chosen, self._options.report, self._stdout, profile, others)
+                report, said = self._options.report, self._options.verbosity
+                outcomes, _ = command.run(runner, chosen, report, self._stdout, profile, others, said)
         self._show_change(outcomes)
         self.outcomes = {outcome.slug: outcome for outcome in [*others, *outcomes]}
         return runner.interrupted

@@ -51,10 +51,23 @@ def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
     return {"services": [shown(name, 80) for name in names], "lines": rows, "left": left}
 
 
+def complaints(folder: Path) -> Iterator[LogLine]:
+    """The errors and warnings in the logs of a test, service by service and without times."""
+    for log in sorted(folder.glob("*.log")):
+        yield from (line for _, line in _without_times(log) if line.level)
+
+
 def _lines(log: Path, test: RecordedTest) -> Iterator[LogLine]:
-    layer, _, name = log.stem.partition(".")
     offsets, walls = log_times.read(log)
     times = _test_times(walls, test)
+    for offset, line in _without_times(log):
+        part = bisect_right(offsets, offset) - 1
+        yield line._replace(time=times[part] if part >= 0 else None)
+
+
+def _without_times(log: Path) -> Iterator[tuple[int, LogLine]]:
+    """The lines with their offsets."""
+    layer, _, name = log.stem.partition(".")
     level = ""
     for offset, raw in _raw_lines(log):
         line = _ESCAPES.sub("", raw[: 4 * _MOST_TEXT].decode("utf-8", "replace")).rstrip("\r\n ")
@@ -62,9 +75,8 @@ def _lines(log: Path, test: RecordedTest) -> Iterator[LogLine]:
         if not text:
             continue
         level = _level(line, level)
-        part = bisect_right(offsets, offset) - 1
         length = f" … ({len(raw)} bytes)" if len(text) > _MOST_TEXT else ""
-        yield LogLine(times[part] if part >= 0 else None, name or layer, level, shown(text[:_MOST_TEXT]) + length)
+        yield offset, LogLine(None, name or layer, level, shown(text[:_MOST_TEXT]) + length)
 
 
 def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:

@@ -19,6 +19,7 @@ from dodo_dsl.cli.run import command
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready
+from tests.cli.terminal import Terminal
 from tests.run.scripted import FAILED, PASSED, Events, ScriptedBackend, ScriptedBackends, plan
 
 STARTS: Mapping[str, Events] = {"environment": [(0.0, Ready("camera"))], "evaluation": [(0.0, Ready("track"))]}
@@ -195,3 +196,21 @@ def test_usage_errors_are_sentences(
 def test_a_real_rig_is_never_kept_up(dodo: Command) -> None:
     code, _, err = dodo.run("--keep", tested=replace(plan(), rig="kiwi", level="hil", isolation="host"))
     assert (code, "test runs on rig 'kiwi', which --keep would leave in motion" in err) == (2, True)
+
+
+def test_quiet_says_only_the_counts_of_a_run_that_passed(dodo: Command) -> None:
+    assert dodo.run("-q")[1] == "1 passed, 0 failed, 0 in error\n"
+    dodo.stages = ENDINGS["failed"]
+    assert [line.split()[0] for line in dodo.run("--quiet")[1].splitlines()] == ["FAILED", "0"]
+
+
+def test_quiet_and_verbose_do_not_go_together(dodo: Command, capsys: pytest.CaptureFixture[str]) -> None:
+    assert dodo.run("-q", "-v")[0] == 2
+    assert "not allowed with argument" in capsys.readouterr().err
+
+
+def test_verbose_shows_lines_on_a_terminal_too(dodo: Command) -> None:
+    stdout = Terminal()
+    folder = dodo.compiled(plan())
+    assert main(["run", "--compiled", str(folder), "--report", "report", "-v"], stdout, StringIO()) == 0
+    assert "s] test  running\n" in stdout.getvalue()

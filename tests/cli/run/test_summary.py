@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 from io import StringIO
+from pathlib import Path
 
+from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.cli.run import summary
 from tests.report.test_report_folder import OUTCOME
 
@@ -31,3 +33,25 @@ def test_repetitions_have_a_rate_and_skipped_tests_are_named() -> None:
     shown = text([PASSED, again], {"ok": "ok", "ok--run-2": "ok"}, tuple("abcdef"))
     assert "\nok: 1 of 2 passed (50.0%)\n" in shown
     assert shown.endswith("6 tests not started: a, b, c, d, e ...\n")
+
+
+def test_quiet_names_only_what_did_not_pass() -> None:
+    stream = StringIO()
+    summary.write(stream, [PASSED, OUTCOME], {"ok": "ok", "test": "test"}, [], Verbosity.QUIET)
+    assert stream.getvalue() == "FAILED  test  hit wall\n1 passed, 1 failed, 0 in error\n"
+
+
+def test_verbose_shows_checks_and_what_services_complained_of(tmp_path: Path) -> None:
+    (tmp_path / "application.steering.log").write_text("frame 0\nwarning: late\x07\nTraceback\n  File x\n")
+    (tmp_path / "evaluation.track.log").write_text('{"dodo": "ready"}\n' + "error: no map\n" * 22)
+    passed = replace(PASSED, checks=({"name": "gap", "value": 0.5, "limit": {"min": 0.1}, "unit": "m", "ok": True},))
+    stream = StringIO()
+    summary.write(stream, [passed], {"ok": "ok"}, [], Verbosity.VERBOSE, {"ok": tmp_path})
+    assert stream.getvalue().splitlines()[2:8] == [
+        "        ok   gap: 0.5 m (min 0.1)",
+        "        steering: warning: late�",
+        "        steering: Traceback",
+        "        steering:   File x",
+        "        track: 2 earlier errors and warnings",
+        "        track: error: no map",
+    ]
