@@ -13,6 +13,7 @@ from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
+  dodo list 'sil-*' 'sil-perception[light=1]'    some of them
   dodo list --services      the services that a test may use
   dodo list --services integrator    one service: parameters, messages
   dodo list --json          the same as JSON
@@ -22,6 +23,7 @@ _MOST_FILES = 3
 
 
 def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
     parser.add_argument(
         "--services", nargs="?", const="", metavar="NAME", help="list services instead of tests, or describe one"
     )
@@ -29,7 +31,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    everything = load([])
+    if options.test and options.services is not None:
+        raise UsageError("--services lists services: name tests without it")
+    everything = selection.select(options.test, (), ()) if options.test else load([])
     if options.services:
         return _explain(everything, options.services, stdout)
     of_services = options.services is not None
@@ -39,7 +43,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     else:
         columns = ("name", "layers", "description") if of_services else ("name", "level", "kind", "description")
         _table(rows, columns, stdout)
-    checked = without_unsatisfied(everything)
+    checked = everything if options.test else without_unsatisfied(everything)
     stderr.write(selection.left_out(checked))
     if checked.ok:
         return Exit.OK

@@ -11,6 +11,7 @@ from dodo_dsl import package_data
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, format_text, has_errors
+from dodo_dsl.spec import parameters
 from dodo_dsl.spec.deployment.deployment import FILE_NAME, SHIPPED, Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX, locate
@@ -50,6 +51,8 @@ def existing_files(paths: Sequence[Path]) -> Sequence[Path]:
 
 
 def _is_path(word: str) -> bool:
+    if parameters.PATTERN.fullmatch(word) and not Path(word).exists():
+        return False  # the slash may be in a value
     return "/" in word or word.endswith(SUFFIX) or Path(word).is_dir()
 
 
@@ -75,7 +78,7 @@ def select(
         others = [spec for spec in checked.specs if spec.path not in given]
         chosen = {spec.slug for word in names for spec in _named(word, others, checked.deployment)}
         checked = _narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
-        given |= {spec.path for spec in others if any(_is_name(word, spec) for word in names)}
+        given |= {spec.path for spec in others if any(_is_meant(word, spec) for word in names)}
     if levels:
         kept = tuple(s for s in checked.specs if s.level in levels)
         if not kept:
@@ -96,9 +99,24 @@ def _is_name(word: str, spec: Spec) -> bool:
     return word in (spec.location.stem, spec.title, spec.slug)
 
 
+def _is_meant(word: str, spec: Spec) -> bool:
+    """Whether a word is the name of a test, with parameters or without."""
+    asked = parameters.parse(word)
+    return _is_name(word, spec) or (asked is not None and _is_name(asked.test, spec))
+
+
 def _named(word: str, specs: Sequence[Spec], deployment: Deployment) -> list[Spec]:
-    found = [s for s in specs if _is_name(word, s)]
-    found = found or [s for s in specs if _matches(s, word)]
+    if found := [s for s in specs if _is_name(word, s)]:
+        return found
+    asked = parameters.parse(word)
+    if asked and (tests := [s for s in specs if _matches(s, asked.test)]):
+        try:
+            return parameters.instances(asked, tests)
+        except parameters.NoSuchInstance as problem:
+            if found := [s for s in specs if _matches_title(s, word)]:
+                return found
+            raise NoSuchTest(str(problem)) from None
+    found = [s for s in specs if _matches(s, word) or _matches_title(s, word)]
     if not found:
         hint = _shipped_hint(word, deployment) or did_you_mean(
             word, list(dict.fromkeys(s.location.stem for s in specs))
@@ -123,9 +141,13 @@ def _shipped_hint(word: str, deployment: Deployment) -> str:
 
 
 def _matches(spec: Spec, pattern: str) -> bool:
-    """Whether a pattern fits a name; in an instance's, such as ``name[light=dark]``, the brackets mean themselves."""
-    plain = any(fnmatch.fnmatchcase(name, pattern) for name in (spec.location.stem, spec.slug))
-    return plain or fnmatch.fnmatchcase(spec.title, pattern.replace("[", "[[]"))
+    """Whether a pattern fits the name of a test."""
+    return any(fnmatch.fnmatchcase(name, pattern) for name in (spec.location.stem, spec.slug))
+
+
+def _matches_title(spec: Spec, pattern: str) -> bool:
+    """Whether a pattern fits that of an instance, such as ``name[light=dark]``, whose brackets mean themselves."""
+    return fnmatch.fnmatchcase(spec.title, pattern.replace("[", "[[]"))
 
 
 def _narrowed(checked: Checked, specs: Sequence[Spec]) -> Checked:

@@ -42,3 +42,14 @@ def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
     assert code == 0
     assert "  map-path: path, required unless another service of the test provides it\n" in out
     assert "  message: message, required\n" in dodo("list", "--services", "continuous-signal")[1]
+
+
+def test_only_the_tests_that_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:"]\n')
+    code, out, err = dodo("list", "sil-perception[clutter=0,light=1]", "sil-closed-*")
+    names = [line.split()[0] for line in out.splitlines()]
+    assert (code, err, names[-1]) == (0, "", "sil-perception[light=1,clutter=0]")
+    assert all(name.startswith("sil-closed-") for name in names[:-1])
+    assert dodo("list", "sil-perception[light=7]")[0] == 2
+    assert dodo("list", "x", "--services")[0] == 2

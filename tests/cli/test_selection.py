@@ -49,3 +49,49 @@ def test_warnings_about_shipped_tests_are_not_for_who_did_not_write_them(reposit
     deployment(repository, '"dodo:"')
     assert {d.rule for d in load([]).diagnostics if d.severity == "warning"} == {"clock-answers"}
     assert not select(["sil-perception"], (), ()).diagnostics
+
+
+CLUTTER = "sil-perception[light={},clutter={}]".format
+
+
+@pytest.mark.parametrize(
+    ("word", "titles"),
+    [
+        ("sil-perception[light=1]", [CLUTTER(1, 0), CLUTTER(1, 60)]),
+        ("sil-perception[clutter=0, light=1]", [CLUTTER(1, 0)]),
+        ("sil-perception[light=1,light=1.8,clutter=0]", [CLUTTER(1, 0), CLUTTER(1.8, 0)]),
+        ("sil-perc*[light=1*,clutter=0]", [CLUTTER(1, 0), CLUTTER(1.8, 0)]),
+        ("sil-perception[light=1,*]", [CLUTTER(1, 0), CLUTTER(1, 60)]),
+        ("sil-perception--light-1--clutter-0", [CLUTTER(1, 0)]),
+    ],
+)
+def test_parameters_select_the_instances_that_have_them(repository: Path, word: str, titles: list[str]) -> None:
+    deployment(repository, '"dodo:"')
+    assert [spec.title for spec in select([word], (), ()).specs] == titles
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("sil-perception[lihgt=1]", "'sil-perception' has no parameter 'lihgt'; did you mean 'light'?"),
+        ("sil-perception[light=2]", "no instance of 'sil-perception' has light=2; known: 0.45, 1, 1.8"),
+        ("sil-perception[light=0.4]", "no instance of 'sil-perception' has light=0.4; did you mean '0.45'?"),
+        ("sil-closed-straight[a=1]", "'sil-closed-straight' has no parameters, as it has no matrix"),
+        ("sil-percept[light=1]", "there is no test 'sil-percept[light=1]'; did you mean 'sil-perception'?"),
+        ("sil-closed-left-curve[{}=1]", "'{}' of 'sil-closed-left-curve' is a range of 'vary' and no parameter"),
+    ],
+)
+def test_wrong_parameters_are_told_with_a_suggestion(repository: Path, word: str, said: str) -> None:
+    deployment(repository, '"dodo:"')
+    (curve,) = select(["sil-closed-left-curve"], (), ()).specs
+    word, said = (text.replace("{}", curve.ranges[0].name) for text in (word, said))
+    with pytest.raises(NoSuchTest) as problem:
+        select([word], (), ())
+    assert str(problem.value).startswith(said)
+
+
+def test_a_value_may_be_a_path(repository: Path) -> None:
+    (repository / "tests/look").mkdir()
+    (repository / "tests/look/look.dodo.yml").write_text("dodo: 1\nname: look\nmatrix: {map: [maps/a, maps/b]}\n")
+    (repository / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\n")
+    assert [spec.title for spec in select(["look[map=maps/b]"], (), ()).specs] == ["look[map=maps/b]"]

@@ -17,7 +17,8 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(registry() / "maps/straight", "tests/maps/straight")
     Path("tests/drive").mkdir()
     Path("tests/drive/drive.dodo.yml").write_text(SPEC)
-    service = "image: x, command: --cid=111, x-dodo: {in: [], out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}"
+    sent = "opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest"
+    service = f"image: x, command: --cid=111, x-dodo: {{in: [], out: [{sent}]}}"
     Path("compose.yml").write_text(f"services: {{app: {{{service}}}}}\n")
     Path("dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: compose.yml\n")
 
