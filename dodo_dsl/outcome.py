@@ -6,6 +6,8 @@ from typing import Any, Literal
 from dodo_dsl.spec.goals import Goal
 
 Result = Literal["passed", "failed", "error"]
+NEXT_REPORT = ".next-"
+"""How the name of a folder inside a report's begins in which the next report is written."""
 
 
 @dataclass(frozen=True)
@@ -114,3 +116,14 @@ class Outcome:
     machine: MachineLoad | None = None
     response: Response | None = None
     goals: tuple[Goal, ...] = ()
+
+
+@dataclass(frozen=True)
+class NotRun:
+    """A test of a run that never began, and why in words; it has no outcome."""
+
+    name: str
+    slug: str
+    spec: str
+    level: str
+    reason: str

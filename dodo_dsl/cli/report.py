@@ -48,11 +48,13 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     with _child_reports(options.gitlab, stdout) as fetched:
         folders = [*options.folder, *fetched] or [REPORT]
         output = options.output or (REPORT if options.gitlab else None)
-        target, outcomes = _drawn([read(path) for path in folders], output, stdout)
+        reports = [read(path) for path in folders]
+        target, outcomes = _drawn(reports, output, stdout)
     from dodo_dsl.report.joined import other_ways
 
     comparison = compare(outcomes, other) if other else None
-    write_summaries(target, outcomes, comparison)
+    circumstances = results.joined([results.Results(one.outcomes, one.circumstances) for one in reports])
+    write_summaries(target, outcomes, comparison, circumstances)
     other_ways.write(target, comparison, other)
     if comparison:
         stdout.writelines(f"{line}\n" for line in text.lines(comparison))

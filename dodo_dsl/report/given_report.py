@@ -19,6 +19,7 @@ class GivenReport:
 
     file: Path
     outcomes: Sequence[Outcome]
+    circumstances: results.Circumstances = results.NO_CIRCUMSTANCES
 
     @property
     def is_whole(self) -> bool:
@@ -34,9 +35,9 @@ def read(path: Path) -> GivenReport:
     """The report in a folder, or of a file; raises ResultsError, also where a slug could leave its folder."""
     is_file = not path.is_dir() and (path.is_file() or path.suffix == ".json")
     file = path if is_file else path / results.FILE_NAME
-    outcomes = results.load(file)
-    for outcome in outcomes:
+    found = results.read(file)
+    for outcome in found.outcomes:
         if len(outcome.slug) > MOST_SLUG or not SLUG.fullmatch(outcome.slug):
             shown = outcome.slug[:_SHOWN]
             raise results.ResultsError(f"{file}: '{shown}' is no slug, expected lower-case letters, digits and hyphens")
-    return GivenReport(file, outcomes)
+    return GivenReport(file, found.outcomes, found.circumstances)

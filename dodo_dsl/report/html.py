@@ -19,6 +19,7 @@ from dodo_dsl.report import check_history, matrix_grid
 from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.comparison import KINDS, Comparison
 from dodo_dsl.report.machine_line import machine_line
+from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
 
 
 class ReportPicture(NamedTuple):
@@ -60,7 +61,12 @@ _URGENCIES = ("error", "failed", "passed")
 _DIRECTIONS = ("worse", "better", "different")
 
 
-def render(outcomes: Sequence[Outcome], files: ReportFiles, comparison: Comparison | None = None) -> str:
+def render(
+    outcomes: Sequence[Outcome],
+    files: ReportFiles,
+    comparison: Comparison | None = None,
+    circumstances: Circumstances = NO_CIRCUMSTANCES,
+) -> str:
     """The page; with a comparison, what changed since the report that it names."""
     folder = package_data.templates()
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
@@ -70,6 +76,7 @@ def render(outcomes: Sequence[Outcome], files: ReportFiles, comparison: Comparis
         files=files,
         meanings=MEANINGS,
         counts=counts,
+        not_run=circumstances.not_run,
         version=__version__,
         machine_line=machine_line,
         curve=check_history.curve,

@@ -5,19 +5,30 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import NotRun, Outcome
 
 # what XML 1.0 cannot hold (section 2.2), whatever a service printed
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def write(path: Path, outcomes: Sequence[Outcome], attachments: Mapping[str, str], links: Mapping[str, str]) -> None:
-    """Writes the file; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder."""
+def write(
+    path: Path,
+    outcomes: Sequence[Outcome],
+    attachments: Mapping[str, str],
+    links: Mapping[str, str],
+    not_run: Sequence[NotRun] = (),
+) -> None:
+    """Writes the file; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
+
+    Tests that were ``not_run`` are skipped ones.
+    """
     from junitparser import JUnitXml, TestSuite
 
     suite = TestSuite("dodo")
     for outcome in outcomes:
         suite.add_testcase(_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)))
+    for test in not_run:
+        suite.add_testcase(_skipped(test))
     document = JUnitXml("dodo")
     document.add_testsuite(suite)
     document.update_statistics()  # type: ignore[no-untyped-call]
@@ -41,6 +52,15 @@ def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
         lines.append(f"[[ATTACHMENT|{attachment}]]")
     if lines:
         case.system_out = xml_text("\n".join(lines))
+    return case
+
+
+def _skipped(test: NotRun) -> Any:
+    from junitparser import Skipped, TestCase
+
+    case = TestCase(xml_text(test.name), classname=test.level)
+    case._elem.set("file", xml_text(test.spec))
+    case.result = [Skipped(xml_text(f"not run: {test.reason}"))]
     return case
 
 

@@ -73,15 +73,18 @@ def write_report(
     tests: Mapping[str, Drawable],
     times: Mapping[str, Sequence[Times]] | None = None,
     past: check_history.Past | None = None,
+    circumstances: results.Circumstances = results.NO_CIRCUMSTANCES,
+    place: Path | None = None,
 ) -> list[str]:
     """Writes the results first, draws each drive, and returns sentences on what could not be drawn.
 
     ``times`` are those of all runs of these tests on this machine, ``past`` what their checks measured in the latest;
-    they are drawn as well.
+    they are drawn as well. ``place`` is where ``folder`` will be moved to, if it will.
     """
     outcomes = [results.writable(outcome) for outcome in outcomes]
+    circumstances = results.writable_circumstances(circumstances)
     folder.mkdir(parents=True, exist_ok=True)
-    atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
     problems = []
     for outcome in outcomes:
         if outcome.slug in tests:
@@ -98,10 +101,11 @@ def write_report(
             atomic.write_text(folder / TIMES, draw_times(times, platform.node() or "this machine"))
         except Exception as error:  # noqa: BLE001  (as above)
             problems.append(f"the times of these tests cannot be drawn: {error}")
-    write_summaries(folder, outcomes)  # first, as the pages take the most room
+    # first, as the pages take the most room
+    write_summaries(folder, outcomes, circumstances=circumstances, place=place)
     problems += _write_pages(folder, outcomes, tests)
     if tests:
-        _write_linked(folder, outcomes)
+        _write_linked(folder, outcomes, None, circumstances, place)
     return problems
 
 
@@ -126,35 +130,47 @@ def _write_pages(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, 
                 yield f"the page of {outcome.name} cannot be written: {error}"
 
 
-def write_summaries(folder: Path, outcomes: Sequence[Outcome], comparison: Comparison | None = None) -> None:
+def write_summaries(
+    folder: Path,
+    outcomes: Sequence[Outcome],
+    comparison: Comparison | None = None,
+    circumstances: results.Circumstances = results.NO_CIRCUMSTANCES,
+    place: Path | None = None,
+) -> None:
     """Writes the four files about the whole run, and with a comparison that with another report.
 
-    Without one, that of an earlier report is removed. Raises OSError.
+    Without one, that of an earlier report is removed. ``place`` is where ``folder`` will be moved to. Raises OSError.
     """
-    atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes))
+    atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
     atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
     markdown.write(folder, comparison)
-    _write_linked(folder, outcomes, comparison)
+    _write_linked(folder, outcomes, comparison, circumstances, place)
 
 
-def _write_linked(folder: Path, outcomes: Sequence[Outcome], comparison: Comparison | None = None) -> None:
+def _write_linked(
+    folder: Path,
+    outcomes: Sequence[Outcome],
+    comparison: Comparison | None,
+    circumstances: results.Circumstances,
+    place: Path | None,
+) -> None:
     """JUnit and the page of the run, with links to what there is."""
     pictures = {o.slug: _pictures(folder, o) for o in outcomes}
-    shown, pages = _shown(folder), _named(folder, outcomes, viewer.PAGE)
+    shown, pages = _shown(place or folder), _named(folder, outcomes, viewer.PAGE)
     with atomic.replacing(folder / "junit.xml") as part:
         attachments = {slug: f"{shown}/{found[0].path}" for slug, found in pictures.items() if found}
-        junit.write(part, outcomes, attachments, links.to_moments(outcomes, pages, shown))
+        junit.write(part, outcomes, attachments, links.to_moments(outcomes, pages, shown), circumstances.not_run)
     times = TIMES if (folder / TIMES).is_file() else ""
     files = html.ReportFiles(
         pictures,
         _logs(folder, outcomes),
         _named(folder, outcomes, RECORDING),
-        _specs(folder, outcomes),
+        _specs(place or folder, outcomes),
         pages,
         times,
         check_history.read(folder),
     )
-    atomic.write_text(folder / "index.html", html.render(outcomes, files, comparison))
+    atomic.write_text(folder / "index.html", html.render(outcomes, files, comparison, circumstances))
 
 
 def _pictures(folder: Path, outcome: Outcome) -> list[html.ReportPicture]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import MachineLoad, Outcome, Response, Wait
+from dodo_dsl.outcome import MachineLoad, NotRun, Outcome, Response, Wait
 from dodo_dsl.spec.goals import Goal, is_goal
 
 FILE_NAME = "results.json"
@@ -21,9 +21,29 @@ class ResultsError(ValueError):
     """A file without results of this version."""
 
 
-def to_json(outcomes: Sequence[Outcome]) -> str:
+@dataclasses.dataclass(frozen=True)
+class Circumstances:
+    """What results say besides the outcomes: the tests that never began."""
+
+    not_run: tuple[NotRun, ...] = ()
+
+
+NO_CIRCUMSTANCES = Circumstances()
+
+
+@dataclasses.dataclass(frozen=True)
+class Results:
+    """All that a ``results.json`` holds."""
+
+    outcomes: Sequence[Outcome]
+    circumstances: Circumstances
+
+
+def to_json(outcomes: Sequence[Outcome], circumstances: Circumstances = NO_CIRCUMSTANCES) -> str:
     tests = [_rounded(dataclasses.asdict(outcome)) for outcome in outcomes]
-    return json.dumps({"dodo": "results", "version": VERSION, "tests": tests}, indent=2, ensure_ascii=False) + "\n"
+    head = {"dodo": "results", "version": VERSION}
+    besides = {key: value for key, value in dataclasses.asdict(circumstances).items() if value}
+    return json.dumps({**head, **besides, "tests": tests}, indent=2, ensure_ascii=False) + "\n"
 
 
 def writable(outcome: Outcome) -> Outcome:
@@ -37,6 +57,21 @@ def writable(outcome: Outcome) -> Outcome:
         last_lines=tuple(map(_written, outcome.last_lines)),
         notes=tuple(map(_written, outcome.notes)),
     )
+
+
+def writable_circumstances(circumstances: Circumstances) -> Circumstances:
+    """The same without characters that UTF-8 cannot encode."""
+    not_run = (
+        dataclasses.replace(test, name=_written(test.name), spec=_written(test.spec)) for test in circumstances.not_run
+    )
+    return dataclasses.replace(circumstances, not_run=tuple(not_run))
+
+
+def joined(each: Sequence[Results]) -> Circumstances:
+    """Those of several results together; a test that ran in one of them was not left out."""
+    ran = {outcome.slug for one in each for outcome in one.outcomes}
+    left = {test.slug: test for one in each for test in one.circumstances.not_run if test.slug not in ran}
+    return Circumstances(tuple(left.values()))
 
 
 def _written(text: str) -> str:
@@ -56,12 +91,17 @@ def _rounded_value(name: str, value: Any) -> Any:
 
 def load(path: Path) -> list[Outcome]:
     """The outcomes of a ``results.json`` that its schema accepts; raises ResultsError."""
+    return list(read(path).outcomes)
+
+
+def read(path: Path) -> Results:
+    """A ``results.json`` that its schema accepts; raises ResultsError."""
     try:
         document = json.loads(regular_file.text(path), parse_int=_whole)
         if document["dodo"] != "results" or document["version"] != VERSION:
             raise ResultsError(f"{path}: not results of version {VERSION}")
         _validate(document)
-        return [_outcome(t) for t in document["tests"]]
+        return Results([_outcome(t) for t in document["tests"]], _circumstances(document))
     except FileNotFoundError as error:
         raise ResultsError(f"there is no {path}") from error
     except OSError as error:
@@ -94,6 +134,10 @@ def _outcome(test: dict[str, Any]) -> Outcome:
     if not all(map(is_goal, goals)):
         raise ValueError("a goal whose numbers make no score")
     return Outcome(**{**values, "machine": _load(test.get("machine")), "response": response, "goals": goals})
+
+
+def _circumstances(document: dict[str, Any]) -> Circumstances:
+    return Circumstances(tuple(NotRun(**test) for test in document.get("not_run", ())))
 
 
 def _load(machine: dict[str, Any] | None) -> MachineLoad | None:

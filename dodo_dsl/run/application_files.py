@@ -8,6 +8,7 @@ from dodo_dsl.application.access.host_paths import HostPaths, repository
 from dodo_dsl.application.access.model import AccessFinding
 from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.interpolation import dotenv_file, interpolate
+from dodo_dsl.outcome import NEXT_REPORT
 from dodo_dsl.plan.model import Application
 
 
@@ -44,5 +45,9 @@ def hidden_folders(application: Application, folder: Path, report: Path) -> list
 
 
 def _holder(path: Path, own: Path) -> Path | None:
-    """What to hide of an output: the folder that holds it, if that is still below the application's."""
+    """What to hide of an output: the folder that holds it, if that is still below the application's.
+
+    Of a report that is not in its place yet, that is the place of all.
+    """
+    path = path.parent if path.parent.name.startswith(NEXT_REPORT) else path
     return next((p for p in (path.parent, path) if p != own and p.is_relative_to(own)), None)

@@ -1,12 +1,13 @@
 """Runs several tests at once, each on a backend of its own, and leaves a clean machine whatever happens."""
 
 import asyncio
+import contextlib
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, Self
 
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.attempts import Attempts, is_undecided
 from dodo_dsl.run.backends import Backends, Job
@@ -75,6 +76,12 @@ class Runner:
         self._undecided: dict[str, tuple[Job, Outcome]] = {}
         self._stop = False
 
+    def not_run(self) -> list[NotRun]:
+        """The tests that never began, in the order in which they would have."""
+        reason = "the run was interrupted" if self.interrupted else "a test before did not pass"
+        plans = [job.plan for job in self.skipped]
+        return [NotRun(plan.name, plan.slug, plan.spec, plan.level, reason) for plan in plans]
+
     @property
     def kept(self) -> list[str]:
         """Sentences on the tests that were left running."""
@@ -85,18 +92,14 @@ class Runner:
         await self.backends.prepare([job.plan for job in jobs], self.progress.note)
         self._waiting = self.schedule.ordered(jobs)
         tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}
-        loop = asyncio.get_running_loop()
-        for number in _SIGNALS:
-            loop.add_signal_handler(number, self._interrupt, tasks)
         try:
-            await asyncio.gather(*tasks.values())
-            for job, first in list(self._undecided.values()):
-                tasks[job.plan.slug] = asyncio.ensure_future(self._again(job, first))
-                await tasks[job.plan.slug]
-            outcomes = [tasks[job.plan.slug].result() for job in jobs]
+            with _signals_call(lambda: self._interrupt(tasks)):
+                await asyncio.gather(*tasks.values())
+                for job, first in list(self._undecided.values()):
+                    tasks[job.plan.slug] = asyncio.ensure_future(self._again(job, first))
+                    await tasks[job.plan.slug]
+                outcomes = [tasks[job.plan.slug].result() for job in jobs]
         finally:
-            for number in _SIGNALS:
-                loop.remove_signal_handler(number)
             self.backends.close()
         return [outcome for outcome in outcomes if outcome is not None]
 
@@ -113,13 +116,15 @@ class Runner:
             need = self.schedule.need(job)
             async with self._cores.take(max(need, self.schedule.setup)) as share:
                 self._waiting.remove(job)
-                if self._stop:
+                if self._stop or self.interrupted:
                     self.skipped.append(job)
                     return None
                 self._began[job.plan.slug] = (job, _now())
                 outcome = await self._attempts.outcome(job, lambda: share.shrink(need))
         except asyncio.CancelledError:
-            outcome = error_outcome(job.plan, self.backends.name, "the run was interrupted before this test began")
+            self._began.pop(job.plan.slug, None)
+            self.skipped.append(job)
+            return None
         except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
             outcome = error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
         if is_undecided(outcome) and not self.interrupted and not self.keep:
@@ -157,12 +162,29 @@ class Runner:
         return outcome
 
     def _show_rest(self) -> None:
+        if self.interrupted:
+            return
         now = _now()
         running = [(job, now - began) for job, began in self._began.values()]
         undecided = [job for job, _ in self._undecided.values()]
         if tests := len(running) + len(self._waiting) + len(undecided):
             alone = sum(map(self.schedule.expected, undecided))
             self.progress.rest(self.schedule.forecast(self._waiting, running) + alone, tests)
+
+
+@contextlib.contextmanager
+def _signals_call(react: Callable[[], None]) -> Iterator[None]:
+    """SIGINT, SIGTERM and SIGHUP call ``react`` in the event loop, and afterwards do what they did before."""
+    loop = asyncio.get_running_loop()
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    for number in _SIGNALS:
+        loop.add_signal_handler(number, react)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            loop.remove_signal_handler(number)
+            signal.signal(number, handler)
 
 
 def _now() -> float:

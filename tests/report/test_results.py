@@ -4,14 +4,15 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
-from dodo_dsl.outcome import MachineLoad, Wait
+from dodo_dsl.outcome import MachineLoad, NotRun, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport
-from dodo_dsl.report.report_folder import forget, write_summaries
+from dodo_dsl.report.report_folder import forget, write_report, write_summaries
 from dodo_dsl.spec.goals import Goal
 from tests.report.test_report_folder import OUTCOME
 
@@ -86,3 +87,26 @@ def test_results_that_cannot_be_read_stop_no_run(tmp_path: Path) -> None:
     with pytest.raises(results.ResultsError, match="cannot be read: Is a directory"):
         results.load(tmp_path / "results.json")
     forget(tmp_path, ["test"])
+
+
+NOT_RUN = NotRun("b[light=1]", "b--light-1", "b/b.dodo.yml", "sil", "the run was interrupted")
+
+
+def test_tests_that_never_began_have_no_outcome_and_are_skipped(tmp_path: Path) -> None:
+    circumstances = results.Circumstances((replace(NOT_RUN, spec="b\udcff"), replace(NOT_RUN, name="<c>", slug="c")))
+    write_report(tmp_path, [OUTCOME], {}, circumstances=circumstances)
+    found = results.read(tmp_path / "results.json")
+    assert [test.slug for test in found.circumstances.not_run] == ["b--light-1", "c"]
+    assert results.load(tmp_path / "results.json") == [OUTCOME]
+    cases = ElementTree.parse(tmp_path / "junit.xml").findall(".//testcase")
+    skipped = [(case.get("name"), part.get("message")) for case in cases for part in case.findall("skipped")]
+    assert skipped == [(name, "not run: the run was interrupted") for name in ("b[light=1]", "<c>")]
+    page = (tmp_path / "index.html").read_text()
+    assert "1 failed</span>" in page and ", 2 not run</h1>" in page
+    assert "<li>&lt;c&gt;: the run was interrupted</li>" in page
+
+
+def test_a_test_that_ran_in_one_report_was_not_left_out_of_the_joined_one() -> None:
+    ran = results.Results([replace(OUTCOME, slug=NOT_RUN.slug)], results.NO_CIRCUMSTANCES)
+    left = results.Results([], results.Circumstances((NOT_RUN, replace(NOT_RUN, slug="c"))))
+    assert [test.slug for test in results.joined([ran, left, left]).not_run] == ["c"]

@@ -7,7 +7,7 @@ import pytest
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.application_files import application_paths, env_file_findings, secrets_of
+from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
 
 FOLDER = Path("generated/t")
 
@@ -50,3 +50,11 @@ def test_a_variable_without_a_value(tmp_path: Path) -> None:
     made = application("${NOWHERE:?name it}")
     with pytest.raises(EnvironmentProblem, match="NOWHERE"):
         list(env_file_findings(made, application_paths(made, tmp_path), {}))
+
+
+@pytest.mark.parametrize("report", ["dodo-report/t", "dodo-report/.next-1a2b/t"])
+def test_the_whole_report_is_hidden_also_while_the_next_one_is_written(tmp_path: Path, report: str) -> None:
+    team = tmp_path / "team"
+    (team / report).mkdir(parents=True)
+    made = Application(".", (ApplicationService("driver"),))
+    assert hidden_folders(made, team, team / report) == [team / "dodo-report"]

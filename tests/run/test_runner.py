@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import BackendError, Exited, VerdictEvent
@@ -116,7 +116,8 @@ def test_fail_fast_begins_no_further_test(scene: Scene, fail_fast: bool, began: 
     outcomes = scene.run(*plans("abc"))
     assert (scene.backends.began, [outcome.slug for outcome in outcomes]) == (began, began)
     assert outcomes[0].outcome == "failed"
-    assert [job.test for job in scene.runner.skipped] == [name for name in "abc" if name not in began]
+    left = [(test.slug, test.reason) for test in scene.runner.not_run()]
+    assert left == [(name, "a test before did not pass") for name in "abc" if name not in began]
 
 
 @pytest.fixture
@@ -327,14 +328,17 @@ def test_a_verdict_outlives_what_breaks_after_it(scene: Scene, problem: Exceptio
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_what_runs_and_what_waits(scene: Scene, number: int) -> None:
     scene.capacity, scene.signals, scene.policy = 1.0, ((4.0, number), (4.5, number)), Policy(retries=1)
-    before = signal.getsignal(number)
-    assert endings(scene.run(*plans("ab"))) == [
-        ("a", "error", "the run was interrupted"),
-        ("b", "error", "the run was interrupted before this test began"),
-    ]
+    before = signal.signal(number, lambda *_: None)
+    mine = signal.getsignal(number)
+    try:
+        assert endings(scene.run(*plans("ab"))) == [("a", "error", "the run was interrupted")]
+        assert signal.getsignal(number) == mine
+    finally:
+        signal.signal(number, before)
+    assert scene.runner.not_run() == [NotRun("b", "b", "b/b.dodo.yml", "sil", "the run was interrupted")]
     assert (scene.runner.interrupted, scene.progress.notes[1:]) == (True, ["interrupted: taking down"])
     assert (scene.backends.began, scene.backends.closed) == (["a"], 1)
-    assert signal.getsignal(number) == before
+    assert ("b", "error") not in scene.progress.phases
 
 
 def test_a_signal_during_teardown_keeps_the_verdict(scene: Scene) -> None:

@@ -2,8 +2,8 @@
 
 import argparse
 import asyncio
-import signal
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO, cast
 
@@ -20,14 +20,15 @@ from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.loading import Loading, loading
 from dodo_dsl.cli.run.profile import COMMAND, FILE_NAME, Profile, ProfiledProgress
 from dodo_dsl.cli.run.report_lock import reserved
-from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
+from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, signals_interrupt, undisturbed
+from dodo_dsl.cli.run.written import write
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report.report_folder import Drawable, forget, write_report
+from dodo_dsl.report.next_report import next_report
+from dodo_dsl.report.results import Circumstances
 from dodo_dsl.report.viewer.names import LOGS
 from dodo_dsl.run.backends import Backends, Job, Processes
-from dodo_dsl.run.history import History
 from dodo_dsl.run.mixed.choice import choose
 from dodo_dsl.run.rigs.attendance import is_real
 from dodo_dsl.run.runner import Policy, Runner
@@ -90,8 +91,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    for signal_number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(signal_number, stop_like_interrupt)
+    with signals_interrupt():
+        return _main(options, stdout)
+
+
+def _main(options: argparse.Namespace, stdout: TextIO) -> int:
     more_descriptors()
     profile = Profile()
     stdout = cast(TextIO, UninterruptedStream(stdout))
@@ -191,35 +195,24 @@ def run(
 
     ``others`` are outcomes of tests that did not run again and stay in the report.
     """
-    gone = forget(report.resolve(), [job.plan.slug for job in jobs], {outcome.slug for outcome in others})
+    slugs, kept = [job.plan.slug for job in jobs], {outcome.slug for outcome in others}
     profile.enter(COMMAND, "run")
-    with runner.progress:
-        outcomes = asyncio.run(runner.run(jobs))
-    tests = {job.plan.slug: job.test for job in jobs}
-    logs = {job.plan.slug: job.report / LOGS for job in jobs}
-    summary.write(stdout, outcomes, tests, [job.plan.name for job in runner.skipped], said, logs)
-    stdout.flush()
-    profile.enter(COMMAND, "report")
-    with undisturbed():
-        history = History()
-        history.add((tests[outcome.slug], outcome) for outcome in outcomes)
-        times = history.times({(job.plan.spec, job.test) for job in jobs}, runner.backends.name)
-        past = {o.slug: history.checks(o.spec, tests[o.slug], o.backend, o.clock) for o in outcomes}
-        drawables = {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs}
-        problems, unwritten = [], ""
-        try:
-            problems = write_report(report, [*outcomes, *others], drawables, times, past)
-        except Exception as error:  # noqa: BLE001  (the outcomes are printed)
-            why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
-            unwritten = f"'{report}' cannot take the whole report: {why}"
-        history.save()
-    stdout.writelines(f"{printable(problem)}\n" for problem in problems)
-    instead = f"; it replaces an earlier one with {progress.count(gone, 'other test')}" if gone else ""
-    if unwritten:
-        stdout.write(f"{unwritten}\n")
-    elif said is not Verbosity.QUIET:
-        stdout.write(f"report: {report / 'index.html'}{instead}\n")
-    return outcomes, not unwritten
+    with next_report(report.resolve(), slugs, kept, in_place=runner.keep) as target:
+        jobs = [replace(job, report=target.folder / job.plan.slug) for job in jobs]
+        with runner.progress:
+            outcomes = asyncio.run(runner.run(jobs))
+        not_run = runner.not_run()
+        logs = {job.plan.slug: job.report / LOGS for job in jobs}
+        summary.write(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, logs)
+        stdout.flush()
+        profile.enter(COMMAND, "report")
+        with undisturbed():
+            circumstances = Circumstances(tuple(not_run))
+            written = write(target, report, jobs, runner.backends.name, outcomes, others, circumstances)
+    stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
+    if said is not Verbosity.QUIET or not written.is_whole:
+        stdout.write(f"{written.sentence}\n")
+    return outcomes, written.is_whole
 
 
 def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:

@@ -9,10 +9,11 @@ from dodo_dsl.cli.display import colours
 from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.cli.run.progress import count, summary_line
 from dodo_dsl.diagnostics import Piece
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.report.junit import check_line
 from dodo_dsl.terminal import printable
 
+_MOST_NAMES = 5
 _MOST_COMPLAINTS = 20
 """Of one service of a test."""
 
@@ -21,7 +22,7 @@ def write(
     stream: TextIO,
     outcomes: Sequence[Outcome],
     tests: Mapping[str, str],
-    skipped: Sequence[str],
+    not_run: Sequence[NotRun],
     verbosity: Verbosity = Verbosity.NORMAL,
     logs: Mapping[str, Path] | None = None,
 ) -> None:
@@ -46,10 +47,11 @@ def write(
     if len(set(tests.values())) < len(tests):
         stream.writelines(f"{line}\n" for line in _rates(outcomes, tests))
     colours.write(stream, _counts(outcomes))
-    if skipped:
-        stream.write(
-            f"{count(len(skipped))} not started: {printable(', '.join(skipped[:5]))}{' ...' * (len(skipped) > 5)}\n"
-        )
+    if not_run:
+        names = ", ".join(test.name for test in not_run[:_MOST_NAMES])
+        more = f" and {len(not_run) - _MOST_NAMES} more" if len(not_run) > _MOST_NAMES else ""
+        colours.write(stream, [(f"{count(len(not_run))} not run", "not run")])
+        stream.write(f", as {not_run[0].reason}: {printable(names)}{more}\n")
 
 
 def _complaints(logs: Path | None) -> Iterator[Piece]:

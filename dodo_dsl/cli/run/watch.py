@@ -3,7 +3,6 @@
 import argparse
 import hashlib
 import os
-import signal
 import time
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -17,7 +16,6 @@ from dodo_dsl.cli.run.loading import loading
 from dodo_dsl.cli.run.profile import Profile
 from dodo_dsl.cli.run.report_lock import reserved
 from dodo_dsl.cli.run.saved_files import Seen, saved, seen
-from dodo_dsl.cli.run.uninterrupted import stop_like_interrupt
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.changes import text
 from dodo_dsl.report.changes.comparison import compare
@@ -74,8 +72,6 @@ class Watch:
         """The files after something was saved, and what it was."""
         self._stdout.write("waiting for a file to be saved; Ctrl-C ends\n")
         self._stdout.flush()
-        for number in (signal.SIGTERM, signal.SIGHUP):  # which a run leaves as the system has them
-            signal.signal(number, stop_like_interrupt)
         latest = before
         while True:
             time.sleep(LOOK_S)

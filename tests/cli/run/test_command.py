@@ -1,9 +1,10 @@
 """``dodo run``: what it prints, reports and exits with, on backends that report given events."""
 
 import json
+import os
 import platform
 import signal
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
@@ -16,9 +17,12 @@ import pytest
 from dodo_dsl import package_data
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.run import command
+from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import to_json
+from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready
+from dodo_dsl.run.runner import Runner
 from tests.cli.terminal import Terminal
 from tests.run.scripted import FAILED, PASSED, Events, ScriptedBackend, ScriptedBackends, plan
 
@@ -43,6 +47,7 @@ class Command:
 
     folder: Path
     stages: Mapping[str, Events]
+    backend: type[ScriptedBackend] = ScriptedBackend
 
     def compiled(self, tested: Plan) -> Path:
         target = self.folder / "generated" / tested.slug
@@ -77,7 +82,7 @@ def dodo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Command]:
     made = Command(tmp_path, ENDINGS["passed"])
 
     def backends(*_: object) -> ScriptedBackends:
-        return ScriptedBackends(lambda tested, _: ScriptedBackend(tested, made.stages))
+        return ScriptedBackends(lambda tested, _: made.backend(tested, made.stages))
 
     monkeypatch.setattr(command, "Processes", backends)
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
@@ -214,3 +219,45 @@ def test_verbose_shows_lines_on_a_terminal_too(dodo: Command) -> None:
     folder = dodo.compiled(plan())
     assert main(["run", "--compiled", str(folder), "--report", "report", "-v"], stdout, StringIO()) == 0
     assert "s] test  running\n" in stdout.getvalue()
+
+
+def interrupted(dodo: Command, count: int) -> tuple[int, str]:
+    """``dodo run`` of one test, several times one after the other, interrupted in the first."""
+
+    class Interrupts(ScriptedBackend):
+        async def begin(self) -> None:
+            await super().begin()
+            os.kill(os.getpid(), signal.SIGINT)
+
+    dodo.stages = stages()
+    dodo.backend = Interrupts
+    code, out, _ = dodo.run("-j", "1", "--repeat", str(count))
+    return code, out
+
+
+def test_an_interrupt_leaves_the_other_tests_not_run(dodo: Command) -> None:
+    code, out = interrupted(dodo, 3)
+    assert code == 130
+    assert "0 passed, 0 failed, 1 in error\n2 tests not run, as the run was interrupted: test[run=2], " in out
+    document = json.loads(Path("report/results.json").read_text())
+    assert [test["outcome"] for test in document["tests"]] == ["error"]
+    assert [test["slug"] for test in document["not_run"]] == ["test--run-2", "test--run-3"]
+
+
+def test_an_interrupt_before_any_test_leaves_the_report_before(dodo: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    dodo.run()
+
+    async def nothing(runner: Runner, jobs: Sequence[Job]) -> list[Outcome]:
+        runner.interrupted, runner.skipped = True, list(jobs)
+        return []
+
+    monkeypatch.setattr(Runner, "run", nothing)
+    code, out, _ = dodo.run()
+    assert (code, out.splitlines()[-1][:54]) == (130, "report: no test of this run began, so report/index.htm")
+    assert dodo.result()["outcome"] == "passed"
+
+
+def test_signals_do_after_a_run_what_they_did_before(dodo: Command) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    interrupted(dodo, 1)
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN

@@ -6,12 +6,13 @@ from pathlib import Path
 
 from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.cli.run import summary
+from dodo_dsl.outcome import NotRun
 from tests.report.test_report_folder import OUTCOME
 
 PASSED = replace(OUTCOME, name="ok", slug="ok", outcome="passed", reason="reached it", setup_s=1.0, execution_s=2.25)
 
 
-def text(outcomes: list[object], tests: dict[str, str], skipped: tuple[str, ...] = ()) -> str:
+def text(outcomes: list[object], tests: dict[str, str], skipped: tuple[NotRun, ...] = ()) -> str:
     stream = StringIO()
     summary.write(stream, outcomes, tests, skipped)  # type: ignore[arg-type]
     return stream.getvalue()
@@ -30,9 +31,13 @@ def test_a_line_each_with_what_explains_it() -> None:
 
 def test_repetitions_have_a_rate_and_skipped_tests_are_named() -> None:
     again = replace(PASSED, slug="ok--run-2", outcome="failed")
-    shown = text([PASSED, again], {"ok": "ok", "ok--run-2": "ok"}, tuple("abcdef"))
+    shown = text(
+        [PASSED, again],
+        {"ok": "ok", "ok--run-2": "ok"},
+        tuple(NotRun(name, name, "", "sil", "the run was interrupted") for name in "abcdef"),
+    )
     assert "\nok: 1 of 2 passed (50.0%)\n" in shown
-    assert shown.endswith("6 tests not started: a, b, c, d, e ...\n")
+    assert shown.endswith("6 tests not run, as the run was interrupted: a, b, c, d, e and 1 more\n")
 
 
 def test_quiet_names_only_what_did_not_pass() -> None:
