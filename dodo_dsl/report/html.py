@@ -77,6 +77,7 @@ def render(
         meanings=MEANINGS,
         counts=counts,
         not_run=circumstances.not_run,
+        runs=circumstances.runs,
         version=__version__,
         machine_line=machine_line,
         curve=check_history.curve,

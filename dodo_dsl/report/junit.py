@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.outcome import NotRun, Outcome
+from dodo_dsl.report.run_record import RunRecord
 
 # what XML 1.0 cannot hold (section 2.2), whatever a service printed
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -17,14 +18,18 @@ def write(
     attachments: Mapping[str, str],
     links: Mapping[str, str],
     not_run: Sequence[NotRun] = (),
+    runs: Sequence[RunRecord] = (),
 ) -> None:
     """Writes the file; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
 
-    Tests that were ``not_run`` are skipped ones.
+    Tests that were ``not_run`` are skipped ones; date and host are those of the run, if it is one of ``runs`` alone.
     """
     from junitparser import JUnitXml, TestSuite
 
     suite = TestSuite("dodo")
+    if len(runs) == 1:
+        suite.timestamp = runs[0].date.partition("+")[0]
+        suite.hostname = xml_text(runs[0].host)
     for outcome in outcomes:
         suite.add_testcase(_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)))
     for test in not_run:

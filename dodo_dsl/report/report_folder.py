@@ -159,7 +159,8 @@ def _write_linked(
     shown, pages = _shown(place or folder), _named(folder, outcomes, viewer.PAGE)
     with atomic.replacing(folder / "junit.xml") as part:
         attachments = {slug: f"{shown}/{found[0].path}" for slug, found in pictures.items() if found}
-        junit.write(part, outcomes, attachments, links.to_moments(outcomes, pages, shown), circumstances.not_run)
+        moments = links.to_moments(outcomes, pages, shown)
+        junit.write(part, outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
     times = TIMES if (folder / TIMES).is_file() else ""
     files = html.ReportFiles(
         pictures,

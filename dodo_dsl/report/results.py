@@ -9,6 +9,7 @@ from typing import Any
 from dodo_dsl import package_data
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, NotRun, Outcome, Response, Wait
+from dodo_dsl.report.run_record import RunRecord, run_record
 from dodo_dsl.spec.goals import Goal, is_goal
 
 FILE_NAME = "results.json"
@@ -23,8 +24,9 @@ class ResultsError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Circumstances:
-    """What results say besides the outcomes: the tests that never began."""
+    """What results say besides the outcomes: of which runs they are, and the tests that never began."""
 
+    runs: tuple[RunRecord, ...] = ()
     not_run: tuple[NotRun, ...] = ()
 
 
@@ -64,14 +66,18 @@ def writable_circumstances(circumstances: Circumstances) -> Circumstances:
     not_run = (
         dataclasses.replace(test, name=_written(test.name), spec=_written(test.spec)) for test in circumstances.not_run
     )
-    return dataclasses.replace(circumstances, not_run=tuple(not_run))
+    runs = (
+        dataclasses.replace(run, host=_written(run.host), command=_written(run.command)) for run in circumstances.runs
+    )
+    return Circumstances(tuple(runs), tuple(not_run))
 
 
 def joined(each: Sequence[Results]) -> Circumstances:
     """Those of several results together; a test that ran in one of them was not left out."""
     ran = {outcome.slug for one in each for outcome in one.outcomes}
     left = {test.slug: test for one in each for test in one.circumstances.not_run if test.slug not in ran}
-    return Circumstances(tuple(left.values()))
+    runs = dict.fromkeys(run for one in each for run in one.circumstances.runs)
+    return Circumstances(tuple(runs), tuple(left.values()))
 
 
 def _written(text: str) -> str:
@@ -137,7 +143,8 @@ def _outcome(test: dict[str, Any]) -> Outcome:
 
 
 def _circumstances(document: dict[str, Any]) -> Circumstances:
-    return Circumstances(tuple(NotRun(**test) for test in document.get("not_run", ())))
+    runs = tuple(map(run_record, document.get("runs", ())))
+    return Circumstances(runs, tuple(NotRun(**test) for test in document.get("not_run", ())))
 
 
 def _load(machine: dict[str, Any] | None) -> MachineLoad | None:

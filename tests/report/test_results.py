@@ -13,6 +13,7 @@ from dodo_dsl.report import results
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport
 from dodo_dsl.report.report_folder import forget, write_report, write_summaries
+from dodo_dsl.report.run_record import Repository, RunRecord
 from dodo_dsl.spec.goals import Goal
 from tests.report.test_report_folder import OUTCOME
 
@@ -93,7 +94,9 @@ NOT_RUN = NotRun("b[light=1]", "b--light-1", "b/b.dodo.yml", "sil", "the run was
 
 
 def test_tests_that_never_began_have_no_outcome_and_are_skipped(tmp_path: Path) -> None:
-    circumstances = results.Circumstances((replace(NOT_RUN, spec="b\udcff"), replace(NOT_RUN, name="<c>", slug="c")))
+    circumstances = results.Circumstances(
+        not_run=(replace(NOT_RUN, spec="b\udcff"), replace(NOT_RUN, name="<c>", slug="c"))
+    )
     write_report(tmp_path, [OUTCOME], {}, circumstances=circumstances)
     found = results.read(tmp_path / "results.json")
     assert [test.slug for test in found.circumstances.not_run] == ["b--light-1", "c"]
@@ -108,5 +111,28 @@ def test_tests_that_never_began_have_no_outcome_and_are_skipped(tmp_path: Path) 
 
 def test_a_test_that_ran_in_one_report_was_not_left_out_of_the_joined_one() -> None:
     ran = results.Results([replace(OUTCOME, slug=NOT_RUN.slug)], results.NO_CIRCUMSTANCES)
-    left = results.Results([], results.Circumstances((NOT_RUN, replace(NOT_RUN, slug="c"))))
+    left = results.Results([], results.Circumstances(not_run=(NOT_RUN, replace(NOT_RUN, slug="c"))))
     assert [test.slug for test in results.joined([ran, left, left]).not_run] == ["c"]
+
+
+RUN = RunRecord(
+    "2026-11-23T04:10:00+00:00", "a-<host>", "0.1.0", "dodo run --seed 3", (Repository("tests", "a" * 40, True),)
+)
+
+
+def test_results_and_page_say_of_which_run_they_are(tmp_path: Path) -> None:
+    write_report(tmp_path, [OUTCOME], {}, circumstances=results.Circumstances((RUN,)))
+    assert results.read(tmp_path / "results.json").circumstances.runs == (RUN,)
+    page = (tmp_path / "index.html").read_text()
+    said = (
+        f"2026-11-23 04:10 UTC on a-&lt;host&gt; with DoDo 0.1.0, tests at commit {'a' * 12} with uncommitted changes"
+    )
+    assert f"{said}: <code>dodo run --seed 3</code>" in page
+    suite = ElementTree.parse(tmp_path / "junit.xml").find(".//testsuite")
+    assert suite is not None
+    assert (suite.get("timestamp"), suite.get("hostname")) == ("2026-11-23T04:10:00", "a-<host>")
+
+
+def test_joined_results_are_of_all_runs_each_once() -> None:
+    one, other = (results.Results([], results.Circumstances((run,))) for run in (RUN, replace(RUN, host="b")))
+    assert [run.host for run in results.joined([one, other, one]).runs] == ["a-<host>", "b"]

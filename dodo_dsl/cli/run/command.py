@@ -13,6 +13,7 @@ from dodo_dsl.cli.display.verbosity import Verbosity, chatter
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit, of_outcomes
 from dodo_dsl.cli.numbers import positive, seconds, seed
+from dodo_dsl.cli.repeat.origin import Origin, origin, recording
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
@@ -111,7 +112,8 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
             _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
             runner = runner_of(options, jobs, deployment, quietly, load, profile)
         with reserved(options.report, stdout):
-            outcomes, is_reported = run(runner, jobs, options.report, stdout, profile, said=options.verbosity)
+            source, said = origin(options, deployment), options.verbosity
+            outcomes, is_reported = run(runner, jobs, options.report, stdout, profile, source, said=said)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
@@ -188,6 +190,7 @@ def run(
     report: Path,
     stdout: TextIO,
     profile: Profile,
+    source: Origin,
     others: Sequence[Outcome] = (),
     said: Verbosity = Verbosity.NORMAL,
 ) -> tuple[list[Outcome], bool]:
@@ -197,7 +200,8 @@ def run(
     """
     slugs, kept = [job.plan.slug for job in jobs], {outcome.slug for outcome in others}
     profile.enter(COMMAND, "run")
-    with next_report(report.resolve(), slugs, kept, in_place=runner.keep) as target:
+    in_place = runner.keep
+    with recording(source) as record, next_report(report.resolve(), slugs, kept, in_place) as target:
         jobs = [replace(job, report=target.folder / job.plan.slug) for job in jobs]
         with runner.progress:
             outcomes = asyncio.run(runner.run(jobs))
@@ -207,7 +211,7 @@ def run(
         stdout.flush()
         profile.enter(COMMAND, "report")
         with undisturbed():
-            circumstances = Circumstances(tuple(not_run))
+            circumstances = Circumstances((record(),), tuple(not_run))
             written = write(target, report, jobs, runner.backends.name, outcomes, others, circumstances)
     stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
     if said is not Verbosity.QUIET or not written.is_whole:

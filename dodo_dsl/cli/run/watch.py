@@ -10,6 +10,7 @@ from typing import TextIO
 
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import of_outcomes
+from dodo_dsl.cli.repeat.origin import origin
 from dodo_dsl.cli.run import command
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.loading import loading
@@ -105,7 +106,8 @@ class Watch:
             others = [outcome for slug, outcome in self.outcomes.items() if slug in slugs]
             with reserved(self._options.report, self._stdout):
                 report, said = self._options.report, self._options.verbosity
-                outcomes, _ = command.run(runner, chosen, report, self._stdout, profile, others, said)
+                source = origin(self._options, deployment)
+                outcomes, _ = command.run(runner, chosen, report, self._stdout, profile, source, others, said)
         self._show_change(outcomes)
         self.outcomes = {outcome.slug: outcome for outcome in [*others, *outcomes]}
         return runner.interrupted

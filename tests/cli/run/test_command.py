@@ -6,6 +6,7 @@ import platform
 import signal
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from xml.etree import ElementTree
 import jsonschema
 import pytest
 
-from dodo_dsl import package_data
+from dodo_dsl import __version__, package_data
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.run import command
 from dodo_dsl.outcome import Outcome
@@ -261,3 +262,11 @@ def test_signals_do_after_a_run_what_they_did_before(dodo: Command) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     interrupted(dodo, 1)
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
+
+
+def test_a_report_says_when_where_and_of_what_it_is(dodo: Command) -> None:
+    dodo.run("--seed", "3")
+    (run,) = json.loads(Path("report/results.json").read_text())["runs"]
+    assert (run["host"], run["dodo"]) == (platform.node(), __version__)
+    assert run["command"] == f"dodo run --seed 3 --compiled {dodo.folder / 'generated/test'}"
+    assert abs((datetime.now(UTC) - datetime.fromisoformat(run["date"])).total_seconds()) < 60
