@@ -6,11 +6,17 @@ import os
 import sys
 
 CLOSED = 3
+_COMPLETES = "_ARGCOMPLETE"
+"""Set by a shell that asks how a command line may go on."""
 
 
 def run() -> None:
     if sys.stdout is None or sys.stderr is None:
         sys.exit(_refuse_closed())
+    if _COMPLETES in os.environ:
+        from dodo_dsl.cli.completion.protocol import answer
+
+        answer()
     try:
         from dodo_dsl.cli.main import main
 

@@ -39,6 +39,9 @@ COMMANDS = {
     "stats": Subcommand("stats.command", "show how many services the tests share"),
     "rec": Subcommand("rec.command", "inspect, cut and export recordings"),
     "lsp": Subcommand("lsp", "check and complete tests in an editor while they are written"),
+    "completion": Subcommand(
+        "completion.command", "print what lets a shell complete commands, options, tests, services and rigs"
+    ),
     "images": Subcommand("images", "build and push the images of DoDo's services, and say what they are made of"),
     "rig": Subcommand("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),

@@ -1,0 +1,79 @@
+"""What shells are told, asked as argcomplete's scripts ask."""
+
+import os
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.cli.completion import candidates
+from dodo_dsl.cli.completion.command import SHELLS
+from dodo_dsl.cli.main import main
+
+ROOT = Path(__file__).parents[3]
+_ASK = [sys.executable, "-c", "import os, sys; os.dup2(1, 8); from dodo_dsl.__main__ import run; run()"]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = "kiwi: {kind: static, cid: 121, camera: {source: /dev/video0, width: 640, height: 480}}"
+    (tmp_path / "dodo.yml").write_text(f'dodo: 1\nregistry: ["dodo:"]\nrigs: {{{rig}}}\n')
+    monkeypatch.chdir(tmp_path)
+
+
+def asked(line: str) -> list[str]:
+    given = {
+        "_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "_ARGCOMPLETE_COMP_WORDBREAKS": " \t\n\"'><;|&(",
+        "COMP_LINE": line, "COMP_POINT": str(len(line)), "COMP_TYPE": "9", "PYTHONPATH": str(ROOT),
+    }  # fmt: skip
+    done = subprocess.run(_ASK, env={**os.environ, **given}, capture_output=True, text=True, check=False)
+    return [word.strip().replace("\\", "") for word in done.stdout.splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("dodo ru", ["run"]),
+        ("dodo run sil-closed-l", ["sil-closed-left-curve"]),
+        ("dodo run --backend m", ["mixed"]),
+        ("dodo compile -", ["--fix", "--forecast", "--format"]),
+        ("dodo explain wrong-un", ["wrong-unit"]),
+    ],
+)
+def test_a_line_goes_on(line: str, words: list[str]) -> None:
+    assert set(words) <= set(asked(line))
+
+
+def test_names_of_services_rigs_and_instances() -> None:
+    assert {"integrator", "virtual-camera"} <= set(candidates.services())
+    assert candidates.rigs() == ["emulated", "kiwi"]
+    assert {"sil-perception[light=1]", "sil-perception[light=1,"} <= set(candidates.tests("sil-perception[li"))
+    both = ["sil-perception[light=1,clutter=0]", "sil-perception[light=1,clutter=60]"]
+    assert candidates.tests("sil-perception[light=1,clu") == both
+    assert candidates.tests("no-such-test[") == []
+    assert "wrong-unit" in candidates.tests_and_rules("wrong")
+
+
+def test_specs_are_completed_as_files() -> None:
+    Path("mine").mkdir()
+    for name in ("a.dodo.yml", "a.txt"):
+        Path("mine", name).touch()
+    assert candidates.tests("mine/") == ["mine/a.dodo.yml"]
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_each_shell_gets_a_script(shell: str) -> None:
+    out = StringIO()
+    assert main(["completion", shell], out, StringIO()) == 0
+    assert "_ARGCOMPLETE" in out.getvalue() and "dodo" in out.getvalue()
+
+
+def test_bash_takes_its_script() -> None:
+    out = StringIO()
+    main(["completion", "bash"], out, StringIO())
+    done = subprocess.run(
+        ["bash", "-c", f"{out.getvalue()}\ncomplete -p dodo"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.split()[-1]) == (0, "dodo"), done.stderr
