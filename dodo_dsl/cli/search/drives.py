@@ -63,7 +63,8 @@ class Kept:
 
 
 def end_like_interrupt() -> None:
-    """SIGTERM and SIGHUP end the search as Ctrl-C does; a round takes them, and does not give them back."""
+    """SIGTERM and SIGHUP end the search as Ctrl-C does, and that at once: asyncio would only cancel its task."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop_like_interrupt)
 
