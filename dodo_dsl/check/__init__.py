@@ -10,6 +10,7 @@ from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.rules import (
     camera_sources,
     clocks,
+    files,
     goals,
     layers,
     levels,
@@ -40,6 +41,7 @@ RULES: tuple[Rule, ...] = (
     parameters.check,
     messages.check,
     references.check,
+    files.check,
     limits.check,
     goals.check,
     producers.check,
@@ -89,7 +91,7 @@ def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[
         for diagnostic in found:
             having.setdefault(diagnostic, {})[spec.title] = None
     for diagnostic, titles in having.items():
-        if len(titles) == len(group):
+        if len(titles) == len(group) or files.is_own(diagnostic):
             yield diagnostic
         else:
             others = f" and {len(titles) - 1} more" if len(titles) > 1 else ""

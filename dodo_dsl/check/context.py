@@ -52,16 +52,21 @@ class RuleContext:
         return known_messages(self.deployment.messages)
 
 
-@functools.cache
 def known_messages(own: tuple[Path, ...]) -> frozenset[str]:
     """The names of the standard messages and of those in a deployment's files, as far as these can be read."""
-    names = {d.name for d in parser.load(STANDARD)}
+    return frozenset(known_ids(own))
+
+
+@functools.cache
+def known_ids(own: tuple[Path, ...]) -> Mapping[str, int]:
+    """The numbers of these messages, by name."""
+    ids = {d.name: d.id for d in parser.load(STANDARD)}
     for path in own:
         try:
-            names.update(d.name for d in parser.load(path))
+            ids.update((d.name, d.id) for d in parser.load(path))
         except parser.OdvdError:
             continue  # reported with the deployment
-    return frozenset(names)
+    return ids
 
 
 class Rule(Protocol):

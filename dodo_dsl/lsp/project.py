@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl.check import context
-from dodo_dsl.check.rules import references
+from dodo_dsl.check.rules import files, references
 from dodo_dsl.compiler import Checked, load, plan, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.lsp.texts import LoadedSpecs, Texts
@@ -53,7 +53,7 @@ class Projects:
         if self._is_outdated:
             self._is_outdated = False
             self._loader, self._former = LoadedSpecs(), {}
-            for cache in (load_manifests, references.entries, context.known_messages):
+            for cache in (load_manifests, references.entries, files.problems, context.known_ids):
                 cache.cache_clear()
         self._texts.show(shown)
         groups: dict[Path, list[Path]] = {}

@@ -20,7 +20,8 @@ class Parameter:
     ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names a path parameter and a list of
     its JSON file (``map-path.obstacles``), whose entries' names are the allowed values; ``within_timeout`` marks a
     duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
-    service is ready; ``not_empty`` names lists of a JSON file that must not be empty.
+    service is ready; ``not_empty`` names lists of a JSON file that must not be empty; ``format`` says what is in the
+    file that a path names, which is checked as the service reads it.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Parameter:
     rig: str = ""
     among: str = ""
     not_empty: tuple[str, ...] = ()
+    format: str = ""
     within_timeout: bool = False
     setup_times: int = 0
     example: Value = None

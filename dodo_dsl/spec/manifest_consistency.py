@@ -67,8 +67,9 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
             yield _misplaced(node, key, f"'{name}' is not a duration", "add 'unit: s'")
     if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
         yield _misplaced(node, "minimum", f"the minimum of '{name}' is larger than its maximum")
-    if "not-empty" in raw and kind != "path":
-        yield _misplaced(node, "not-empty", f"'not-empty' is for paths, but '{name}' is of type {kind}")
+    for key in ("not-empty", "format"):
+        if key in raw and kind != "path":
+            yield _misplaced(node, key, f"'{key}' is for paths, but '{name}' is of type {kind}")
     source = str(raw.get("among", "")).partition(".")[0]
     if source and types.get(source) != "path":
         message = f"'among' begins with '{source}', expected a parameter of type path"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from google.protobuf.message import Message
 
+from dodo_dsl.opendlv.inputs.trajectory import Trajectory, TrajectoryError, TrajectoryPose, straight
+from dodo_dsl.opendlv.inputs.way_points import read_points, read_table
 from services.base import Context, Flags, Output, Service, period_of
-from services.beacon.table import read_points, read_table
-from services.beacon.trajectory import Trajectory, TrajectoryError, TrajectoryPose, straight
 
 MICROSECONDS = 1_000_000
 

@@ -5,16 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MICROSECONDS = 1_000_000
+from dodo_dsl.opendlv.inputs.target_table import MICROSECONDS, TargetError
+
+__all__ = ["MICROSECONDS", "Target", "TargetError", "Times", "Values", "in_order"]
 
 Times = NDArray[np.int64]
 """Microseconds."""
 
 Values = NDArray[np.float64]
-
-
-class TargetError(ValueError):
-    """A target that cannot be used; the message names file and place."""
 
 
 @dataclass(frozen=True)

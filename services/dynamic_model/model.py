@@ -7,7 +7,7 @@ explicit Euler. SI units; body frame x forward, y left, yaw rate positive to the
 import math
 from dataclasses import dataclass
 
-from services.dynamic_model.car import KIWI, Car
+from dodo_dsl.opendlv.inputs.car import KIWI, Car
 
 MICROSECONDS = 1_000_000
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.inputs.car import KIWI, read_car
 from services.base import Context, Output, Service, period_of
-from services.dynamic_model.car import KIWI, read_car
 from services.dynamic_model.model import Vehicle
 
 RESET = "reset"

@@ -3,9 +3,8 @@
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from dodo_dsl.opendlv.inputs.truth_file import plain
 from services.object_detection.boxes import Box, LabelledBox
-
-PREFIX = "color:"
 
 
 class FrameKey(NamedTuple):
@@ -71,8 +70,3 @@ class DetectedFrame:
     true: Detections = field(default_factory=Detections)
     has_truth: bool = False
     answered: float | None = None
-
-
-def plain(label: str) -> str:
-    """A class without ``color:`` and blanks around it."""
-    return label.strip().removeprefix(PREFIX).strip()

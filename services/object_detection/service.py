@@ -1,16 +1,16 @@
 """The evaluator of a perception on the bus."""
 
-import difflib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.inputs.truth_file import no_box
 from services.base import Context, Flags, Handler
 from services.object_detection.boxes import Box
 from services.object_detection.frames import FrameKey, TypeNumber, Value
 from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import MEASURES, DetectionLimits, Rules
-from services.object_detection.truth import Truth, TruthFileError, load
+from services.object_detection.truth import Truth, load
 
 LOGIC = "opendlv.logic.perception.Detection"
 ANNOUNCEMENT = "opendlv.proxy.ImageReadingShm"
@@ -69,9 +69,7 @@ def _truth(flags: Flags) -> Truth | None:
     truth = load(Path(path), flags["truth-frames"])
     for name in classes:
         if name not in truth.labels():
-            close = difflib.get_close_matches(name, truth.labels(), n=1)
-            hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(truth.labels())}"
-            raise TruthFileError(f"--classes: {path} has no box of class '{name}'; {hint}")
+            raise ValueError(f"--classes: {path} has {no_box(name, truth.labels())}")
     return truth
 
 

@@ -14,6 +14,9 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli.main import main
+from dodo_dsl.opendlv.inputs.car import read_car
+from dodo_dsl.opendlv.inputs.way_points import read_points
+from dodo_dsl.opendlv.inputs.way_points import read_table as read_points_table
 from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run import leases
 from dodo_dsl.run.rigs import devices, permission, quarantine
@@ -23,10 +26,7 @@ from dodo_dsl.run.rigs.rig_leases import device_leases
 from dodo_dsl.spec.deployment import machine as operator
 from dodo_dsl.spec.deployment.machine import MachineError, machine
 from services.base.flags import parse
-from services.beacon.table import read_points
-from services.beacon.table import read_table as read_points_table
 from services.continuous_signal.csv_target import read_table
-from services.dynamic_model.car import read_car
 from services.gantry import manual
 from services.gantry.protocol import answer
 from tests.run.helpers import Bench

@@ -18,6 +18,9 @@ import pytest
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.inputs.json_node import MapError
+from dodo_dsl.opendlv.inputs.map_file import MAX_OVERLAYS, read_map
+from dodo_dsl.opendlv.inputs.mesh_text import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES
 from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError, SharedMemory, SharedMemoryError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.odvd.parser import OdvdError
@@ -40,9 +43,7 @@ from services.rec_recorder.model import RecordingFile
 from services.rec_recorder.traffic import FloodError, Traffic
 from services.virtual_camera.draw import scene
 from services.virtual_camera.image.overlays import load_with_alpha
-from services.virtual_camera.map.json_node import MapError
-from services.virtual_camera.map.map_file import MAX_OVERLAYS, read_map
-from services.virtual_camera.map.meshes import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES, load_obj
+from services.virtual_camera.map.meshes import load_obj
 from services.virtual_camera.map.textures import load_picture
 from tests.drive.applications import results
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video

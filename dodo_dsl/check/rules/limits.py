@@ -33,6 +33,8 @@ def _files(service: ResolvedService) -> Iterator[Diagnostic]:
         entry, file = argument.entry, argument.value.path if argument.value else None
         for key in argument.parameter.not_empty if entry and file else ():
             found = entries(file, key) if file else ""
+            if isinstance(found, str) and argument.parameter.format:
+                continue  # told with the file
             if entry and file and isinstance(found, str):
                 yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {found}")
             elif entry and file and not found:

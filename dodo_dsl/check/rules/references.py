@@ -1,7 +1,7 @@
 """``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
 
-``wrong-file``: that file is JSON of the shape that the manifest names. ``short-timeout``: the test's timeout leaves
-room for the longest time that an evaluator waits.
+``wrong-file``: that file, if its parameter has no format (see files.py), is JSON of the shape that the manifest names.
+``short-timeout``: the test's timeout leaves room for the longest time that an evaluator waits.
 """
 
 import functools
@@ -39,6 +39,8 @@ def _among(service: ResolvedService, argument: Argument, entry: Entry) -> Iterat
     if file is None:
         return
     names = _names(file, key)
+    if isinstance(names, str) and service.arguments[source].parameter.format:
+        return  # told with the file
     if isinstance(names, str):
         yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(key, ""))
         return

@@ -8,18 +8,26 @@ from typing import Any, NamedTuple
 
 from google.protobuf.message import DecodeError
 
+from dodo_dsl.opendlv.bus.frame_header import HEADER_BYTES, MAGIC, FrameError, body_length
 from dodo_dsl.opendlv.messages import wire
 from dodo_dsl.opendlv.messages.protobuf_classes import Layout, build
 from dodo_dsl.opendlv.odvd import parser
 
-MAGIC = b"\x0d\xa4"
-HEADER_BYTES = 5
+__all__ = [
+    "HEADER_BYTES",
+    "MAGIC",
+    "Envelope",
+    "FrameError",
+    "body_length",
+    "decode_body",
+    "decode_frame",
+    "decode_parts",
+    "encode_body",
+    "encode_frame",
+]
+
 MAX_BODY_BYTES = 2**24 - 1
 MICROSECONDS = 1_000_000
-
-
-class FrameError(ValueError):
-    """Bytes that are no frame, or an envelope that fits in none."""
 
 
 class Envelope(NamedTuple):
@@ -71,13 +79,6 @@ def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
     if len(frame) < end:
         raise FrameError(f"the frame has {len(frame)} bytes of {end}")
     return decode_body(frame[HEADER_BYTES:end], received)
-
-
-def body_length(header: bytes) -> int:
-    """The length in bytes of the envelope that follows a header of 5 bytes; raises FrameError."""
-    if len(header) < HEADER_BYTES or header[:2] != MAGIC:
-        raise FrameError("not a frame: the header is missing")
-    return int.from_bytes(header[2:5], "little")
 
 
 def encode_body(envelope: Envelope) -> bytes:

@@ -1,10 +1,15 @@
 """Width and height of pictures, read before they are decoded: a file of a megabyte may unfold to gigabytes."""
 
+import zlib
+
 MAX_PIXELS = 7680 * 4320
 """Of a picture that is decoded: 8K, which takes 133 MB as B, G, R, A."""
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
+_JPEG_END = b"\xff\xd9"
+_PNG_AROUND = 12
+"""Bytes around the content of a part of a PNG: its length, name and checksum."""
 _ALONE = frozenset({0x01, *range(0xD0, 0xD8)})
 """JPEG's markers without a length (ITU-T T.81, table B.1)."""
 _FRAMES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
@@ -22,7 +27,26 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 def problem_of(data: bytes) -> str:
     """Why a picture file cannot be decoded here, without its name; empty when it can, as far as its header tells."""
     size = picture_size(data)
-    return "not a readable picture, expected PNG or JPEG" if size is None else too_large(*size)
+    if size is None:
+        return "not a readable picture, expected PNG or JPEG"
+    return too_large(*size) or ("" if all(size) else "a picture without an area") or _cut(data)
+
+
+def _cut(data: bytes) -> str:
+    """Where a file ends before its picture does, or a part of a PNG is damaged; empty for whole ones."""
+    if data.startswith(_JPEG):
+        return "" if _JPEG_END in data else f"the picture is cut: its {len(data)} bytes have no end"
+    at = len(_PNG)
+    while at + _PNG_AROUND <= len(data):
+        end = at + _PNG_AROUND + _number(data, at, 4)
+        if end > len(data):
+            break
+        if zlib.crc32(memoryview(data)[at + 4 : end - 4]) != _number(data, end - 4, 4):
+            return f"the picture is damaged at byte {at}: a checksum is wrong"
+        if data[at + 4 : at + 8] == b"IEND":
+            return ""
+        at = end
+    return f"the picture is cut: its {len(data)} bytes have no end"
 
 
 def too_large(width: int, height: int) -> str:

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dodo_dsl.opendlv.inputs.map_file import Instance
 from services.virtual_camera.camera import Array
 from services.virtual_camera.draw.raster import Colour
-from services.virtual_camera.map.map_file import Instance
 from services.virtual_camera.map.textures import Texture
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from dodo_dsl.opendlv.inputs.json_node import MapError
+from dodo_dsl.opendlv.inputs.map_file import ObstacleEntry, find_map, read_obstacles
 from services.virtual_camera.draw.faces import Face
 from services.virtual_camera.draw.raster import Colour
-from services.virtual_camera.map.json_node import MapError
-from services.virtual_camera.map.map_file import ObstacleEntry, find_map, read_obstacles
 
 TAPE: Colour = (235.0, 235.0, 235.0, 255.0)
 THICKNESS = 0.0002
@@ -22,7 +22,7 @@ def pick(path: Path, names: Sequence[str]) -> list[ObstacleEntry]:
     for name in names:
         if name not in known:
             have = ", ".join(sorted(known)) or "none"
-            raise MapError(f"{find_map(path)}: there is no obstacle '{name}' with lines; the map has {have}")
+            raise MapError(find_map(path), f"there is no obstacle '{name}' with lines; the map has {have}")
     return [entry for entry in obstacles if entry.name in names]
 
 

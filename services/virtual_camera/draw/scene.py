@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dodo_dsl.opendlv.inputs.json_node import MapError
+from dodo_dsl.opendlv.inputs.map_file import BlockEntry, MapFile, ModelEntry, OverlayEntry, Vector3, read_map
 from services.virtual_camera.camera import Array
 from services.virtual_camera.draw.copies import Copies
 from services.virtual_camera.draw.faces import Covering, Face, TextureMap, box_faces
@@ -15,8 +17,6 @@ from services.virtual_camera.draw.lines import line_faces, pick
 from services.virtual_camera.draw.raster import Colour
 from services.virtual_camera.draw.shape import Shape, make_shape
 from services.virtual_camera.map.clutter import clutter
-from services.virtual_camera.map.json_node import MapError
-from services.virtual_camera.map.map_file import BlockEntry, MapFile, ModelEntry, OverlayEntry, Vector3, read_map
 from services.virtual_camera.map.meshes import load_obj
 from services.virtual_camera.map.textures import Texture, default_ground, load_picture
 
@@ -67,7 +67,7 @@ class _Budget:
     def take(self, amount: int) -> None:
         self.taken += amount
         if self.taken > self.most:
-            raise MapError(f"{self.path}: more than {self.most} {self.what} in all")
+            raise MapError(self.path, f"more than {self.most} {self.what} in all")
 
 
 def _model(entry: ModelEntry, triangles: _Budget, shapes: dict[Path, tuple[Shape, int]]) -> Copies:

@@ -6,9 +6,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from dodo_dsl.opendlv.inputs.json_node import MapError
+from dodo_dsl.opendlv.inputs.map_file import OverlayEntry
 from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.map.json_node import MapError
-from services.virtual_camera.map.map_file import OverlayEntry
 from services.virtual_camera.map.textures import picture_bytes
 
 
@@ -20,7 +20,7 @@ def load_with_alpha(path: Path) -> Image:
     except cv2.error:
         picture = None
     if picture is None or picture.dtype != np.uint8:
-        raise MapError(f"{path}: not a picture with 8 bits per colour, expected PNG or JPEG")
+        raise MapError(path, "not a picture with 8 bits per colour, expected PNG or JPEG")
     channels = 1 if picture.ndim == 2 else picture.shape[2]
     codes = {1: cv2.COLOR_GRAY2BGRA, 3: cv2.COLOR_BGR2BGRA}
     return np.asarray(cv2.cvtColor(picture, codes[channels]) if channels in codes else picture, np.uint8)

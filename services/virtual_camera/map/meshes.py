@@ -1,23 +1,18 @@
 """OBJ files as triangles: loaded by trimesh, welded, and solids of revolution with fewer sides."""
 
 import io
-import re
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from dodo_dsl.opendlv.inputs import mesh_text
+from dodo_dsl.opendlv.inputs.json_node import MapError, read_bytes
 from services.virtual_camera.camera import Array
-from services.virtual_camera.map.json_node import MapError, read_bytes
 
 Indices = npt.NDArray[np.intp]
 
-MAX_BYTES = 16 << 20
-MAX_TRIANGLES = 50_000
-MAX_VERTICES = 4 * MAX_TRIANGLES
 ROUND_SIDES = 16
-_FACE, _VERTEX = (re.compile(rb"^[ \t]*%b[ \t]" % letter, re.MULTILINE) for letter in (b"f", b"v"))
-_RELATIVE_FACE = re.compile(rb"^\s*f\s[^#\n]*-\d", re.MULTILINE)
 
 
 def weld(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
@@ -87,27 +82,15 @@ def oriented(vertices: Array, triangles: Indices) -> Indices:
     return triangles if volume(vertices, triangles) > 0 else triangles[:, ::-1]
 
 
-def _refuse_large(path: Path, data: bytes) -> None:
-    """Raises MapError for a file that unfolds to more than a mesh may have, before it is parsed."""
-    if len(data) > MAX_BYTES:
-        raise MapError(f"{path}: the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}")
-    for pattern, what, most in ((_FACE, "triangles", MAX_TRIANGLES), (_VERTEX, "vertices", MAX_VERTICES)):
-        count = sum(1 for _ in pattern.finditer(data))
-        if count > most:
-            raise MapError(f"{path}: {count} {what}, expected at most {most}")
-
-
 def _parse(path: Path, data: bytes) -> tuple[Array, Indices]:
-    _refuse_large(path, data)
+    mesh_text.check(path, data)
     from services.virtual_camera.map.mesh_library import trimesh
 
-    if _RELATIVE_FACE.search(data):
-        raise MapError(f"{path}: faces count vertices by negative numbers, expected positive ones")
     try:
         mesh = trimesh.load_mesh(io.BytesIO(data), file_type="obj", process=False, skip_materials=True)
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.intp)
     except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
-        raise MapError(f"{path}: not a readable OBJ file: {error}") from error
+        raise MapError(path, f"not a readable OBJ file: {error}") from error
     return vertices, faces
 
 
@@ -115,12 +98,12 @@ def load_obj(path: Path) -> tuple[Array, Indices]:
     """Vertices (V, 3) in m and triangles (T, 3) of an OBJ file; MapError when there is nothing to draw."""
     vertices, triangles = _parse(path, read_bytes(path))
     if len(triangles) == 0:
-        raise MapError(f"{path}: the OBJ file has no faces")
-    if len(triangles) > MAX_TRIANGLES:
-        raise MapError(f"{path}: {len(triangles)} triangles, expected at most {MAX_TRIANGLES}")
+        raise MapError(path, "the OBJ file has no faces")
+    if len(triangles) > mesh_text.MAX_TRIANGLES:
+        raise MapError(path, f"{len(triangles)} triangles, expected at most {mesh_text.MAX_TRIANGLES}")
     if not np.isfinite(vertices).all() or np.abs(vertices).max() > 1e5:
-        raise MapError(f"{path}: the OBJ file has vertices that are not finite numbers below 100 km")
+        raise MapError(path, "the OBJ file has vertices that are not finite numbers below 100 km")
     vertices, triangles = with_fewer_sides(*weld(vertices, triangles))
     if len(with_area(vertices, triangles)) == 0:
-        raise MapError(f"{path}: no face of the OBJ file has an area")
+        raise MapError(path, "no face of the OBJ file has an area")
     return vertices, with_area(vertices, oriented(vertices, triangles))

@@ -5,9 +5,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from dodo_dsl.opendlv.inputs.json_node import MapError, read_bytes
 from dodo_dsl.opendlv.video.picture_size import problem_of
 from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.map.json_node import MapError, read_bytes
 
 MAX_TILE = 1024
 CANVAS = 2048
@@ -58,7 +58,7 @@ def picture_bytes(path: Path) -> Image:
     """The bytes of a PNG or JPEG file that is small enough to be decoded; MapError otherwise."""
     data = read_bytes(path)
     if problem := problem_of(data):
-        raise MapError(f"{path}: {problem}")
+        raise MapError(path, f"{problem}")
     return np.frombuffer(data, np.uint8)
 
 
@@ -68,9 +68,9 @@ def load_picture(path: Path) -> Image:
     try:
         picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
     except cv2.error as error:
-        raise MapError(f"{path}: the picture cannot be read: {error.err}") from error
+        raise MapError(path, f"the picture cannot be read: {error.err}") from error
     if picture is None:
-        raise MapError(f"{path}: not a readable picture, expected PNG or JPEG")
+        raise MapError(path, "not a readable picture, expected PNG or JPEG")
     return np.asarray(picture, np.uint8)
 
 

@@ -5,12 +5,12 @@ from typing import Any
 import pytest
 
 from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.inputs.trajectory import TrajectoryError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context
 from services.base.flags import parse
 from services.base.manifest import load_manifest
 from services.beacon.service import Beacon
-from services.beacon.trajectory import TrajectoryError
 from tests.services.built import refusal
 from tests.services.process import PATIENCE, ROOT, receive, running, send
 

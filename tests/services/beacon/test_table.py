@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.beacon.table import read_points, read_table
-from services.beacon.trajectory import Trajectory, TrajectoryError
+from dodo_dsl.opendlv.inputs.trajectory import Trajectory, TrajectoryError
+from dodo_dsl.opendlv.inputs.way_points import read_points, read_table
 from tests.services.process import ROOT
 
 

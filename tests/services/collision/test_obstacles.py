@@ -38,29 +38,29 @@ def test_a_map_may_have_none(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("document", "message"),
     [
-        ([], ": expected an object with a list of obstacles"),
-        ({"obstacles": {}}, ": expected an object with a list of obstacles"),
-        ({"obstacles": ["left"]}, ": obstacles[0]: expected an object with a name"),
-        ({"obstacles": [{"lines": []}]}, ": obstacles[0]: expected an object with a name"),
+        ([], ": $: expected an object, found []"),
+        ({"obstacles": {}}, ": $.obstacles: expected a list, found {}"),
+        ({"obstacles": ["left"]}, ": $.obstacles[0]: expected an object with a name"),
+        ({"obstacles": [{"lines": []}]}, ": $.obstacles[0]: expected an object with a name"),
         (
             {"obstacles": [{"name": "a", "lines": []}]},
-            ": obstacles[0].lines: expected a list of lines [x1, y1, x2, y2]",
+            ": $.obstacles[0].lines: expected a list of lines [x1, y1, x2, y2]",
         ),
         (
             {"obstacles": [{"name": "a", "lines": [[0, 0, 1, 1], [0, 0, 1]]}]},
-            ": obstacles[0].lines[1]: expected four numbers [x1, y1, x2, y2] in metres",
+            ": $.obstacles[0].lines[1]: expected four numbers [x1, y1, x2, y2] in metres",
         ),
         (
             {"obstacles": [{"name": "a", "lines": [0, 0, "1", 1]}]},
-            ": obstacles[0].lines: expected four numbers [x1, y1, x2, y2] in metres",
+            ": $.obstacles[0].lines: expected four numbers [x1, y1, x2, y2] in metres",
         ),
         (
             '{"obstacles": [{"name": "a", "lines": [[0, 0, NaN, 1]]}]}',
-            ": obstacles[0].lines[0]: expected four numbers [x1, y1, x2, y2] in metres",
+            ": $.obstacles[0].lines[0]: expected four numbers [x1, y1, x2, y2] in metres",
         ),
         (
             "[",
-            ": cannot be read as a map: Expecting value: line 1 column 2 (char 1)",
+            ":1:2: not JSON: Expecting value",
         ),
     ],
 )
@@ -73,9 +73,7 @@ def test_what_is_no_map_is_said_with_its_place(tmp_path: Path, document: Any, me
 def test_a_missing_map(tmp_path: Path) -> None:
     with pytest.raises(ObstaclesError) as caught:
         load(tmp_path / "nowhere")
-    assert (
-        str(caught.value) == f"{tmp_path / 'nowhere' / 'map.json'}: cannot be read as a map: No such file or directory"
-    )
+    assert str(caught.value) == f"there is no file '{tmp_path / 'nowhere' / 'map.json'}'"
 
 
 def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv.inputs.map_file import Instance
 from services.virtual_camera.draw.bsp import Tree
 from services.virtual_camera.draw.faces import Face, box_faces
-from services.virtual_camera.map.map_file import Instance
 
 WHITE = (255.0, 255.0, 255.0, 255.0)
 

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
+from dodo_dsl.opendlv.inputs.json_node import MapError
 from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.lines import TAPE
 from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.scene import SceneOptions, load_scene
-from services.virtual_camera.map.json_node import MapError
 
 STRAIGHT = package_data.registry() / "maps" / "straight"
 

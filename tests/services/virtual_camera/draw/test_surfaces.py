@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv.inputs.json_node import MapError
 from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.faces import Face, TextureMap
 from services.virtual_camera.draw.surfaces import draw_backdrop, draw_face
-from services.virtual_camera.map.json_node import MapError
 from services.virtual_camera.map.textures import Texture, default_ground, load_picture
 
 SKY, GROUND = (255.0, 0.0, 0.0, 255.0), (0.0, 255.0, 0.0, 255.0)

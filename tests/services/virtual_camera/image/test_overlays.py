@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from dodo_dsl.opendlv.inputs.json_node import MapError
 from services.virtual_camera.draw.scene import load_scene
 from services.virtual_camera.image.overlays import Overlay, load_overlays
-from services.virtual_camera.map.json_node import MapError
 
 
 def overlay(name="t.png", size=(0.5, 0.25), place=(0.25, 0.5)):

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
+from dodo_dsl.opendlv.inputs.json_node import MapError
 from services.virtual_camera.draw.polygons import convex_parts, join
 from services.virtual_camera.draw.shape import make_shape
-from services.virtual_camera.map.json_node import MapError
 from services.virtual_camera.map.meshes import is_closed, load_obj, oriented, volume
 
 
@@ -108,8 +108,8 @@ def test_a_cone_on_a_plate_has_two_convex_parts_and_a_box_one(obj, cube_obj):
 BAD = [
     ("", "has no faces"),
     ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "has no faces"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "not a readable OBJ file"),
-    ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not a readable OBJ file"),
+    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", r"a\.obj:4: the face has vertex 9, expected 1 to 3"),
+    ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"a\.obj:1: 'v 0 0 x' is no vertex"),
     ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite numbers"),
     ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "no face of the OBJ file has an area"),
     ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n", "count vertices by negative numbers"),
@@ -122,4 +122,4 @@ def test_bad_objs_are_told_with_their_file(obj, text, message):
     path = obj(text)
     with pytest.raises(MapError, match=message) as caught:
         load_obj(path)
-    assert str(caught.value).startswith(f"{path}: ")
+    assert str(caught.value).startswith(f"{path}:")

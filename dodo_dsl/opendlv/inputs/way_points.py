@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.inputs.trajectory import Point, TrajectoryError
 from dodo_dsl.opendlv.numbers import number
-from services.beacon.trajectory import Point, TrajectoryError
 
 NEEDED, POSSIBLE = ("x", "y"), ("x", "y", "z", "yaw", "time")
 

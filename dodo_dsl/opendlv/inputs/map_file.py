@@ -1,9 +1,11 @@
 """An OpenDLV ``map.json``, checked; models and textures are not loaded yet."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
-from services.virtual_camera.map.json_node import MapError, Node
+from dodo_dsl.opendlv.inputs.json_node import MapError, Node
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
@@ -150,11 +152,6 @@ def _obstacle(node: Node) -> ObstacleEntry | None:
     return ObstacleEntry(name.text(), tuple((a, b, c, d) for a, b, c, d in rows))
 
 
-def _limit(path: Path, what: str, count: int, limit: int) -> None:
-    if count > limit:
-        raise MapError(f"{path}: {count} instances of {what}, expected at most {limit}")
-
-
 def find_map(path: Path) -> Path:
     """The ``map.json`` of a map given as its folder or as the file itself."""
     return path / "map.json" if path.is_dir() else path
@@ -163,14 +160,69 @@ def find_map(path: Path) -> Path:
 def read_map(path: Path) -> MapFile:
     """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
     file = find_map(path)
-    root = Node.load(file)
-    models = tuple(m for m in map(_model, root.items("model")) if m)
-    blocks = tuple(b for b in map(_block, root.items("block")) if b)
-    _limit(file, "models", sum(len(m.instances) for m in models), MAX_INSTANCES)
-    _limit(file, "blocks", sum(len(b.instances) for b in blocks), MAX_BLOCKS)
-    overlays = tuple(o for o in map(_overlay, root.items("overlay")) if o)
-    _limit(file, "overlays", sum(len(o.places) for o in overlays), MAX_OVERLAYS)
+    return _collected(file, Node.load(file), _raised)
+
+
+def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
+    """What can be drawn of a map, None for what is no map, and all that is wrong with it."""
+    file, found = find_map(path), list[MapError]()
+    try:
+        root = Node.load(file)
+        read = _collected(file, root, found.append)
+    except MapError as error:
+        return None, [error]
+    found.extend(root.slips(_KEYS))
+    for key, known in _KEYS.items():
+        entries = root.member(key)
+        if entries is not None and isinstance(entries.value, list):
+            found.extend(slip for entry in root.items(key) for slip in entry.slips(known))
+    return read, found
+
+
+_KEYS = {
+    "model": ("name", "file", "color", "textureFile", "instances"),
+    "block": ("name", "dimension", "color", "textureFile", "textureSize", "instances"),
+    "overlay": ("name", "dimension", "textureFile", "instances"),
+    "obstacles": ("name", "lines"),
+}
+"""What is read of each list."""
+Entry = TypeVar("Entry")
+Report = Callable[[MapError], None]
+
+
+def _raised(error: MapError) -> None:
+    raise error
+
+
+def _collected(file: Path, root: Node, report: Report) -> MapFile:
+    root.member("model")
+    models = _entries(root, "model", _model, report)
+    blocks = _entries(root, "block", _block, report)
+    overlays = _entries(root, "overlay", _overlay, report)
+    for key, count, limit in (
+        ("model", sum(len(m.instances) for m in models), MAX_INSTANCES),
+        ("block", sum(len(b.instances) for b in blocks), MAX_BLOCKS),
+        ("overlay", sum(len(o.places) for o in overlays), MAX_OVERLAYS),
+    ):
+        if count > limit:
+            report(MapError(file, f"{count} instances of {key}s, expected at most {limit}", f"$.{key}"))
     return MapFile(file, models, blocks, overlays)
+
+
+def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report: Report) -> tuple[Entry, ...]:
+    """The entries of a list that can be read; the others are reported."""
+    found: list[Entry] = []
+    try:
+        for item in root.items(key):
+            try:
+                entry = read(item)
+            except MapError as error:
+                report(error)
+            else:
+                found.extend([] if entry is None else [entry])
+    except MapError as error:
+        report(error)
+    return tuple(found)
 
 
 def read_obstacles(path: Path) -> tuple[ObstacleEntry, ...]:

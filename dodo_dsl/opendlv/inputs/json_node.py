@@ -1,37 +1,58 @@
 """JSON values that know their file and path, so that every error names its place."""
 
+import difflib
+import functools
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn, Self
+
+from dodo_dsl.opendlv.inputs.problem import InputError
 
 MAX_BYTES = 64 * 1024 * 1024
 MAX_NUMBER = 100_000.0
 
 
-class MapError(ValueError):
-    """A map that cannot be used: one sentence that names file, place and what was expected."""
+class MapError(InputError):
+    """A map that cannot be used."""
 
 
 def read_bytes(path: Path) -> bytes:
     """The contents of a regular file of at most 64 MiB; MapError otherwise."""
     if not path.exists():
-        raise MapError(f"there is no file '{path}'")
+        raise MapError(path, "there is no such file", sentence=f"there is no file '{path}'")
     if not path.is_file():
-        raise MapError(f"{path}: not a regular file")
+        raise MapError(path, "not a regular file")
     size = path.stat().st_size
     if size > MAX_BYTES:
-        raise MapError(f"{path}: the file has {size} bytes, expected at most {MAX_BYTES}")
+        raise MapError(path, f"the file has {size} bytes, expected at most {MAX_BYTES}")
     try:
         return path.read_bytes()
     except OSError as error:
-        raise MapError(f"{path}: the file cannot be read: {error.strerror}") from error
+        raise MapError(path, f"the file cannot be read: {error.strerror}") from error
 
 
 def _shown(value: object) -> str:
     text = json.dumps(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def near(word: str, known: Iterable[str]) -> str:
+    """A hint that names the known word that is spelt alike; empty where there is none."""
+    close = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.7)
+    return f"did you mean '{close[0]}'?" if close else ""
+
+
+@functools.lru_cache(maxsize=2)
+def _document(data: bytes) -> object:
+    """The JSON in a file, which several readers may look at one after the other; none of them changes it."""
+    return json.loads(data.decode("utf-8-sig"))
+
+
+def forget() -> None:
+    """Keep no document in memory."""
+    _document.cache_clear()
 
 
 @dataclass(frozen=True)
@@ -44,17 +65,22 @@ class Node:
 
     @classmethod
     def load(cls, file: Path) -> Self:
+        data = read_bytes(file)
         try:
-            return cls(file, "$", json.loads(read_bytes(file).decode("utf-8-sig")))
+            return cls(file, "$", _document(data))
         except json.JSONDecodeError as error:
-            raise MapError(f"{file}:{error.lineno}:{error.colno}: not JSON: {error.msg}") from error
+            raise MapError(file, f"not JSON: {error.msg}", line=error.lineno, column=error.colno) from error
         except UnicodeDecodeError as error:
-            raise MapError(f"{file}: byte {error.start} is not UTF-8 text") from error
+            raise MapError(
+                file, "not UTF-8 text", line=_line(error), sentence=f"{file}: byte {error.start} is not UTF-8 text"
+            ) from error
         except RecursionError as error:
-            raise MapError(f"{file}: the JSON is nested too deeply") from error
+            raise MapError(file, "the JSON is nested too deeply") from error
+        except ValueError as error:
+            raise MapError(file, f"not JSON: {str(error)[:120]}") from error
 
-    def fail(self, expected: str) -> NoReturn:
-        raise MapError(f"{self.file}: {self.place}: expected {expected}, found {_shown(self.value)}")
+    def fail(self, expected: str, hint: str = "") -> NoReturn:
+        raise MapError(self.file, f"expected {expected}, found {_shown(self.value)}", self.place, hint=hint)
 
     def member(self, key: str) -> "Node | None":
         if not isinstance(self.value, dict):
@@ -66,7 +92,7 @@ class Node:
         return node if node is not None else self.lacks(f"'{key}'")
 
     def lacks(self, what: str) -> NoReturn:
-        raise MapError(f"{self.file}: {self.place}: {what} is missing")
+        raise MapError(self.file, f"{what} is missing", self.place)
 
     def items(self, key: str) -> Iterator["Node"]:
         """The elements of the list ``key``; none when there is no such list."""
@@ -104,7 +130,20 @@ class Node:
         except (ValueError, OSError, RuntimeError):
             self.fail("the path of a file")
         if not path.is_relative_to(folder):
-            self.fail(f"a file inside the map's folder {folder}")
+            self.fail("a file inside the map's folder", "copy it there: the map's folder goes with the test")
         if not path.is_file():
-            self.fail(f"a file in {folder}")
+            beside = (each.name for each in path.parent.iterdir()) if path.parent.is_dir() else ()
+            self.fail("a file in the map's folder", near(path.name, beside))
         return path
+
+    def slips(self, known: Collection[str]) -> Iterator[MapError]:
+        """Keys that are spelt almost like known ones, and so mean nothing."""
+        for key in self.value if isinstance(self.value, dict) else ():
+            hint = near(key, known) if key not in known else ""
+            if hint:
+                yield MapError(self.file, f"nothing reads '{key}'", f"{self.place}.{key}", hint=hint, is_slip=True)
+
+
+def _line(error: UnicodeDecodeError) -> int:
+    """The line of the first byte that is not UTF-8."""
+    return error.object.count(b"\n", 0, error.start) + 1

@@ -1,0 +1,179 @@
+"""The formats of files that parameters name: each a function that yields what is wrong with a file.
+
+Readers are imported where they are needed, as few tests need all of them.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.inputs import map_file, mesh_text, obstacles
+from dodo_dsl.opendlv.inputs.json_node import MapError, read_bytes
+from dodo_dsl.opendlv.inputs.problem import InputError
+from dodo_dsl.opendlv.video.picture_size import problem_of
+
+Settings = Mapping[str, str]
+"""What the test gives to other parameters of the service, as text; empty where there is no value."""
+Ids = Mapping[str, int]
+"""The numbers of messages, by name."""
+Format = Callable[[Path, Settings, Ids], Iterator[InputError]]
+
+RECORDING = ".rec"
+PICTURES = (".png", ".jpg", ".jpeg")
+_BOXES = "annotations"
+_IMAGE, _IMAGE_NAME = 1055, "pictures"
+_QUOTED = re.compile(r"'([^']+)'")
+
+
+def problems(name: str, path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
+    """What is wrong with a file of a format; nothing where the services of DoDo do not read it."""
+    return _FORMATS[name](path, settings, ids)
+
+
+def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    read, found = map_file.problems(path)
+    yield from found
+    if read is None:
+        return
+    meshes = dict.fromkeys(model.file for model in read.models)
+    paints = [*(model.paint for model in read.models), *(block.paint for block in read.blocks)]
+    for file in meshes:
+        try:
+            mesh_text.check(file, read_bytes(file))
+        except MapError as error:
+            yield error
+    for paint in dict.fromkeys((*paints, *(overlay.file for overlay in read.overlays))):
+        if isinstance(paint, Path):
+            yield from _picture(paint)
+
+
+def _picture(file: Path) -> Iterator[InputError]:
+    try:
+        problem = problem_of(read_bytes(file))
+    except MapError as error:
+        yield error
+    else:
+        if problem:
+            yield InputError(file, problem, hint="save the picture again as PNG or JPEG")
+
+
+def _obstacles(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    yield from _raised(path, lambda: obstacles.read(path))
+
+
+def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.inputs import truth_file
+
+    frames: truth_file.Frames = settings["truth-frames"]  # type: ignore[assignment]
+    try:
+        pictures = truth_file.read(path, frames)
+    except truth_file.TruthFileError as error:
+        if error.where != _BOXES:  # told by the rule on empty files
+            yield error
+        return
+    labels = {label for boxes in pictures.values() for label, _ in boxes}
+    missing = [name for name in settings["classes"].split(",") if name and name not in labels]
+    known = truth_file.categories(path) if missing else ()
+    for name in missing:
+        if name in known:  # others are told by the rule on names
+            yield InputError(path, truth_file.no_box(name, labels), _BOXES)
+
+
+def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
+    field = settings["target-field"] or settings["field"]
+    if path.suffix != RECORDING:
+        from dodo_dsl.opendlv.inputs import target_table
+
+        yield from _raised(path, lambda: target_table.read(path, field))
+        return
+    message = settings["target-message"] or settings["message"]
+    sender = settings["target-sender"] or settings["sender"]
+    if message in ids and sender.isdecimal():
+        yield from _contents(path, ids[message], int(sender), message, is_needed=True)
+
+
+def _way_points(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.inputs import way_points
+    from dodo_dsl.opendlv.inputs.trajectory import Trajectory
+
+    speed = float(settings["speed"] or 1)
+    yield from _raised(path, lambda: Trajectory(way_points.read_table(path, 0.0), speed))
+
+
+def _car(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.inputs import car
+
+    yield from _raised(path, lambda: car.read_car(path))
+
+
+def _recording(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    sender = settings["video-sender"] if settings["video"] == "true" else ""
+    wanted = (_IMAGE, int(sender)) if sender.isdecimal() else (-1, 0)
+    yield from _contents(path, *wanted, _IMAGE_NAME, is_needed=False)
+
+
+def _contents(path: Path, message: int, sender: int, name: str, *, is_needed: bool) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.inputs import recording_contents
+
+    return recording_contents.problems(path, message, sender, name, is_needed)
+
+
+def _pictures(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
+    if path.suffix == RECORDING:
+        yield from _recording(path, {"video": "", "video-sender": ""}, ids)
+    elif path.suffix.lower() in PICTURES:
+        yield from _picture(path)
+
+
+_FORMATS: Mapping[str, Format] = {
+    "map": _map,
+    "obstacles": _obstacles,
+    "truth": _truth,
+    "target": _target,
+    "way-points": _way_points,
+    "car": _car,
+    "recording": _recording,
+    "pictures": _pictures,
+}
+SETTINGS: Mapping[str, tuple[str, ...]] = {
+    "truth": ("truth-frames", "classes"),
+    "target": ("field", "message", "sender", "target-field", "target-message", "target-sender"),
+    "way-points": ("speed",),
+    "recording": ("video", "video-sender"),
+}
+"""The parameters that say how a file of a format is read."""
+HELP: Mapping[str, str] = {
+    "map": "docs/maps.md has an example",
+    "obstacles": "docs/maps.md has an example",
+    "truth": "services/object_detection/README.md says what a truth has",
+    "target": "services/continuous_signal/README.md says what a target has",
+    "way-points": "services/beacon/README.md says what a path has",
+    "car": "services/dynamic_model/README.md lists the parameters",
+}
+"""Where to read on, for problems without a hint of their own."""
+
+
+def _raised(path: Path, read: Callable[[], object]) -> Iterator[InputError]:
+    """What a reader raises, with the place that its sentence begins with."""
+    try:
+        read()
+    except InputError as error:
+        yield error
+    except ValueError as error:
+        found = re.match(re.escape(str(path)) + r"(?::(\d+))?(?::(\d+))?:? (.*)", str(error), re.DOTALL)
+        line, column, what = found.groups() if found else (None, None, str(error))
+        at = int(line or 0)
+        yield InputError(path, what, line=at, column=int(column or 0) or _column(path, at, what))
+
+
+def _column(path: Path, line: int, what: str) -> int:
+    """Where what a sentence quotes is in its line; the begin of the line where it quotes nothing."""
+    quoted = _QUOTED.search(what)
+    if not line or quoted is None:
+        return 1
+    try:
+        lines = regular_file.text(path, encoding="utf-8-sig").splitlines()
+    except (OSError, ValueError):
+        return 1
+    return lines[line - 1].find(quoted[1]) + 1 or 1 if line <= len(lines) else 1

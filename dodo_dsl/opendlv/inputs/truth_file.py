@@ -1,0 +1,150 @@
+"""True boxes from a file in the COCO format (cocodataset.org, "Data format", object detection), in pixels."""
+
+import difflib
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, NoReturn
+
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.inputs.problem import InputError
+
+Frames = Literal["one", "sample-time", "number"]
+Area = tuple[float, float, float, float]
+"""x, y, width and height as fractions of the picture."""
+
+LARGEST = 2**63
+PREFIX = "color:"
+
+
+class TruthFileError(InputError):
+    """A truth that cannot be used; the message names file and place."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """An entry of a file."""
+
+    path: Path
+    name: str
+
+    def fail(self, what: str, inner: str = "") -> NoReturn:
+        raise TruthFileError(self.path, what, self.name + inner)
+
+
+def plain(label: str) -> str:
+    """A class without ``color:`` and blanks around it."""
+    return label.strip().removeprefix(PREFIX).strip()
+
+
+def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
+    """The classes and boxes of each picture, by what tells pictures apart; raises TruthFileError."""
+    document = _document(path)
+    images = {_whole(entry, "id", place): (entry, place) for entry, place in _entries(document, "images", path)}
+    if len(images) != len(document["images"]):
+        raise TruthFileError(path, "two have the same id", "images")
+    names = {_whole(entry, "id", place): _name(entry, place) for entry, place in _entries(document, "categories", path)}
+    if len(names) != len(document["categories"]):
+        raise TruthFileError(path, "two have the same id", "categories")
+    boxes: dict[int, list[tuple[str, Area]]] = {number: [] for number in images}
+    for entry, place in _entries(document, "annotations", path):
+        image, category = _known(entry, "image_id", images, place), _known(entry, "category_id", names, place)
+        boxes[image].append((names[category], _box(entry, images[image], place)))
+    if not any(boxes.values()):
+        raise TruthFileError(path, "no boxes, expected at least one", "annotations")
+    keys = _keys(images, frames, path)
+    return {keys[number]: found for number, found in boxes.items()}
+
+
+def no_box(name: str, labels: Collection[str]) -> str:
+    """What to say of a class that none of the boxes has; ``labels`` are theirs."""
+    close = difflib.get_close_matches(name, labels, n=1)
+    hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(sorted(labels))}"
+    return f"no box of class '{name}'; {hint}"
+
+
+def categories(path: Path) -> list[str]:
+    """The classes that a file names, whether a box has them or not; raises TruthFileError."""
+    return [_name(entry, place) for entry, place in _entries(_document(path), "categories", path)]
+
+
+def _document(path: Path) -> Any:
+    try:
+        return json.loads(regular_file.text(path))
+    except (OSError, ValueError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        line, column = (error.lineno, error.colno) if isinstance(error, json.JSONDecodeError) else (0, 0)
+        what = f"cannot be read as COCO JSON: {reason}"
+        raise TruthFileError(path, what, line=line, column=column, sentence=f"{path}: {what}") from None
+
+
+def _entries(document: Any, name: str, path: Path) -> Sequence[tuple[dict[str, Any], Place]]:
+    entries = document.get(name) if isinstance(document, dict) else None
+    if not isinstance(entries, list):
+        raise TruthFileError(path, f"expected an object with a list '{name}'")
+    places = [Place(path, f"{name}[{index}]") for index in range(len(entries))]
+    for entry, place in zip(entries, places, strict=True):
+        if not isinstance(entry, dict):
+            place.fail("expected an object")
+    return list(zip(entries, places, strict=True))
+
+
+def _keys(images: Mapping[int, tuple[Any, Place]], frames: Frames, path: Path) -> dict[int, int]:
+    """Each image's key, by its id."""
+    if frames == "number":
+        return {number: number for number in images}
+    if frames == "sample-time":
+        keys = {number: _whole(entry, "sample_time", place) for number, (entry, place) in images.items()}
+        if len(set(keys.values())) < len(keys):
+            raise TruthFileError(path, "two have the same sample_time", "images")
+        return keys
+    if len(images) > 1:
+        raise TruthFileError(
+            path,
+            f"has {len(images)} images, expected one for all frames; see --truth-frames",
+            line=1,
+            sentence=f"{path}: has {len(images)} images, expected one for all frames; see --truth-frames",
+        )
+    return dict.fromkeys(images, 0)
+
+
+def _box(entry: dict[str, Any], image: tuple[dict[str, Any], Place], place: Place) -> Area:
+    """The box as fractions of its image."""
+    if entry.get("iscrowd"):
+        place.fail("iscrowd is set, expected the box of one object")
+    width, height = (_whole(image[0], side, image[1], 1) for side in ("width", "height"))
+    numbers = entry.get("bbox")
+    if not isinstance(numbers, list) or len(numbers) != 4 or not all(map(_is_number, numbers)):
+        place.fail("expected four numbers [x, y, width, height] in pixels", ".bbox")
+    x, y, wide, high = map(float, numbers)
+    if wide <= 0 or high <= 0:
+        place.fail(f"has no area, {wide:g} x {high:g} pixels", ".bbox")
+    if x >= width or y >= height or x + wide <= 0 or y + high <= 0:
+        place.fail(f"lies outside its image of {width} x {height} pixels", ".bbox")
+    return (x / width, y / height, wide / width, high / height)
+
+
+def _name(entry: dict[str, Any], place: Place) -> str:
+    name = entry.get("name")
+    if not isinstance(name, str) or not plain(name):
+        place.fail("expected a string", ".name")
+    return plain(name)
+
+
+def _known(entry: dict[str, Any], key: str, known: Mapping[int, object], place: Place) -> int:
+    number = _whole(entry, key, place)
+    if number not in known:
+        place.fail(f"no entry has the id {number}", f".{key}")
+    return number
+
+
+def _whole(entry: dict[str, Any], key: str, place: Place, least: int = 0) -> int:
+    value = entry.get(key)
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value < LARGEST:
+        place.fail(f"expected a whole number, {least} or more", f".{key}")
+    return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and -LARGEST < value < LARGEST
