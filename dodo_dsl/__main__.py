@@ -1,4 +1,4 @@
-"""``python -m dodo_dsl`` and ``dodo``: the process exit and its streams, and nothing else."""
+"""``python -m dodo_dsl`` and ``dodo``: the process's exit, its streams, and what begins before anything is loaded."""
 
 import contextlib
 import io
@@ -17,6 +17,10 @@ def run() -> None:
         from dodo_dsl.cli.completion.protocol import answer
 
         answer()
+    if sys.argv[1:2] == ["run"]:
+        from dodo_dsl.cli.run.loading import begin
+
+        begin(sys.argv[2:])
     try:
         from dodo_dsl.cli.main import main
 

@@ -18,6 +18,7 @@ from dodo_dsl.run.process.environment import (
     expanded,
     own_environment,
 )
+from dodo_dsl.run.process.python_path import package_path
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.rigs.ports import masked
 
@@ -126,9 +127,3 @@ def changes(base: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str
     removed: dict[str, str | None] = {name: None for name in base if name not in wanted}
     different = {name: value for name, value in wanted.items() if base.get(name) != value}
     return {**removed, **different, **{name: wanted.get(name) for name in OWN_VARIABLES}}
-
-
-def package_path() -> str:
-    """``PYTHONPATH`` of services and sandbox: the folders of ``services`` and of ``dodo_dsl``."""
-    places = [str(package_data.root()), str(Path(__file__).resolve().parents[3]), os.environ.get("PYTHONPATH", "")]
-    return os.pathsep.join(dict.fromkeys(p for p in places if p))

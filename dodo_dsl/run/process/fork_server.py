@@ -3,7 +3,8 @@
 Loading numpy, OpenCV and the like takes most of the processor time of a short test's set-up. Sandboxes with namespaces
 of their own are forked from here; their services are forks of them in turn.
 
-    runner to fork server   {"load": [module of a service of DoDo's, ...]};
+    runner to fork server   {"hold": true} with the descriptor of a lease that the forks hold, too;
+                            {"load": [module of a service of DoDo's, ...]};
                             {"slot": name, "words": [more of the sandbox's words]} with the sandbox's end of its channel
                             and its log's descriptor
 """
@@ -80,6 +81,9 @@ def serve(runner: socket.socket) -> None:
         if not data:
             return
         message = json.loads(data)
+        if "hold" in message:
+            os.set_inheritable(descriptors[0], True)
+            continue
         if "load" in message:
             load_services(message["load"])
             continue

@@ -10,8 +10,8 @@ import subprocess
 import sys
 from collections.abc import Iterable, Sequence
 
-from dodo_dsl.run.process.commands import package_path
 from dodo_dsl.run.process.environment import own_environment
+from dodo_dsl.run.process.python_path import package_path
 
 END_S = 10.0
 
@@ -22,8 +22,8 @@ class ForkServer:
     It loads for a second before it serves; what is asked of it meanwhile waits.
     """
 
-    def __init__(self, descriptors: tuple[int, ...]) -> None:
-        """``descriptors`` are those of leases that sandboxes hold, too."""
+    def __init__(self, descriptors: tuple[int, ...] = ()) -> None:
+        """``descriptors`` are those of leases that sandboxes hold, too, as with ``hold``."""
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
@@ -35,6 +35,11 @@ class ForkServer:
                 start_new_session=True,
                 env={**own_environment(), "PYTHONPATH": package_path()},
             )
+
+    def hold(self, descriptor: int) -> None:
+        """Lets the sandboxes to come hold a lease, too."""
+        with contextlib.suppress(OSError):  # it has ended, which the next sandbox finds
+            socket.send_fds(self._socket, [b'{"hold": true}'], [descriptor])
 
     def load(self, modules: Iterable[str]) -> None:
         """Lets the sandboxes to come have loaded these services of DoDo's."""

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from dodo_dsl.run import leases
-from dodo_dsl.run.process.commands import package_path
 from dodo_dsl.run.process.environment import base_environment
+from dodo_dsl.run.process.python_path import package_path
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in, leased
 

@@ -1,15 +1,81 @@
 """A fork server that was started early belongs to the backend that took it; one that nobody took is ended at once."""
 
 import argparse
+import contextlib
+import os
+import subprocess
+import sys
 import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.run.loading import loading
+from dodo_dsl.cli.run.loading import begin, loading
+from dodo_dsl.run.process import fork_server_client
+from dodo_dsl.run.process.fork_server_client import ForkServer
+from tests.run.desk import ROOT
 
 
 def options(**chosen: str) -> argparse.Namespace:
     return argparse.Namespace(**{"backend": None, "isolation": None} | chosen)
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ForkServer]]:
+    """The fork servers that a test starts."""
+    servers: list[ForkServer] = []
+    start = ForkServer.__init__
+
+    def remembered(self: ForkServer, descriptors: tuple[int, ...] = ()) -> None:
+        start(self, descriptors)
+        servers.append(self)
+
+    monkeypatch.setattr(fork_server_client.ForkServer, "__init__", remembered)
+    yield servers
+    for server in servers:
+        server.kill()
+
+
+def test_one_that_has_begun_is_taken(started: list[ForkServer]) -> None:
+    begin(["sil-closed-straight"])
+    with tempfile.TemporaryFile() as lease, loading(options(), lease.fileno()) as load:
+        assert started == [load.fork_server]
+
+
+def test_one_that_has_begun_in_vain_ends(started: list[ForkServer]) -> None:
+    begin(["sil-closed-straight", "--iso=host"])  # argparse takes it
+    with loading(options(isolation="host"), 0) as load:
+        assert load.take() is None
+    assert [server.is_alive for server in started] == [False]
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--backend", "docker"], ["--isolation=host"]])
+def test_none_begins_in_vain(words: list[str], started: list[ForkServer]) -> None:
+    begin(["sil-closed-straight", *words])
+    assert started == []
+
+
+def test_one_that_has_begun_ends_with_a_command_that_is_refused(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "dodo_dsl", "run", "--no-such-option"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MARK": str(tmp_path)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (2, b"")
+    deadline = time.monotonic() + 60
+    while left := marked(f"MARK={tmp_path}"):
+        assert time.monotonic() < deadline, left
+        time.sleep(0.05)
+
+
+def marked(variable: str) -> list[str]:
+    """Processes with a variable."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if variable.encode() in path.read_bytes().split(b"\0"):
+                found.append(path.parent.name)
+    return found
 
 
 @pytest.mark.parametrize("chosen", [{"backend": "docker"}, {"isolation": "host"}])
