@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -13,6 +14,8 @@ from dodo_dsl.run.docker.client import engine_error
 PROJECT_LABEL = "com.docker.compose.project"
 SERVICE_LABEL = "com.docker.compose.service"
 _STOP_S = 2
+_RESTS_S = 0.5, 1.0, 2.0
+"""Waits before removing once more what the engine refuses to: it may still be busy with a container that has ended."""
 
 
 @dataclass
@@ -42,11 +45,27 @@ def stop_project(client: Any, project: str) -> None:
 def remove_project(client: Any, project: str) -> int:
     """Removes containers, networks and volumes of a project and returns their number, without those already removed.
 
-    Goes on when one cannot be removed, and raises the first such error at the end.
+    Goes on when one cannot be removed, tries it again for a while, and raises the first such error at the end.
     """
+    from docker.errors import APIError
+
+    removed = 0
+    for rest in (*_RESTS_S, None):
+        count, problems = _removed(client, project)
+        removed += count
+        if not problems:
+            break
+        if rest is None or not any(isinstance(problem, APIError) for problem in problems):
+            raise problems[0]
+        time.sleep(rest)
+    return removed
+
+
+def _removed(client: Any, project: str) -> tuple[int, list[Exception]]:
+    """How many things were removed, and why others were not."""
     from docker.errors import DockerException, NotFound
 
-    removed, problems = 0, []
+    removed, problems = 0, list[Exception]()
     for remove in _removals(client, project):
         try:
             remove()
@@ -55,9 +74,7 @@ def remove_project(client: Any, project: str) -> int:
             continue
         except (DockerException, OSError) as error:
             problems.append(error)
-    if problems:
-        raise problems[0]
-    return removed
+    return removed, problems
 
 
 def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:

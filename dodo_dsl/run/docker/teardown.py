@@ -33,8 +33,9 @@ def take_down(
             if name in containers:
                 _copy_report(containers[name], name, report[1], note)
         remove_project(client, project)
-    except Exception:  # noqa: BLE001  (whatever it was, the record of the project has to stay)
-        note("the engine cannot remove the test's containers: the next run or 'dodo doctor --clean' does")
+    except Exception as error:  # noqa: BLE001  (whatever it was, the record of the project has to stay)
+        reason = engine_error(error)
+        note(f"the engine cannot remove the test's containers ({reason}): the next run or 'dodo doctor --clean' does")
         return False
     return True
 

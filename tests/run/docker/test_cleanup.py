@@ -1,0 +1,72 @@
+"""Projects are removed from an engine that may still be busy with what has ended."""
+
+from typing import Any
+
+import pytest
+from docker.errors import APIError, NotFound
+
+from dodo_dsl.run.docker import cleanup
+
+
+class Thing:
+    """A container, network or volume whose removal raises given errors first."""
+
+    def __init__(self, engine: "Engine", *errors: Exception) -> None:
+        self._engine, self._errors = engine, list(errors)
+
+    def remove(self, **_: object) -> None:
+        if self._errors:
+            raise self._errors.pop(0)
+        self._engine.things.remove(self)
+
+
+class Engine:
+    """An engine with a network."""
+
+    def __init__(self, *errors: Exception) -> None:
+        self.things = [Thing(self, *errors)]
+        self.networks = self
+        self.containers = self.volumes = NOTHING
+
+    def list(self, **_: object) -> list[Thing]:
+        return list(self.things)
+
+
+class Nothing:
+    def list(self, **_: object) -> list[Thing]:
+        return []
+
+
+NOTHING: Any = Nothing()
+
+
+@pytest.fixture
+def rests(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """How long it waited each time."""
+    found: list[float] = []
+    monkeypatch.setattr(cleanup.time, "sleep", found.append)
+    return found
+
+
+def test_what_is_refused_at_first_is_removed(rests: list[float]) -> None:
+    engine = Engine(*[APIError("network has active endpoints")] * 2)
+    assert cleanup.remove_project(engine, "dodo-x") == 1
+    assert (engine.things, rests) == ([], [0.5, 1.0])
+
+
+def test_what_is_refused_for_long_is_an_error(rests: list[float]) -> None:
+    engine = Engine(*[APIError("network has active endpoints")] * 4)
+    with pytest.raises(APIError, match="active endpoints"):
+        cleanup.remove_project(engine, "dodo-x")
+    assert rests == [0.5, 1.0, 2.0]
+
+
+def test_an_engine_that_does_not_answer_is_not_waited_for(rests: list[float]) -> None:
+    with pytest.raises(ConnectionError):
+        cleanup.remove_project(Engine(ConnectionError("it has stopped")), "dodo-x")
+    assert rests == []
+
+
+def test_what_is_gone_already_is_no_problem(rests: list[float]) -> None:
+    assert cleanup.remove_project(Engine(NotFound("gone")), "dodo-x") == 0
+    assert rests == []
