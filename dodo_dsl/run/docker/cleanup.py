@@ -3,7 +3,7 @@
 import contextlib
 import functools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
@@ -42,15 +42,16 @@ def stop_project(client: Any, project: str) -> None:
         list(pool.map(lambda c: c.stop(timeout=_STOP_S), containers))
 
 
-def remove_project(client: Any, project: str) -> int:
+def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_S) -> int:
     """Removes containers, networks and volumes of a project and returns their number, without those already removed.
 
-    Goes on when one cannot be removed, tries it again for a while, and raises the first such error at the end.
+    Goes on when one cannot be removed, tries it again after each of ``rests_s``, and raises the first such error at the
+    end.
     """
     from docker.errors import APIError
 
     removed = 0
-    for rest in (*_RESTS_S, None):
+    for rest in (*rests_s, None):
         count, problems = _removed(client, project)
         removed += count
         if not problems:
@@ -96,7 +97,7 @@ def reap_projects(client: Any) -> Reaped:
     for lease, about in leases.orphans(leases.PROJECT):
         project, test = lease.name.removeprefix(leases.PROJECT), about.get("test", "?")
         try:
-            count = remove_project(client, project)
+            count = remove_project(client, project, rests_s=())
         except (DockerException, OSError) as error:
             reaped.left.append(f"{test}: project {project}: {engine_error(error)}")
             lease.leave()

@@ -61,6 +61,12 @@ def test_what_is_refused_for_long_is_an_error(rests: list[float]) -> None:
     assert rests == [0.5, 1.0, 2.0]
 
 
+def test_what_earlier_runs_left_is_not_waited_for(rests: list[float]) -> None:
+    with pytest.raises(APIError):
+        cleanup.remove_project(Engine(APIError("network has active endpoints")), "dodo-x", rests_s=())
+    assert rests == []
+
+
 def test_an_engine_that_does_not_answer_is_not_waited_for(rests: list[float]) -> None:
     with pytest.raises(ConnectionError):
         cleanup.remove_project(Engine(ConnectionError("it has stopped")), "dodo-x")
