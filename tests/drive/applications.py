@@ -10,6 +10,8 @@ from typing import Any
 
 import yaml
 
+from tests.realtime import hurry
+
 ROOT = Path(__file__).parents[2]
 KIWI = ROOT / "examples" / "kiwi"
 
@@ -24,6 +26,7 @@ def dodo(*words: str, code: int | tuple[int, ...], before: Sequence[str] = ()) -
     """The output of a command, after the words ``before`` it, that must end with an exit code, or one of some."""
     command = [*before, sys.executable, "-m", "dodo_dsl", *words]
     process = subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    hurry(process.pid)
     try:
         output, _ = process.communicate(timeout=600)
     finally:
