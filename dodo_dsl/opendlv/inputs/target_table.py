@@ -28,7 +28,7 @@ def read(path: Path, field: str) -> list[tuple[int, float]]:
         reason = error.strerror if isinstance(error, OSError) else error
         raise TargetError(f"{path}: cannot be read as a CSV table: {reason}") from None
     if len(samples) < 2:
-        raise TargetError(f"{path}: has {len(samples)} rows below its header, expected at least 2")
+        raise TargetError(f"{path}: expected at least 2 rows below the header, found {len(samples)}")
     return samples
 
 

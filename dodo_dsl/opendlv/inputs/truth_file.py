@@ -102,9 +102,9 @@ def _keys(images: Mapping[int, tuple[Any, Place]], frames: Frames, path: Path) -
     if len(images) > 1:
         raise TruthFileError(
             path,
-            f"has {len(images)} images, expected one for all frames; see --truth-frames",
+            f"has {len(images)} images, expected one for all frames; see truth-frames",
             line=1,
-            sentence=f"{path}: has {len(images)} images, expected one for all frames; see --truth-frames",
+            sentence=f"{path}: has {len(images)} images, expected one for all frames; see truth-frames",
         )
     return dict.fromkeys(images, 0)
 

@@ -81,7 +81,7 @@ def test_a_table_of_sample_times_is_exact_and_begins_with_its_first_row(tmp_path
         ("", ":1: expected a header with the columns time and x (or value), found nothing"),
         ("time,y\n", ":1: expected a header with the columns time and x (or value), found time, y"),
         ("t,x\n", ":1: expected a header with the columns time and x (or value), found t, x"),
-        ("time,x\n0,1\n", ": has 1 rows below its header, expected at least 2"),
+        ("time,x\n0,1\n", ": expected at least 2 rows below the header, found 1"),
         ("time,x\n0,1\n1\n", ":3: has 1 columns, expected 2 as in the header"),
         ("time,x\n0,1\n1,nan\n", ":3: the value 'nan' is not a finite number"),
         ("time,x\n0,1\n1,1e999\n", ":3: the value '1e999' is not a finite number"),

@@ -99,7 +99,7 @@ def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said
 
 
 def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TruthFileError, match=r"has 2 images, expected one for all frames; see --truth-frames$"):
+    with pytest.raises(TruthFileError, match=r"has 2 images, expected one for all frames; see truth-frames$"):
         load(write(tmp_path, COCO), "one")
 
 
