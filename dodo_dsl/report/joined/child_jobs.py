@@ -9,6 +9,7 @@ import stat
 import urllib.error
 import urllib.request
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -22,6 +23,8 @@ FOLDER = "dodo-report"
 """Of a job's report among its artifacts."""
 _NEEDED = ("CI_API_V4_URL", "CI_PROJECT_ID", "CI_PIPELINE_ID")
 _PATIENCE_S = 60.0
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError)
+"""Raised by zipfile for damage, and the last for what is encrypted or compressed in a way that it does not know."""
 _MOST_JSON = 16 << 20
 _MOST_PAGES = 100
 
@@ -98,7 +101,7 @@ def _fetched(pipeline: ParentPipeline, number: int, folder: Path) -> Path | None
     try:
         with zipfile.ZipFile(archive) as opened:
             _extract(opened, folder)
-    except (zipfile.BadZipFile, NotImplementedError, EOFError) as error:
+    except _UNREADABLE as error:
         raise NoChildJobs(f"the artifacts of job {number} cannot be read: {error}") from None
     archive.unlink()
     return folder / FOLDER if (folder / FOLDER).is_dir() else None

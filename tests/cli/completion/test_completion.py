@@ -1,4 +1,4 @@
-"""What shells are told, asked as argcomplete's scripts ask."""
+"""What a shell gets as completions when it asks as argcomplete's scripts do."""
 
 import os
 import subprocess

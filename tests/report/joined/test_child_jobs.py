@@ -3,7 +3,7 @@
 import io
 import stat
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -92,8 +92,31 @@ def test_an_archive_writes_only_into_its_report(api: Api, tmp_path: Path) -> Non
     assert results.FILE_NAME == "results.json" and len(found) == 3
 
 
-def test_a_damaged_archive_is_said(api: Api, tmp_path: Path) -> None:
-    api.changed["artifacts"] = b"not a zip"
+def archive(change: Callable[[bytearray], None]) -> bytes:
+    """A compressed report, changed."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as opened:
+        opened.writestr("dodo-report/results.json", bytes(range(256)) * 40)
+    data = bytearray(buffer.getvalue())
+    change(data)
+    return bytes(data)
+
+
+def damage(data: bytearray) -> None:
+    """In the compressed bytes, behind the entry's header of 30 bytes and its name."""
+    begin = 30 + len("dodo-report/results.json")
+    data[begin : begin + 8] = b"\xff" * 8
+
+
+def encrypt(data: bytearray) -> None:
+    """As the flag of the central directory says (APPNOTE, section 4.4.4)."""
+    data[data.index(b"PK\x01\x02") + 8] |= 1
+    data[6] |= 1
+
+
+@pytest.mark.parametrize("data", [b"not a zip", archive(damage), archive(encrypt)], ids=["no", "damaged", "encrypted"])
+def test_a_damaged_archive_is_said(data: bytes, api: Api, tmp_path: Path) -> None:
+    api.changed["artifacts"] = data
     with pytest.raises(NoChildJobs, match="the artifacts of job 2 cannot be read"):
         fetched(api, tmp_path / "target")
 
