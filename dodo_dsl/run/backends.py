@@ -11,8 +11,8 @@ from typing import Protocol
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
-from dodo_dsl.run.process.commands import own_module
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.commands import own_modules
+from dodo_dsl.run.process.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.attendance import attended, is_real, refuse_hardware
@@ -102,12 +102,7 @@ class Processes:
 
     def _start_fork_server(self, plans: Sequence[Plan]) -> None:
         """One for the services of these tests, none where there are none."""
-        loaded = self._loaded()
-        if plans:
-            self._fork_server = loaded or ForkServer(self._descriptors)
-            self._fork_server.load({own_module(service.process) for plan in plans for service in plan.services} - {""})
-        elif loaded is not None:
-            loaded.kill()
+        self._fork_server = serving(self._loaded(), own_modules(plans) if plans else None, self._descriptors)
 
     def close(self) -> None:
         if self._fork_server is not None:

@@ -13,8 +13,8 @@ from dodo_dsl.run.mixed.backend import MixedBackend
 from dodo_dsl.run.mixed.containers import ApplicationContainers
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
-from dodo_dsl.run.process.commands import own_module
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.commands import own_modules
+from dodo_dsl.run.process.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.attendance import attended
@@ -52,13 +52,9 @@ class Mixed:
         await self._containers.prepare(plans, note)
         for left in leftovers.reap():
             note(f"removed what a killed run left: {left}")
-        loaded = self._loaded()
         forked = [plan for plan in plans if plan.isolation == "network"]
-        if forked and may_enter():
-            self._fork_server = loaded or ForkServer(self._descriptors)
-            self._fork_server.load({own_module(service.process) for plan in forked for service in plan.services} - {""})
-        elif loaded is not None:
-            loaded.kill()
+        modules = own_modules(forked) if forked and may_enter() else None
+        self._fork_server = serving(self._loaded(), modules, self._descriptors)
 
     def close(self) -> None:
         if self._fork_server is not None:

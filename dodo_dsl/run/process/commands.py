@@ -1,7 +1,7 @@
 """Commands that start a test's services as local processes: words, variables and folder, for the test's slot."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,6 +106,11 @@ class Commands:
         environment = {**inherited, **own, SLOT_VARIABLE: self.slot.name}
         hidden = tuple(masked(self.plan, None))
         return Command(service.name, "application", argv, environment, folder, masked=hidden)
+
+
+def own_modules(plans: Iterable[Plan]) -> set[str]:
+    """The modules of DoDo's own services that tests have."""
+    return {own_module(service.process) for plan in plans for service in plan.services} - {""}
 
 
 def own_module(process: Sequence[str]) -> str:

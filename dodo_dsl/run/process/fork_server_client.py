@@ -68,6 +68,19 @@ class ForkServer:
         self.close()
 
 
+def serving(
+    loaded: ForkServer | None, modules: Iterable[str] | None, descriptors: tuple[int, ...]
+) -> ForkServer | None:
+    """The one that loads these services: ``loaded``, or a new one; with no modules none, and ``loaded`` ends."""
+    if modules is None:
+        if loaded is not None:
+            loaded.kill()
+        return None
+    server = loaded or ForkServer(descriptors)
+    server.load(modules)
+    return server
+
+
 class ForkedSandbox:
     """A sandbox that is the fork server's child, with the interface of subprocess.Popen."""
 
