@@ -8,7 +8,7 @@ import numpy as np
 
 from services.virtual_camera.camera import NEAR, Array, CameraPose, Pinhole, View, clip
 from services.virtual_camera.draw.raster import Image, fill_fixed
-from services.virtual_camera.draw.render import Labels, Renderer
+from services.virtual_camera.draw.render import Renderer
 from services.virtual_camera.draw.shading import Piece
 from services.virtual_camera.image.lens import Lens
 
@@ -67,13 +67,16 @@ class SceneTruth:
         labels, drawn = self._renderer.labels(pose)
         seen = np.bincount(labels[labels >= 0], minlength=len(self._renderer.bodies.names))
         view = self._renderer.camera.view(pose)
-        found = [self._box(view, body, pieces, int(seen[body]), labels) for body, pieces in drawn.items()]
-        return sorted((box for box in found if box is not None), key=lambda box: box.number)
+        mask = np.zeros(labels.shape, np.uint8)
+        names = self._renderer.bodies.names
+        found = [
+            self._box(view, body, self._classes[names[body]], drawn[body], int(seen[body]), mask)
+            for body in sorted(drawn)
+            if seen[body] and names[body] in self._classes
+        ]
+        return [box for box in found if box is not None]
 
-    def _box(self, view: View, body: int, pieces: list[Piece], seen: int, labels: Labels) -> TrueBox | None:
-        name = self._classes.get(self._renderer.bodies.names[body])
-        if name is None or seen == 0:
-            return None
+    def _box(self, view: View, body: int, name: str, pieces: list[Piece], seen: int, mask: Image) -> TrueBox | None:
         corners, inside = _cut(self._corners(view, body), view.camera)
         if self._lens:
             corners, share = _cut(self._lens.shown(corners - 0.5) + 0.5, self._lens.camera)
@@ -81,7 +84,7 @@ class SceneTruth:
         (left, top), (wide, high) = corners.min(axis=0).tolist(), np.ptp(corners, axis=0).tolist()
         if high < self._limits.height or wide <= 0.0:
             return None
-        visible = min(seen / max(_alone(pieces, labels), 1) * inside, 1.0)
+        visible = min(seen / max(_alone(pieces, mask), 1) * inside, 1.0)
         if visible < self._limits.visible:
             return None
         return TrueBox(body, name, left, top, wide, high, visible)
@@ -103,13 +106,14 @@ def _cut(points: Array, camera: Pinhole) -> tuple[Array, float]:
     return kept, float(np.prod(np.ptp(kept, axis=0))) / whole if whole > 0.0 else 0.0
 
 
-def _alone(pieces: list[Piece], labels: Labels) -> int:
-    """How many pixels the pieces of a body cover when nothing is before them."""
-    points = np.concatenate([points.reshape(-1, 2) for points, _ in pieces])
-    size = np.array([labels.shape[1], labels.shape[0]])
-    first = np.clip(points.min(axis=0) // _ONE - 1, 0, size)
-    wide, high = (np.clip(points.max(axis=0) // _ONE + 2, 0, size) - first).tolist()
-    mask: Image = np.zeros((max(high, 1), max(wide, 1)), np.uint8)
+def _alone(pieces: list[Piece], mask: Image) -> int:
+    """How many pixels the pieces of a body cover when nothing is before them; ``mask`` is empty before and after."""
+    points = np.concatenate([points.reshape(-1, 2) for points, _ in pieces]) // _ONE
+    size = np.array(mask.shape[::-1])
+    (left, top), (right, bottom) = (np.clip(edge, 0, size).tolist() for edge in (points.min(0) - 1, points.max(0) + 3))
     for corners, _ in pieces:
-        fill_fixed(mask, corners - (first * _ONE).astype(np.int32), (1,))
-    return int(cv2.countNonZero(mask))
+        fill_fixed(mask, corners, (1,))
+    window = mask[top:bottom, left:right]
+    covered = cv2.countNonZero(window) if window.size else 0
+    window.fill(0)
+    return covered

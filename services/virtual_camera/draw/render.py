@@ -1,5 +1,7 @@
 """Pictures of a scene from anywhere, drawn with OpenCV and numpy."""
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 import numpy.typing as npt
 
@@ -7,6 +9,7 @@ from services.virtual_camera.camera import CameraPose, Pinhole, View
 from services.virtual_camera.draw.bodies import Bodies, Drawn
 from services.virtual_camera.draw.bsp import Tree
 from services.virtual_camera.draw.faces import Face
+from services.virtual_camera.draw.moved import Movable
 from services.virtual_camera.draw.raster import Image, fill_fixed
 from services.virtual_camera.draw.scene import Scene
 from services.virtual_camera.draw.shading import Piece
@@ -35,14 +38,32 @@ class Renderer:
         """
         image = np.empty((self.camera.height, self.camera.width, 4), np.uint8) if out is None else out
         view = self.camera.view(pose)
+        self._draw(image, view, self._back_to_front(view))
+        return image
+
+    def render_around(self, pose: CameraPose, others: Iterable[CameraPose], out: Image) -> Iterator[Image]:
+        """What a camera sees from ``pose``, and from each of the others close to it; all in ``out``, one by one.
+
+        From the others the models are moved as wholes, and stay in the order that they have from ``pose``.
+        """
+        yield self.render(pose, out)
+        items = self._latest[1]
+        drawn = [item for item in items if not isinstance(item, Face)]
+        movable = Movable(self.camera.view(pose), self.bodies.middles, drawn)
+        for other in others:
+            view = self.camera.view(other)
+            moved = movable.seen_from(view)
+            self._draw(out, view, (item if isinstance(item, Face) else (item[0], next(moved)) for item in items))
+            yield out
+
+    def _draw(self, image: Image, view: View, items: Iterable[Face | Drawn]) -> None:
         draw_backdrop(image, view, self.scene.sky, self.scene.ground)
-        for item in self._back_to_front(view):
+        for item in items:
             if isinstance(item, Face):
                 draw_face(image, view, item)
             else:
                 for points, colour in item[1]:
                     fill_fixed(image, points, colour)
-        return image
 
     def labels(self, pose: CameraPose) -> tuple[Labels, dict[int, list[Piece]]]:
         """For each pixel (height, width) the number of the body that it shows, or -1; and all that is drawn of each."""

@@ -42,28 +42,35 @@ class Development:
         self._sensor = sensor
         self._exposure = sensor.table(sensor.exposure) if sensor.exposure != 1.0 else None
         self._gain = sensor.table(sensor.gain) if sensor.gain != 1.0 else None
-        self._pool = _pool(sensor) if sensor.noise > 0.0 else None
+        self._pools = _pools(sensor) if sensor.noise > 0.0 else None
 
     def develop(self, picture: Image, sample_time: int) -> None:
         """Changes a picture (height, width, 4) that was sampled at ``sample_time`` us."""
         if self._exposure is not None:
             cv2.LUT(picture, self._exposure, dst=picture)
-        if self._pool is not None:
-            cv2.add(picture, self._noise(self._pool, picture.shape, sample_time), dst=picture, dtype=cv2.CV_8U)
+        if self._pools is not None:
+            rows = self._rows(picture.shape, sample_time)
+            cv2.add(picture, _taken(self._pools[0], rows, picture.shape), dst=picture)
+            cv2.subtract(picture, _taken(self._pools[1], rows, picture.shape), dst=picture)
         if self._gain is not None:
             cv2.LUT(picture, self._gain, dst=picture)
 
-    def _noise(self, pool: npt.NDArray[np.int16], shape: tuple[int, ...], sample_time: int) -> npt.NDArray[np.int16]:
-        """Each row is a piece of the pool from a place drawn by lot."""
+    def _rows(self, shape: tuple[int, ...], sample_time: int) -> npt.NDArray[np.intp]:
+        """For each row of a picture the pixel of the pool where its noise begins, drawn by lot."""
         height, width = shape[:2]
         random = np.random.RandomState([self._sensor.seed, sample_time & 0xFFFFFFFF, sample_time >> 32 & 0xFFFFFFFF])
-        rows = np.lib.stride_tricks.sliding_window_view(pool.reshape(-1), width * 4)[::4]
-        return rows[random.randint(0, len(rows), height)].reshape(height, width, 4)
+        return random.randint(0, _POOL - width + 1, height)
 
 
-def _pool(sensor: Sensor) -> npt.NDArray[np.int16]:
-    """Noise (n, 4) for as many pixels, none in alpha."""
+def _pools(sensor: Sensor) -> tuple[Image, Image]:
+    """Noise for so many pixels (n, 4), none in alpha: what it adds, and what it takes away."""
     random = np.random.RandomState([2903, sensor.seed])
     pool = np.zeros((_POOL, 4), np.int16)
     pool[:, :3] = np.rint(random.standard_normal((_POOL, 3)) * (sensor.noise * 255.0))
-    return pool
+    return np.clip(pool, 0, 255).astype(np.uint8), np.clip(-pool, 0, 255).astype(np.uint8)
+
+
+def _taken(pool: Image, rows: npt.NDArray[np.intp], shape: tuple[int, ...]) -> Image:
+    """A picture whose rows are those pieces of the pool."""
+    pieces = np.lib.stride_tricks.sliding_window_view(pool.reshape(-1), shape[1] * 4)[::4]
+    return pieces[rows].reshape(shape)
