@@ -1,16 +1,19 @@
 """How long tests took on this machine, and what their checks measured, kept over runs: for forecasts and the report."""
 
 import contextlib
+import functools
 import json
 import math
 import os
 import statistics
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
+
+import orjson
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
@@ -126,17 +129,31 @@ def _values(checks: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     return {c["name"]: c["value"] for c in checks if names[c["name"]] == 1 and c["value"] is not None}
 
 
-def _read(path: Path) -> Iterator[PastRun]:
-    """The valid lines; one that a killed run left unfinished is skipped."""
+def _read(path: Path) -> tuple[PastRun, ...]:
+    """The valid lines; a file that did not change is not read again."""
     try:
-        text = regular_file.content(path).decode("utf-8", "replace")
+        now = path.stat()
     except OSError:
-        return
-    for line in text.splitlines():
-        with contextlib.suppress(ValueError, TypeError, AttributeError, RecursionError):
-            run = PastRun(**json.loads(line))
-            texts = (run.spec, run.test, run.level, run.backend, run.clock, run.outcome)
-            times = (run.setup_s, run.execution_s, run.cores or 0.0)
-            is_measured = all(isinstance(value, int | float) and math.isfinite(value) for value in run.checks.values())
-            if is_measured and all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):
-                yield run
+        return ()
+    return _read_at(path, now.st_mtime_ns, now.st_size, now.st_ino)
+
+
+@functools.lru_cache(maxsize=1)
+def _read_at(path: Path, *_stamp: int) -> tuple[PastRun, ...]:
+    """Lines that a killed run left unfinished are skipped."""
+    try:
+        lines = regular_file.content(path).splitlines()
+    except OSError:
+        return ()
+    return tuple(run for line in lines if (run := _past_run(line)))
+
+
+def _past_run(line: bytes) -> PastRun | None:
+    with contextlib.suppress(ValueError, TypeError, AttributeError):
+        run = PastRun(**orjson.loads(line))
+        texts = (run.spec, run.test, run.level, run.backend, run.clock, run.outcome)
+        times = (run.setup_s, run.execution_s, run.cores or 0.0)
+        is_measured = all(isinstance(value, int | float) and math.isfinite(value) for value in run.checks.values())
+        if is_measured and all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):
+            return run
+    return None
