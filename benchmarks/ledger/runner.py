@@ -26,6 +26,7 @@ SECONDS = {
     "bench_rec": 38,
     "bench_recorder": 36,
     "bench_replay": 45,
+    "bench_report": 30,
     "bench_services": 37,
 }
 """Budgets of the benchmarks; of ten minutes they leave some for those that have to be ended."""
