@@ -29,7 +29,8 @@
       if (test.section) test.section.hidden = !isShown;
       if (isShown) shown += 1;
     }
-    count.textContent = shown === tests.length ? `${shown} tests` : `${shown} of ${tests.length} tests`;
+    const all = tests.length === 1 ? "1 test" : `${tests.length} tests`;
+    count.textContent = shown === tests.length ? all : `${shown} of ${all}`;
   }
 
   function key(row, column) {
