@@ -1,6 +1,7 @@
 """An application that harms whom it can reach, and drives nobody.
 
-It ends when there is a file /stop/now, at the latest after ten minutes.
+It ends when there is a file /stop/now, at the latest after ten minutes. It leaves others some of the processor: what it
+does is tried, not how much of it.
 
 python3 hostile.py --cid=111 --name=video0.argb --harm=flood|groups|memory|tmp
 """
@@ -31,12 +32,12 @@ def request(name: str, **fields: float) -> bytes:
 
 
 def flood() -> None:
-    """Some 15,000 datagrams a second, garbage and large ones, on the test's own bus."""
+    """Some 2,000 datagrams a second, garbage and large ones, on the test's own bus."""
     junk = encode_frame(Envelope(5000, os.urandom(20_000), 0, 0, 0, 0))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for turn in itertools.count():
             sender.sendto(junk if turn % 2 else os.urandom(100), group(CID))
-            if turn % 200 == 0:
+            if turn % 20 == 0:
                 time.sleep(0.01)
 
 
@@ -51,7 +52,7 @@ def groups() -> None:
                 if cid != CID:
                     for datagram in (steering, pedal, frame):
                         sender.sendto(datagram, group(cid))
-            time.sleep(0.05)
+            time.sleep(0.25)
 
 
 def memory() -> None:
@@ -66,7 +67,7 @@ def memory() -> None:
             segment = sysv_ipc.SharedMemory(int(line.split()[0]))
             segment.write(b"\0" * segment.size)
             segment.detach()
-        time.sleep(0.02)
+        time.sleep(0.1)
 
 
 def tmp() -> None:
