@@ -16,6 +16,7 @@ from dodo_dsl.emit.pipeline import CHILD, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.source import resolve
+from dodo_dsl.template_cache import compiled_templates
 
 _SERVICE_DEPTH = 2
 _MOST_BLOCKS = 10_000
@@ -80,6 +81,7 @@ def _yaml(value: Any) -> str:
 @functools.cache
 def _templates() -> jinja2.Environment:
     environment = jinja2.Environment(
+        bytecode_cache=compiled_templates(),
         loader=jinja2.FileSystemLoader(package_data.templates()),
         undefined=jinja2.StrictUndefined,
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)

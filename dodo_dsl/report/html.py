@@ -20,6 +20,7 @@ from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.comparison import KINDS, Comparison
 from dodo_dsl.report.machine_line import machine_line
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
+from dodo_dsl.template_cache import compiled_templates
 
 
 class ReportPicture(NamedTuple):
@@ -98,6 +99,7 @@ def render(
 @functools.cache
 def _template() -> jinja2.Template:
     environment = jinja2.Environment(
+        bytecode_cache=compiled_templates(),
         loader=jinja2.FileSystemLoader(package_data.templates()),
         undefined=jinja2.StrictUndefined,
         autoescape=True,

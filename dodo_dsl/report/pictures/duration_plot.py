@@ -12,6 +12,7 @@ from typing import NamedTuple
 import jinja2
 
 from dodo_dsl import package_data
+from dodo_dsl.template_cache import compiled_templates
 
 Times = tuple[float, float]
 """Seconds of set-up and of execution."""
@@ -67,7 +68,10 @@ def draw(tests: Mapping[str, Sequence[Times]], machine: str) -> str:
 @functools.cache
 def _template() -> jinja2.Template:
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(package_data.templates()), undefined=jinja2.StrictUndefined, autoescape=True
+        bytecode_cache=compiled_templates(),
+        loader=jinja2.FileSystemLoader(package_data.templates()),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
     )
     return environment.get_template("times.svg.j2")
 
