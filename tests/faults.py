@@ -1,4 +1,4 @@
-"""The page of faults and outcomes, ``docs/faults.md``: tests write its rows, or compare them with it."""
+"""The page of faults and outcomes, ``docs/reference/faults.md``: tests write its rows, or compare them with it."""
 
 import re
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dodo_dsl import atomic
 
-PAGE = Path(__file__).parents[1] / "docs" / "faults.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "faults.md"
 FAULTS = (
     "An image is missing",
     "The connection breaks in the middle of a pull",
@@ -95,4 +95,4 @@ class Book:
         if self.update:
             others = [r for r in read() if (r.fault, r.backend) != (fault, backend)]
             atomic.write_text(PAGE, page([*others, row]))
-        assert row in read(), f"scripts/make-faults updates docs/faults.md: {row.markdown()}"
+        assert row in read(), f"scripts/make-faults updates docs/reference/faults.md: {row.markdown()}"

@@ -25,7 +25,7 @@ def block(word: str) -> str:
     return found
 
 
-PROGRAM = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "applications.md").read_text(), re.DOTALL)[1]  # type: ignore[index]
+PROGRAM = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "reference" / "applications.md").read_text(), re.DOTALL)[1]  # type: ignore[index]
 SPEC = "tests/sil-my-straight/sil-my-straight.dodo.yml"
 
 
@@ -146,7 +146,7 @@ def test_every_test_has_a_readme(folder: Path) -> None:
 
 def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
     """Its obstacles and instances are what report and services read."""
-    (text,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "maps.md").read_text(), re.DOTALL)
+    (text,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "reference" / "maps.md").read_text(), re.DOTALL)
     (tmp_path / "map.json").write_text(text)
     ground = read_ground(tmp_path)
     assert [name for name, _ in ground.lines] == ["left", "right", "finish"]

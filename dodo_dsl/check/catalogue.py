@@ -1,6 +1,6 @@
 """The rule catalogue: for each rule a summary, its reason, an example that violates it and one that does not.
 
-docs/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are generated from ``catalogue.yml``.
+docs/reference/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are generated from ``catalogue.yml``.
 """
 
 import functools
@@ -67,7 +67,7 @@ def text(page: Page) -> str:
 
 
 def markdown() -> str:
-    """The text of docs/rules.md."""
+    """The text of docs/reference/rules.md."""
     return "\n".join((_INTRODUCTION, *_contents(), *_sections()))
 
 
@@ -94,5 +94,5 @@ def _sections() -> Iterator[str]:
 
 
 def write(file: Path) -> None:
-    """Generates docs/rules.md."""
+    """Generates docs/reference/rules.md."""
     atomic.write_text(file, markdown())

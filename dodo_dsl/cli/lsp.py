@@ -13,7 +13,7 @@ EXAMPLES = """examples:
   dodo lsp                  what an editor starts; it speaks the language server protocol on standard input and output
   pip install 'dodo-dsl[lsp]'    what it needs beside DoDo
 
-docs/editors.md has the settings for VS Code, Neovim and PyCharm.
+docs/how-to/editors.md has the settings for VS Code, Neovim and PyCharm.
 """
 
 
@@ -30,7 +30,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         message = f"the package '{error.name}' is missing; install it with: pip install 'dodo-dsl[lsp]'"
         raise UsageError(message) from error
     if sys.stdin is None or sys.stdin.isatty():
-        raise UsageError("an editor starts this program and speaks with it; docs/editors.md says how to set it up")
+        raise UsageError("an editor starts this program and speaks with it; docs/how-to/editors.md says how to set it up")
     sys.stdout.flush()
     with (
         contextlib.redirect_stdout(sys.stderr),  # what is printed by mistake is no message

@@ -55,7 +55,7 @@ class Contents:
     frames: Frames
 
     def as_json(self, recording: Recording) -> dict[str, Any]:
-        """For programs; see docs/recordings.md."""
+        """For programs; see docs/how-to/recordings.md."""
         facts = asdict(self)
         facts["messages"] = facts.pop("streams")
         facts["skipped"] = [asdict(place) for place in recording.damage.places]

@@ -12,7 +12,7 @@ from tests.check.test_bad_specs import marked
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "dodo_dsl"
-PAGE = ROOT / "docs" / "rules.md"
+PAGE = ROOT / "docs" / "reference" / "rules.md"
 RULES = sorted(catalogue.pages())
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "architecture.md").read_text()
+PAGE = (ROOT / "docs" / "explanation" / "architecture.md").read_text()
 FOLDERS = sorted({path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "dodo_dsl").rglob("*.py")})
 TOPS = ("dodo_dsl", "services", "schemas", "templates", "tests_registry", "tests", "firmware", "examples", "benchmarks")
 NAMED = sorted(name for name in set(re.findall(r"`([\w./-]+/[\w./-]*)`", PAGE)) if name.split("/")[0] in TOPS)

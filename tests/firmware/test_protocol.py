@@ -22,7 +22,7 @@ def test_a_stale_file_is_named(tmp_path: Path) -> None:
     for name in ("firmware/protocol.yml", "scripts/make-protocol"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
-    for name in ("firmware/gantry/protocol.h", "docs/serial-protocol.md", "services/gantry/rig_table.py"):
+    for name in ("firmware/gantry/protocol.h", "docs/reference/serial-protocol.md", "services/gantry/rig_table.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("old", encoding="utf-8")
     words = [sys.executable, str(tmp_path / "scripts/make-protocol")]

@@ -151,7 +151,7 @@ def test_a_build_without_images_fails(tmp_path: Path, change: tuple[str, str], s
 
 
 def test_the_page_s_variables_are_those_of_the_templates() -> None:
-    page = (Path(__file__).parents[2] / "docs/gitlab.md").read_text()
+    page = (Path(__file__).parents[2] / "docs/how-to/gitlab.md").read_text()
     templates = "".join(template.read_text() for template in TEMPLATES)
     for variable in set(re.findall(r"DODO_[A-Z_]+[A-Z]", page)) - {
         "DODO_IMAGE",

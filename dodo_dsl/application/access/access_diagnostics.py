@@ -52,4 +52,4 @@ def _key(node: Node, steps: Steps, otherwise: Span) -> Span:
 
 
 def _new(key: object) -> str:
-    return f"a key of your own begins with x-, as x-{key}; docs/compose-keys.md has compose's"
+    return f"a key of your own begins with x-, as x-{key}; docs/reference/compose-keys.md has compose's"

@@ -1,7 +1,7 @@
 """Every key of the compose specification, and what becomes of it in a test's copy of a compose file.
 
 A key without a row is unknown, and refused until somebody decides. The tests compare the tables with the
-specification's schema, and docs/compose-keys.md shows them.
+specification's schema, and docs/reference/compose-keys.md shows them.
 """
 
 from typing import Literal
@@ -152,7 +152,7 @@ MOUNT: Rows = {
     "consistency": ("kept", "Linux ignores it"),
     "image": ("kept", "a folder of an image"),
     "read_only": ("kept", "less access"),
-    "source": ("rewritten", "see docs/applications.md"),
+    "source": ("rewritten", "see docs/reference/applications.md"),
     "target": ("kept", "a path in the container"),
     "tmpfs": ("rewritten", "the memory of `sandbox` at most"),
     "type": ("kept", "bind, volume, tmpfs and image only"),

@@ -20,7 +20,7 @@ MAP = "map.json"
 _MAX_BYTES = 20 << 20
 _ATTEMPT = re.compile(r"\$\{(matrix|vary)")
 """A placeholder that nothing has replaced, which another rule reports."""
-_HELP = {"obstacles": "see docs/maps.md"}
+_HELP = {"obstacles": "see docs/reference/maps.md"}
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:

@@ -144,8 +144,8 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
 }
 """The parameters that say how a file of a format is read."""
 HELP: Mapping[str, str] = {
-    "map": "docs/maps.md has an example",
-    "obstacles": "docs/maps.md has an example",
+    "map": "docs/reference/maps.md has an example",
+    "obstacles": "docs/reference/maps.md has an example",
     "truth": "services/object_detection/README.md says what a truth has",
     "target": "services/continuous_signal/README.md says what a target has",
     "way-points": "services/beacon/README.md says what a path has",

@@ -1,7 +1,7 @@
 """The clock of a service in lockstep: the clock service alone advances the time of the test.
 
 What a service consumes comes inside the step message and nowhere else, and what it produces goes back inside the
-answer, so that no lost or late datagram can change a result (``docs/lockstep.md``).
+answer, so that no lost or late datagram can change a result (``docs/explanation/lockstep.md``).
 """
 
 import time

@@ -1,4 +1,4 @@
-"""docs/compose-keys.md, made from the tables."""
+"""docs/reference/compose-keys.md, made from the tables."""
 
 from dodo_dsl.application.access import compose_keys
 

@@ -11,7 +11,7 @@ from dodo_dsl.application.access import compose_keys
 from tests.application.access import keys_page
 
 VENDORED = Path(check_jsonschema.__file__).parent / "builtin_schemas" / "vendor" / "compose-spec.json"
-PAGE = Path(__file__).parents[3] / "docs" / "compose-keys.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "compose-keys.md"
 
 
 def schema() -> dict[str, Any]:

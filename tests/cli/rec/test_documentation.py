@@ -1,4 +1,4 @@
-"""What docs/recordings.md and the command's help show can be run."""
+"""What docs/how-to/recordings.md and the command's help show can be run."""
 
 import json
 import re
@@ -12,7 +12,7 @@ from dodo_dsl.cli.rec import command
 from dodo_dsl.rec.truth import Mark, text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, video
 
-PAGE = (Path(__file__).parents[3] / "docs" / "recordings.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
 SHOWN = re.findall(
     r"^ +dodo rec (.*?)(?:  |$)", PAGE + command.EXAMPLES + command._CUT + command._EXPORT + command._INFO, re.MULTILINE
 )

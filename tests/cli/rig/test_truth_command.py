@@ -166,7 +166,7 @@ def test_a_camera_that_gives_nothing_is_an_error(place: Path) -> None:
 
 @pytest.mark.realtime
 def test_what_help_and_page_show_works(place: Path) -> None:
-    page = (ROOT / "docs" / "rigs.md").read_text()
+    page = (ROOT / "docs" / "how-to" / "rigs.md").read_text()
     for words in re.findall(r"dodo rig truth ([^`\n]*)", page.split("## Truth files")[1]):
         rig(*shlex.split(words))
     assert files(place / "truths", "") == [
