@@ -16,7 +16,7 @@ PARTS := realtime-tests engine-tests fast-tests slow-tests first second
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test dev style types quick-tests $(PARTS) tools lint bench firmware format goldens schema clean
+.PHONY: help demo check test dev style types quick-tests $(PARTS) tools lint bench firmware format goldens schema site clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
@@ -28,6 +28,7 @@ help:
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
 	@echo "make schema   put what manifests say into the schema that editors read"
+	@echo "make site     build the documentation as a site, into build/site"
 	@echo "make clean    remove what was built"
 
 demo:
@@ -100,6 +101,11 @@ goldens:
 schema:
 	@scripts/setup dev
 	@scripts/make-schema
+
+site:
+	@scripts/setup dev
+	@.venv/bin/python -m sphinx -q -W --keep-going -d build/site-kept -c docs/site . build/site
+	@echo "build/site/docs/index.html"
 
 clean:
 	rm -rf .venv build dist generated dodo-report .pytest_cache .mypy_cache .ruff_cache .hypothesis

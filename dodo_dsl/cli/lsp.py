@@ -30,7 +30,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         message = f"the package '{error.name}' is missing; install it with: pip install 'dodo-dsl[lsp]'"
         raise UsageError(message) from error
     if sys.stdin is None or sys.stdin.isatty():
-        raise UsageError("an editor starts this program and speaks with it; docs/how-to/editors.md says how to set it up")
+        raise UsageError(
+            "an editor starts this program and speaks with it; docs/how-to/editors.md says how to set it up"
+        )
     sys.stdout.flush()
     with (
         contextlib.redirect_stdout(sys.stderr),  # what is printed by mistake is no message

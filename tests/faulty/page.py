@@ -17,10 +17,10 @@ NOT_RUN = "?"
 LONGEST = 300  # characters of a reason
 HEAD = """# The kill matrix
 
-Do the shipped tests catch faulty applications, and do they say what is wrong? `scripts/kill-matrix` turns the example
-application ([examples/kiwi](../examples/kiwi)) into {faults} faulty ones, as student teams write them, runs each of
-them against all {tests} shipped tests of the levels sil and dil in lockstep, and writes this page. The faults stand in
-[tests/faulty](../tests/faulty). One by hand:
+Do the shipped tests catch faulty applications, and do they say what is wrong? `scripts/kill-matrix` turns the
+[example application](../../examples/kiwi/README.md) into {faults} faulty ones, as student teams write them, runs each
+of them against all {tests} shipped tests of the levels sil and dil in lockstep, and writes this page. The faults stand
+in `tests/faulty`. One by hand:
 
     FAULT=steering-reversed dodo run sil-open-straight --application tests/faulty/docker-compose.yml
 

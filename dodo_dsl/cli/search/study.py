@@ -72,7 +72,9 @@ def _refuse(word: str, tests: tuple[ResolvedTest, ...]) -> None:
     if spec.clock != "lockstep":
         raise UsageError(f"{spec.title} runs on hardware, which does not wait; a search needs lockstep")
     if not spec.ranges:
-        raise UsageError(f"{spec.title} has no ranges to search: write them under 'vary', see docs/reference/language.md")
+        raise UsageError(
+            f"{spec.title} has no ranges to search: write them under 'vary', see docs/reference/language.md"
+        )
 
 
 def _key(texts: list[str], space: Space, seed: int) -> str:

@@ -1,0 +1,34 @@
+"""The tutorial is what happens."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.contributing.tutorial import Command, Edit, follow, steps
+
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+
+
+@pytest.mark.slow
+def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
+    follow(TUTORIAL / "python.md", tmp_path, Path(sys.executable).parent)
+
+
+def test_a_page_is_read_as_its_reader_does() -> None:
+    page = "```console\n$ a b\nsaid\n...\nend\n$ c\n```\n\n```diff\n--- f\n-old\n+new\n```\n\n```text\n$ not run\n```\n"
+    assert list(steps(page)) == [Command("a b", "said\n...\nend\n"), Command("c", ""), Edit("f", "old", "new")]
+
+
+@pytest.mark.parametrize(
+    ("output", "right"),
+    [("said\nmore\nend\n", True), ("said\n\nend", True), ("said\nmore\n", False), ("first\nsaid\nmore\nend\n", False)],
+)
+def test_what_a_page_leaves_out_may_be_anything(output: str, right: bool) -> None:
+    assert (Command("a", "said\n...\nend\n").wrong(output) == "") is right
+
+
+def test_an_edit_has_one_place(tmp_path: Path) -> None:
+    (tmp_path / "f").write_text("old old")
+    with pytest.raises(AssertionError, match="2 times"):
+        Edit("f", "old", "new").make(tmp_path)
