@@ -19,8 +19,10 @@ class Arguments(argparse.ArgumentParser):
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
+        from dodo_dsl.search.address import masked
+
         choice = _CHOICE.fullmatch(message)
-        super().error(_wrong_choice(choice) if choice else message)
+        super().error(masked(_wrong_choice(choice) if choice else message))
 
     def _unknown(self, word: str) -> str:
         option = word.partition("=")[0]

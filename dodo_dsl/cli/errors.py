@@ -71,11 +71,12 @@ def _usage_errors() -> tuple[type[Exception], ...]:
 
 
 def _machine_errors() -> tuple[type[Exception], ...]:
-    """Errors of the machine, its engine and its rigs. ``usage`` of a rig's error makes it one of the user."""
+    """Errors of the machine, its engine, rigs and databases. ``usage`` of a rig's error makes it one of the user."""
     from dodo_dsl.images.docker_command import DockerError
     from dodo_dsl.images.sbom import SbomError
     from dodo_dsl.images.wheels import WheelsError
     from dodo_dsl.run.leases import LeaseTimeout
     from dodo_dsl.run.rigs.problems import RigProblem
+    from dodo_dsl.search.postgres import StorageProblem
 
-    return DockerError, SbomError, WheelsError, LeaseTimeout, RigProblem
+    return DockerError, SbomError, WheelsError, LeaseTimeout, RigProblem, StorageProblem

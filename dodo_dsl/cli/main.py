@@ -98,13 +98,15 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.OK
     except Exception as error:
+        from dodo_dsl.search.address import masked
+
         code = exit_code(error)
         if code is not None:
-            stderr.write(f"dodo {options.command}: {_indented(sentence(error))}\n")
+            stderr.write(f"dodo {options.command}: {_indented(masked(sentence(error)))}\n")
             return code
         if os.environ.get(DEBUG):
             raise
-        said = _indented(f"internal error: {type(error).__name__}: {error}")
+        said = _indented(f"internal error: {type(error).__name__}: {masked(str(error))}")
         stderr.write(f"dodo {options.command}: {said}\n{DEBUG}=1 shows where\n")
         return Exit.ERROR
 

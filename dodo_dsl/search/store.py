@@ -1,11 +1,12 @@
-"""The drives of a search in a SQLite file, by their values: none is driven twice, whatever ends the command."""
+"""The drives of a search by their values: none is driven twice, whatever ends the command. Here in a SQLite file."""
 
 import contextlib
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 FILE_NAME = "search.sqlite"
 _TABLES = """
@@ -36,8 +37,33 @@ class Drive:
     reason: str
 
 
-class Store:
-    """The drives of one study: the same test, ranges and seed. Raises OtherSearch for those of another."""
+class Store(Protocol):
+    """The drives of one study: the same test, ranges and seed.
+
+    Where it ``is_shared``, several workers drive, and each claims values before it drives there.
+    """
+
+    is_shared: bool
+
+    def get(self, values: Mapping[str, str]) -> Drive | None: ...
+
+    def known(self, points: Sequence[Mapping[str, str]]) -> Sequence[Drive | None]:
+        """What ``get`` says of each, asked for at once."""
+
+    def claim(self, values: Mapping[str, str]) -> bool:
+        """Whether this worker is to drive at these values: no other does, or has done."""
+
+    def add(self, drive: Drive) -> None:
+        """Keeps a drive and ends its claim; the first one at some values stays."""
+
+    def wait(self) -> None:
+        """Returns when others may have got on."""
+
+
+class FileStore:
+    """A file, which one worker uses at a time. Raises OtherSearch for that of another study."""
+
+    is_shared = False
 
     def __init__(self, folder: Path, key: str, name: str = FILE_NAME) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -61,15 +87,25 @@ class Store:
         with self._told(), self._connection:
             self._connection.execute(
                 "insert or ignore into drives values (?, ?, ?, ?, ?)",
-                (_point(drive.values), drive.number, drive.outcome, drive.margin, drive.reason),
+                (point_text(drive.values), drive.number, drive.outcome, drive.margin, drive.reason),
             )
 
     def get(self, values: Mapping[str, str]) -> Drive | None:
         columns = "number, outcome, margin, reason"
         with self._told():
-            found = self._connection.execute(f"select {columns} from drives where point = ?", (_point(values),))  # noqa: S608
+            found = self._connection.execute(f"select {columns} from drives where point = ?", (point_text(values),))  # noqa: S608
             row = found.fetchone()
         return Drive(row[0], dict(values), *row[1:]) if row else None
+
+    def known(self, points: Sequence[Mapping[str, str]]) -> Sequence[Drive | None]:
+        return [self.get(values) for values in points]
+
+    def claim(self, values: Mapping[str, str]) -> bool:
+        """There are no others."""
+        return True
+
+    def wait(self) -> None:
+        """There is nobody to wait for."""
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
@@ -84,13 +120,14 @@ class Store:
 
 
 @contextlib.contextmanager
-def opened(folder: Path, key: str, name: str = FILE_NAME) -> Iterator[Store]:
-    store = Store(folder, key, name)
+def opened(folder: Path, key: str, name: str = FILE_NAME) -> Iterator[FileStore]:
+    store = FileStore(folder, key, name)
     try:
         yield store
     finally:
         store.close()
 
 
-def _point(values: Mapping[str, str]) -> str:
+def point_text(values: Mapping[str, str]) -> str:
+    """What names a drive in a table."""
     return json.dumps(dict(sorted(values.items())), ensure_ascii=False)

@@ -5,7 +5,7 @@ import asyncio
 import importlib.util
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO, cast
@@ -28,8 +28,10 @@ from dodo_dsl.cli.search.text import lines
 from dodo_dsl.run.backends import Processes
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.search import postgres
 from dodo_dsl.search.findings import Findings, document, failures_of, find
 from dodo_dsl.search.itinerary import Itinerary
+from dodo_dsl.search.postgres import MAIN
 from dodo_dsl.search.space import nominal, texts
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.terminal import json_text
@@ -40,6 +42,7 @@ EXAMPLES = """examples:
   dodo search sil-my-drive --minutes 30    as many drives as fit into half an hour
   dodo search sil-my-drive --save          keep a test of each failure among your tests
   dodo search sil-my-drive --sweep         only measure how often it fails
+  dodo search sil-my-drive --storage postgresql://dodo@server/dodo    together with other machines
 
 The same command again goes on where an earlier one was interrupted, or with more drives.
 
@@ -78,12 +81,24 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--report", type=Path, default=REPORT, metavar="DIR",
         help="the search is kept in DIR/search/TEST (default: dodo-report)"
     )  # fmt: skip
+    parser.add_argument(
+        "--storage", metavar="URL",
+        help="PostgreSQL database whose drives all workers share (default: a file in DIR/search/TEST)"
+    )  # fmt: skip
+    parser.add_argument("--study", metavar="NAME", help=f"with --storage: which search of TEST (default: {MAIN})")
+    parser.add_argument(
+        "--finish", action="store_true", help="look for nothing more: shrink the failures found, and write the result"
+    )
     selection.add_application(parser)
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if importlib.util.find_spec(_NEEDED) is None:
         raise UsageError(f"this needs {_NEEDED}: pip install 'dodo-dsl[search]'")
+    if options.storage is None and options.study is not None:
+        raise UsageError("--study names a search in a database: name that with --storage")
+    if options.storage is not None and not postgres.is_installed():
+        raise UsageError("--storage needs psycopg: pip install 'dodo-dsl[search,storage]'")
     end_like_interrupt()
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))
@@ -92,7 +107,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
         study = study_of(options, folder.path, stdout)
         report = options.report.resolve() / "search" / study.test.spec.slug
-        with opened(report, study.key) as store:
+        with _store(options, study, report) as store:
             findings, interrupted = _search(options, study, store, folder.path, report, load, stdout)
     with undisturbed():
         atomic.write_text(report / FILE_NAME, json_text(document(findings)))
@@ -107,6 +122,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return Exit.PROBLEMS if findings.failures or fails_at_nominal else Exit.OK
 
 
+def _store(options: argparse.Namespace, study: Study, report: Path) -> AbstractContextManager[Store]:
+    if options.storage is None:
+        return opened(report, study.key)
+    return postgres.opened(options.storage, options.study or MAIN, study.test.spec.slug, study.key)
+
+
 def _search(
     options: argparse.Namespace, study: Study, store: Store, work: Path, report: Path, load: Loading, stdout: TextIO
 ) -> tuple[Findings, bool]:
@@ -116,7 +137,7 @@ def _search(
     deployment = study.checked.deployment
     backends = Kept(Processes(deployment.cids, options.isolation, (load.descriptor,), [deployment.root], load.take))
     order = schedule(options.jobs, expectation(backends.name))
-    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
+    deadline = _deadline(options)
     with _shown(stdout, runs + 1 if options.runs or not deadline else None, deadline) as progress:
         drives = Drives(study.checked, study.test.spec, store, backends, order, progress, work, report, deadline)
         shrinker = Shrinker(drives, study.space, runs + 1, _registry(study) if options.save else None)
@@ -125,6 +146,12 @@ def _search(
     swept, proposed = course.known(True), course.known(False)
     findings = find(study.test.spec.title, options.seed, study.space, at_nominal, swept, proposed)
     return replace(findings, shrunk=tuple(shrinker.found)), interrupted
+
+
+def _deadline(options: argparse.Namespace) -> float | None:
+    if options.finish:
+        return time.monotonic()
+    return time.monotonic() + options.minutes * 60 if options.minutes else None
 
 
 def _registry(study: Study) -> Path:

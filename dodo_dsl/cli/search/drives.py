@@ -1,5 +1,6 @@
 """Drives of a search: candidates compiled as tests and run in rounds, those of the store only once."""
 
+import itertools
 import shutil
 import signal
 import time
@@ -28,7 +29,9 @@ from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.spec.model import Spec
 
 _ROUND = 8
-"""Drives a core in a round, so that cores hardly wait for its last one; one where time ends the search."""
+"""Drives a core in a round, so that cores hardly wait for its last one; one where time or workers share the search."""
+_WINDOW = 256
+"""Candidates that are looked at for the next round, more than workers could drive at once."""
 _REPEAT = "#"
 """No name of a range."""
 RETRIES = 1
@@ -100,21 +103,42 @@ class Drives:
 
         Candidates with the same values share a drive, but for each ``repeat``. Raises Interrupted.
         """
-        numbers: dict[int, Values] = {}
-        for number, values in enumerate(candidates, first):
+        missing: dict[int, Values] = {}
+        known = self.store.known([repeated(values, repeat) for values in candidates])
+        for number, (values, drive) in enumerate(zip(candidates, known, strict=True), first):
             point = (*key(values), str(repeat))
-            known = self.store.get(repeated(values, repeat)) if point not in self._counted else None
-            if known:
-                self.progress.count(known)
-            elif point not in self._counted:
-                numbers[number] = values
+            if point in self._counted:
+                continue
             self._counted.add(point)
-        size = max(1, int(self.order.capacity)) * (_ROUND if self.deadline is None else 1)
-        missing = list(numbers.items())
-        for start in range(0, len(missing), size):
-            if self.is_over:
+            if drive:
+                self.progress.count(drive)
+            else:
+                missing[number] = values
+        is_long = self.deadline is None and not self.store.is_shared
+        size = max(1, int(self.order.capacity)) * (_ROUND if is_long else 1)
+        while missing and not self.is_over:
+            if claimed := self._claimed(missing, size, repeat):
+                await self._round(claimed, repeat)
+            elif missing:
+                end_like_interrupt()
+                self.store.wait()
+
+    def _claimed(self, missing: dict[int, Values], most: int, repeat: int) -> dict[int, Values]:
+        """Takes up to ``most`` of the first candidates out of ``missing``, and those that others have driven."""
+        first = dict(itertools.islice(missing.items(), max(most, _WINDOW)))
+        if self.store.is_shared:
+            known = self.store.known([repeated(values, repeat) for values in first.values()])
+            for number, drive in zip(list(first), known, strict=True):
+                if drive:
+                    self.progress.count_other(drive)
+                    del missing[number], first[number]
+        claimed: dict[int, Values] = {}
+        for number, values in first.items():
+            if len(claimed) == most:
                 break
-            await self._round(dict(missing[start : start + size]), repeat)
+            if self.store.claim(repeated(values, repeat)):
+                claimed[number] = missing.pop(number)
+        return claimed
 
     async def _round(self, candidates: dict[int, Values], repeat: int) -> None:
         folder = self.work / f"round-{min(candidates)}"

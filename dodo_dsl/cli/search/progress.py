@@ -63,6 +63,11 @@ class SearchProgress:
         if drive.margin is not None:
             self._worst = drive.margin if self._worst is None else min(self._worst, drive.margin)
 
+    def count_other(self, drive: Drive) -> None:
+        """Counts a drive that another worker made meanwhile."""
+        self._driven += 1
+        self.count(drive)
+
     def shrink(self, reason: str) -> None:
         """From now on, drives shrink a failure; how many it takes is not known."""
         self._total = self._deadline = None

@@ -18,52 +18,13 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.search import command
 from dodo_dsl.cli.search.drives import Drives
-from dodo_dsl.margins import with_margin
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
 from dodo_dsl.search import itinerary
 from dodo_dsl.search.itinerary import FIRST
 from tests.check import examples
+from tests.cli.search.drives import LIMIT, SPEC, stages, start_of
 from tests.run import scripted
-from tests.run.scripted import Events, ScriptedBackend, ScriptedBackends
-
-SPEC = """\
-vary:
-  start: {from: -8 cm, to: 8 cm, nominal: 0 cm}
-  clutter: {from: 0, to: 100, nominal: 0}
-environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, clutter: "${vary.clutter}"}}}
-action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {x: "${vary.start}"}}}
-# docker-compose.yml
-services:
-  driver:
-    image: driver
-    command: --cid=111
-    x-dodo: {in: [], out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}
-    x-dodo-process: [python, driver.py]
-"""
-LIMIT = 0.05
-"""Drives that begin further to the right fail."""
-BROKEN = -0.06
-"""Those that begin further to the left end in error."""
-
-
-def start_of(plan: Plan) -> float:
-    pose = next(service for service in plan.services if service.name == "pose")
-    return float(next(flag.value for flag in pose.flags if flag.name == "x"))
-
-
-def stages(plan: Plan) -> dict[str, Events]:
-    start = start_of(plan)
-    ready = {
-        layer: [(0.0, Ready(service.name)) for service in plan.layer(layer)]
-        for layer in ("environment", "action", "evaluation")
-    }
-    if start < BROKEN:
-        return {**ready, "begin": [(0.0, Exited("track", 1))]}
-    ok = start <= LIMIT
-    check = with_margin({"name": "start", "value": start, "limit": {"max": LIMIT}, "unit": "m", "ok": ok})
-    reason = "it drove" if ok else f"hit wall right after {start:.3f} m"
-    return {**ready, "begin": [(0.0, VerdictEvent("track", ok, reason, (check,))), (0.0, Exited("track", 0))]}
+from tests.run.scripted import ScriptedBackend, ScriptedBackends
 
 
 @dataclass
@@ -249,6 +210,54 @@ def test_the_drive_at_the_nominal_values_decides_too(search: Search) -> None:
 def test_whole_numbers_where_a_parameter_needs_them(search: Search) -> None:
     search("example", "--runs", "8")
     assert result()["worst"]["values"]["clutter"].isdecimal()
+
+
+def test_an_ended_search_is_finished_without_looking_for_more(search: Search) -> None:
+    search("example", "--runs", "9", "--sweep")
+    code, _ = search("example", "--runs", "100", "--finish")
+    found = result()
+    assert (code, found["judged"] + found["errors"], len(found["shrunk"])) == (1, 9, 1)
+    assert all(slug.startswith("example--run-1") for slug in search.driven), (
+        "shrinking drives have the numbers after it"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--study", "x"), "--study names a search in a database: name that with --storage"),
+        (("--storage", ""), "--storage takes the address of a PostgreSQL server"),
+        (("--storage", "postgresql://u:ge@heim@h/db"), "the address after --storage cannot be read"),
+    ],
+)
+def test_a_storage_that_cannot_be_used(search: Search, words: tuple[str, ...], said: str) -> None:
+    if words[0] == "--storage":
+        pytest.importorskip("psycopg")
+    code, out = search("example", *words)
+    assert (code, search.driven) == (2, [])
+    assert said in out and "heim" not in out
+
+
+def test_an_unreachable_server_is_an_error_without_the_password(search: Search) -> None:
+    pytest.importorskip("psycopg")
+    code, out = search("example", "--storage", "postgresql://u:geheim@127.0.0.1:1/db")
+    assert (code, search.driven) == (3, [])
+    assert "dodo search: postgresql://u:***@127.0.0.1:1/db cannot be used: " in out and "geheim" not in out
+
+
+def test_an_address_in_a_wrong_place_shows_no_password(search: Search, capsys: pytest.CaptureFixture[str]) -> None:
+    address = "postgresql://u:geheim@h/db"
+    said = "".join(search(*words)[1] for words in ([address], ["example", address], ["example", "--runs", address]))
+    assert "geheim" not in said + capsys.readouterr().err
+
+
+def test_a_missing_driver_of_databases_is_said(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "psycopg" else real(name))
+    assert search("example", "--storage", "postgresql://u@h/db") == (
+        2,
+        "dodo search: --storage needs psycopg: pip install 'dodo-dsl[search,storage]'\n",
+    )
 
 
 @pytest.mark.parametrize(

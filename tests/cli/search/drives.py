@@ -1,0 +1,44 @@
+"""A test whose drives end as their values say, without processes."""
+
+from dodo_dsl.margins import with_margin
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
+from tests.run.scripted import Events
+
+SPEC = """\
+vary:
+  start: {from: -8 cm, to: 8 cm, nominal: 0 cm}
+  clutter: {from: 0, to: 100, nominal: 0}
+environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, clutter: "${vary.clutter}"}}}
+action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {x: "${vary.start}"}}}
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=111
+    x-dodo: {in: [], out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}
+    x-dodo-process: [python, driver.py]
+"""
+LIMIT = 0.05
+"""Drives that begin further to the right fail."""
+BROKEN = -0.06
+"""Those that begin further to the left end in error."""
+
+
+def start_of(plan: Plan) -> float:
+    pose = next(service for service in plan.services if service.name == "pose")
+    return float(next(flag.value for flag in pose.flags if flag.name == "x"))
+
+
+def stages(plan: Plan) -> dict[str, Events]:
+    start = start_of(plan)
+    ready = {
+        layer: [(0.0, Ready(service.name)) for service in plan.layer(layer)]
+        for layer in ("environment", "action", "evaluation")
+    }
+    if start < BROKEN:
+        return {**ready, "begin": [(0.0, Exited("track", 1))]}
+    ok = start <= LIMIT
+    check = with_margin({"name": "start", "value": start, "limit": {"max": LIMIT}, "unit": "m", "ok": ok})
+    reason = "it drove" if ok else f"hit wall right after {start:.3f} m"
+    return {**ready, "begin": [(0.0, VerdictEvent("track", ok, reason, (check,))), (0.0, Exited("track", 0))]}
