@@ -24,7 +24,10 @@ from dodo_dsl.spec.settings import Settings
 
 @dataclass(frozen=True)
 class Study:
-    """``key`` names what all drives of a search have in common: test with its files, application, ranges and seed."""
+    """``key`` names what all drives of a search have in common: test with its files, application, ranges and seed.
+
+    It is the same wherever the repository is.
+    """
 
     checked: Checked
     test: ResolvedTest
@@ -39,7 +42,7 @@ def study_of(options: argparse.Namespace, work: Path, stdout: TextIO) -> Study:
     if checked.ok:
         _refuse(options.test, tests)
     try:
-        made = compiler.plan(checked, work / "nominal") if checked.ok else None
+        made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
     except compiler.NoApplication:
         raise UsageError(NO_APPLICATION) from None
     problems = ordered([*checked.diagnostics, *(made.problems if made else ())])

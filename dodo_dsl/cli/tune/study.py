@@ -54,7 +54,7 @@ def tune_study(options: argparse.Namespace, work: Path, stdout: TextIO) -> TuneS
     """The study of the options; raises UsageError where the application or a test cannot be tuned."""
     checked = selection.select(options.tests, (), options.application, Settings("lockstep", options.isolation))
     try:
-        made = compiler.plan(checked, work / "nominal") if checked.ok else None
+        made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
     except compiler.NoApplication:
         raise UsageError(NO_APPLICATION) from None
     problems = ordered([*checked.diagnostics, *(made.problems if made else ())])

@@ -4,6 +4,7 @@ import asyncio
 import importlib.util
 import json
 import os
+import shutil
 import signal
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -188,6 +189,14 @@ def test_another_map_is_another_search(search: Search) -> None:
     (map_file,) = Path.cwd().glob("**/plain/map.json")
     map_file.write_text(f"{map_file.read_text()} ")
     assert search("example", "--runs", "1")[0] == 2
+
+
+def test_a_search_goes_on_in_another_folder(search: Search, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    search("example", "--runs", "1")
+    shutil.copytree(tmp_path, tmp_path / "deeper" / "copy")
+    monkeypatch.chdir(tmp_path / "deeper" / "copy")
+    assert search("example", "--runs", "1")[0] == 1
+    assert search.driven == []
 
 
 def test_a_search_by_time_begins_no_drive_after_it(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
