@@ -14,7 +14,7 @@ from dodo_dsl.check.resolve import ResolvedTest, resolve
 from dodo_dsl.check.unchanged import Findings, Surroundings, check_again
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.emit.output_folder import pipeline_folder
-from dodo_dsl.emit.pipeline import pipeline_problems
+from dodo_dsl.emit.pipeline import SearchJobs, pipeline_problems
 from dodo_dsl.emit.render import File, render_pipeline
 from dodo_dsl.plan.build import Compiled, build
 from dodo_dsl.source import Reader, Scalar, read
@@ -155,17 +155,20 @@ def _registries_above(paths: Sequence[Path], reader: Reader) -> list[Path]:
     return [folder for file in files if file for folder in load_deployment(file, reader)[0].registry]
 
 
-def plan(checked: Checked, out: Path) -> Compilation:
-    """The Plans of tests without errors, for the output folder ``out``; raises NoApplication without one."""
+def plan(checked: Checked, out: Path, searches: Sequence[SearchJobs] = ()) -> Compilation:
+    """The Plans of tests without errors, for the output folder ``out``; raises NoApplication without one.
+
+    The pipeline has the jobs of ``searches``, too.
+    """
     if checked.application is None:
         raise NoApplication
     compiled, problems = build(
         checked.tests, checked.manifests, checked.deployment, checked.application, out.resolve(), checked.settings
     )
-    child = render_pipeline(compiled.suite, pipeline_folder(out))
+    child = render_pipeline(compiled.suite, pipeline_folder(out), searches)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    for problem in pipeline_problems(compiled.suite, child.text):
+    for problem in pipeline_problems(compiled.suite, child.text, searches):
         span = replace(problem.span, file=shown.get(problem.span.file, problem.span.file))
         problems.append(replace(problem, span=span))
     return Compilation(compiled, child, tuple(ordered(problems)))

@@ -3,7 +3,7 @@
 import math
 import shlex
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
@@ -20,6 +20,7 @@ MAX_JOBS_FREE = 500
 MAX_JOBS_PARSED = 850
 
 _SPARE_MINUTES = 10
+_SEARCH_OPTIONS = '--study "$CI_PIPELINE_ID" --report dodo-search $DODO_SEARCH_OPTIONS'
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,26 @@ class PipelineJob:
 
 
 @dataclass(frozen=True)
+class SearchJobs:
+    """A test that ``workers`` jobs search together, and the compose files of its application, as a job names them."""
+
+    test: str
+    slug: str
+    workers: int
+    application: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """No test's name has a space."""
+        return f"search {self.slug}"
+
+    @property
+    def script(self) -> str:
+        files = "".join(f" --application {shlex.quote(file)}" for file in self.application)
+        return f'dodo search {shlex.quote(self.test)}{files} --storage "$DODO_SEARCH_STORAGE" {_SEARCH_OPTIONS}'
+
+
+@dataclass(frozen=True)
 class Pipeline:
     """The stages in order, whether a gate precedes hil, whether images are pulled, and the jobs."""
 
@@ -44,17 +65,20 @@ class Pipeline:
     gate: bool
     images: bool
     jobs: tuple[PipelineJob, ...]
+    searches: tuple[SearchJobs, ...] = ()
 
 
-def pipeline(suite: Suite, folder: str) -> Pipeline:
+def pipeline(suite: Suite, folder: str, searches: Sequence[SearchJobs] = ()) -> Pipeline:
     """The jobs of a suite; ``folder`` is the output folder's name, as the parent's artifact has it."""
     levels = {plan.level for plan in suite.plans}
     gate = _gated(suite)
     stages = [stage for stage in LEVELS if stage in levels]
     if gate:
         stages.insert(stages.index("hil"), "gate")
+    if searches:
+        stages.append("search")
     jobs = tuple(_job(plan, gate, folder) for plan in suite.plans)
-    return Pipeline(tuple(stages), gate, any(_needs_images(plan) for plan in suite.plans), jobs)
+    return Pipeline(tuple(stages), gate, any(_needs_images(plan) for plan in suite.plans), jobs, tuple(searches))
 
 
 def _gated(suite: Suite) -> bool:
@@ -81,7 +105,7 @@ def _job(plan: Plan, gate: bool, folder: str) -> PipelineJob:
     )
 
 
-def pipeline_problems(suite: Suite, text: str) -> list[Diagnostic]:
+def pipeline_problems(suite: Suite, text: str, searches: Sequence[SearchJobs] = ()) -> list[Diagnostic]:
     """What GitLab would refuse in the child pipeline ``text`` of a suite, at the test with the largest share.
 
     A job's name has at most 255 characters. The archive of an artifact that holds the YAML of a child pipeline has at
@@ -94,7 +118,7 @@ def pipeline_problems(suite: Suite, text: str) -> list[Diagnostic]:
     Sources: https://docs.gitlab.com/administration/cicd/limits/ and
     https://docs.gitlab.com/user/gitlab_com/#cicd
     """
-    return [*_names(suite), *_whole(suite, text)]
+    return [*_names(suite), *_whole(suite, text, sum(search.workers + 1 for search in searches))]
 
 
 def _names(suite: Suite) -> Iterator[Diagnostic]:
@@ -104,8 +128,9 @@ def _names(suite: Suite) -> Iterator[Diagnostic]:
             yield Diagnostic(_place(plan), RULE, message, "shorten the test's name, or the keys and values of 'matrix'")
 
 
-def _whole(suite: Suite, text: str) -> Iterator[Diagnostic]:
-    jobs, size = len(suite.plans) + _gated(suite), len(text.encode())
+def _whole(suite: Suite, text: str, more: int) -> Iterator[Diagnostic]:
+    """Problems of all jobs together; ``more`` are those that run no single test."""
+    jobs, size = len(suite.plans) + _gated(suite) + more, len(text.encode())
     hint = "compile fewer tests into one pipeline, or a smaller 'matrix'"
     if size > MAX_BYTES:
         message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab accepts 5 MB"

@@ -2,7 +2,8 @@
 
 import functools
 import textwrap
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import jinja2
@@ -12,7 +13,7 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.emit.containers import containers
-from dodo_dsl.emit.pipeline import CHILD, pipeline
+from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.source import resolve
@@ -121,11 +122,11 @@ def render_plan(plan: Plan) -> list[File]:
     return files
 
 
-def render_pipeline(suite: Suite, folder: str) -> File:
+def render_pipeline(suite: Suite, folder: str, searches: Sequence[SearchJobs] = ()) -> File:
     """The child pipeline; ``folder`` is the output folder's name, as the parent's artifact has it."""
-    child = pipeline(suite, folder)
-    text = _render("child.gitlab-ci.yml.j2", stages=child.stages, gate=child.gate, images=child.images, jobs=child.jobs)
-    return File(CHILD, text)
+    child = pipeline(suite, folder, searches)
+    parts = {field.name: getattr(child, field.name) for field in fields(child)}
+    return File(CHILD, _render("child.gitlab-ci.yml.j2", **parts))
 
 
 def render(suite: Suite, folder: str) -> list[File]:

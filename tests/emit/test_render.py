@@ -9,11 +9,14 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import compiler
-from dodo_dsl.emit.pipeline import CHILD
-from dodo_dsl.emit.render import render_plan
+from dodo_dsl.emit.pipeline import CHILD, SearchJobs
+from dodo_dsl.emit.render import render_pipeline, render_plan
+from dodo_dsl.plan.model import Suite
 from tests.emit.readers import ROOT, tree
 
 GOLDEN = Path(__file__).parent / "golden"
+SEARCH = "search.gitlab-ci.yml"
+"""A child pipeline that also searches its test."""
 
 
 def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -24,6 +27,9 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     first = {plan.spec: plan.slug for plan in reversed(made.compiled.suite.plans)}  # one instance of a matrix
     plans = [plan for plan in made.compiled.suite.plans if first[plan.spec] == plan.slug]
     files = {file.path: file.text for plan in plans for file in render_plan(plan)} | {CHILD: made.pipeline.text}
+    searched = made.compiled.suite.plans[-1]
+    search = SearchJobs(searched.name, searched.slug, 4, ("docker-compose.yml",))
+    files[SEARCH] = render_pipeline(Suite((searched,)), "generated", [search]).text
     if update_goldens:
         shutil.rmtree(GOLDEN, ignore_errors=True)
         for path, text in files.items():

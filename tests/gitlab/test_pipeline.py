@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.emit.pipeline import pipeline_problems
+from dodo_dsl.emit.pipeline import SearchJobs, pipeline_problems
 from dodo_dsl.emit.render import render_pipeline
 from dodo_dsl.plan.model import Place, Plan, Suite
 
@@ -41,6 +41,40 @@ def test_hil_waits_for_a_gate_behind_all_others(plan: Plan, on_rig: OnRig) -> No
     assert "needs" not in made["gate"], "a job without needs waits for all stages before its own"
     assert made["hil"]["needs"][1:] == ["gate"]
     assert made["dil"]["needs"][1:] == []
+
+
+def searching(plan: Plan, *searches: SearchJobs) -> str:
+    return render_pipeline(Suite((plan,)), "generated", searches).text
+
+
+def test_workers_search_together_and_another_job_reports(
+    plan: Plan, tmp_path: Path, accepted: Callable[..., None]
+) -> None:
+    text = searching(plan, SearchJobs("my drive", "my-drive", 4, ("a b.yml",)), SearchJobs("other", "other", 1))
+    (tmp_path / "child.yml").write_text(text)
+    accepted(tmp_path / "child.yml")
+    made = yaml.safe_load(text)
+    workers, report = made["search my-drive"], made["search my-drive report"]
+    assert (made["stages"], workers["stage"]) == (["sil", "search"], "search")
+    assert (workers["parallel"], workers["needs"], workers["allow_failure"]) == (4, [], {"exit_codes": [1]})
+    assert workers["script"] == [
+        "dodo search 'my drive' --application 'a b.yml' --storage \"$DODO_SEARCH_STORAGE\" "
+        '--study "$CI_PIPELINE_ID" --report dodo-search $DODO_SEARCH_OPTIONS'
+    ]
+    assert report["script"] == [f"{workers['script'][0]} --finish"]
+    assert report["needs"] == [{"job": "search my-drive", "artifacts": True}]
+    assert report["rules"] == [{"when": "always"}], "also when no worker came to the end"
+    assert workers["artifacts"] == report["artifacts"] == {
+        "when": "always", "expire_in": "4 weeks", "paths": ["dodo-search/"]
+    }  # fmt: skip
+    assert "parallel" not in made["search other"]
+
+
+def test_jobs_of_searches_count(plan: Plan) -> None:
+    plans = [replace(plan, slug=f"test-{n}") for n in range(480)]
+    assert problems(*plans) == []
+    (problem,) = pipeline_problems(Suite(tuple(plans)), "", [SearchJobs("x", "x", 20)])
+    assert "has 501 jobs" in problem.message
 
 
 def test_without_gates_or_others_hil_waits_for_nothing(plan: Plan, on_rig: OnRig) -> None:

@@ -157,6 +157,8 @@ def test_the_page_s_variables_are_those_of_the_templates() -> None:
         "DODO_IMAGE",
         "DODO_IMAGE_LANE_FINDER",
         "DODO_API_TOKEN",
+        "DODO_SEARCH_STORAGE",
+        "DODO_SEARCH_OPTIONS",
     }:
         assert f"  {variable}:" in templates, variable
     (block,) = [b for b in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "include:" in b]

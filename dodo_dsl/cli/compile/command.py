@@ -17,6 +17,7 @@ from dodo_dsl.cli.numbers import patience, positive
 from dodo_dsl.compiler import Checked, NoApplication, plan
 from dodo_dsl.diagnostics import Diagnostic, forget_lines, has_errors, ordered, shown_path
 from dodo_dsl.emit.output_folder import differences, stale_folders, write
+from dodo_dsl.emit.pipeline import SearchJobs
 from dodo_dsl.plan.model import Suite
 from dodo_dsl.terminal import printable
 
@@ -27,10 +28,12 @@ EXAMPLES = """examples:
   dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
   dodo compile --check --format gitlab     the same as a code quality report; sarif and junit are others
   dodo compile --forecast 4 --times dodo-report    how long the pipeline takes with four runners
+  dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
 """
 
 
 _OVERHEAD_S = 10.0  # from when GitLab gives a job to a runner until its test begins, and at its end
+_WORKERS = 4
 _SHORT_DIFF = 30  # lines that are shown without --diff
 _MOST_NAMES = 8
 _MOST_PASSES = 5
@@ -57,6 +60,10 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="results or report with times; repeatable (default: the history here)")  # fmt: skip
     parser.add_argument("--overhead", type=patience, default=_OVERHEAD_S, metavar="S",
                         help="seconds that a runner needs to begin a job (default: %(default)g)")  # fmt: skip
+    parser.add_argument("--search", action="append", default=[], metavar="TEST",
+                        help="add jobs that together search TEST; repeatable")  # fmt: skip
+    parser.add_argument("--workers", type=positive, metavar="N",
+                        help=f"with --search: jobs of each search (default: {_WORKERS})")  # fmt: skip
     selection.add_application(parser)
 
 
@@ -65,6 +72,8 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         raise UsageError("--forecast needs the pipeline, which --check does not write: call dodo compile without it")
     if options.fix and not options.check:
         raise UsageError("--fix applies to --check")
+    if options.workers and not options.search:
+        raise UsageError("--workers are jobs of a search: name its test with --search")
     checked = selection.select(options.path, (), options.application)
     if options.fix:
         checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
@@ -101,7 +110,7 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = list(checked.diagnostics), {}
     if checked.ok and checked.application is not None and checked.specs:
-        made = plan(checked, options.output)
+        made = plan(checked, options.output, _searches(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)
@@ -146,7 +155,7 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         _show(list(checked.diagnostics), options.format, checked, stdout)
         return Exit.USAGE
     try:
-        made = plan(checked, options.output)
+        made = plan(checked, options.output, _searches(options))
     except NoApplication:
         raise UsageError(NO_APPLICATION) from None
     diagnostics = ordered([*checked.diagnostics, *made.problems])
@@ -164,6 +173,14 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
             stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
     (stdout if options.format == "text" else stderr).write(expected)
     return Exit.OK
+
+
+def _searches(options: argparse.Namespace) -> tuple[SearchJobs, ...]:
+    if not options.search:
+        return ()
+    from dodo_dsl.cli.compile.searches import search_jobs
+
+    return search_jobs(options.search, options.workers or _WORKERS, options.application)
 
 
 def _forecast(suite: Suite, options: argparse.Namespace) -> str:

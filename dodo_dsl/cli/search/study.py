@@ -40,7 +40,7 @@ def study_of(options: argparse.Namespace, work: Path, stdout: TextIO) -> Study:
     checked = selection.select([options.test], (), options.application, Settings("lockstep", options.isolation))
     tests = checked.tests
     if checked.ok:
-        _refuse(options.test, tests)
+        refuse(options.test, tests)
     try:
         made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
     except compiler.NoApplication:
@@ -67,7 +67,8 @@ def digests(checked: Checked, spec: Spec, work: Path) -> list[str]:
     return [f"{file.target} {hashlib.sha256(file.source.read_bytes()).hexdigest()}" for file in files]
 
 
-def _refuse(word: str, tests: tuple[ResolvedTest, ...]) -> None:
+def refuse(word: str, tests: tuple[ResolvedTest, ...]) -> None:
+    """Raises UsageError unless the word means one test in lockstep with ranges."""
     if len(tests) != 1:
         names = ", ".join(test.spec.slug for test in tests[:5])
         raise UsageError(f"'{word}' means {len(tests)} tests, expected one: {names}")
