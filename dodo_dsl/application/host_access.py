@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from dodo_dsl.application.compose_paths import is_path
 from dodo_dsl.application.interpolation import split_outside
 
 CONTAINER_CAPABILITIES = frozenset(
@@ -50,6 +51,16 @@ def mount(volume: Any) -> Mount:
     if len(parts) == 1:
         return Mount("", _clean(parts[0]))
     return Mount(_clean(parts[0]), _clean(parts[1]), "ro" in ",".join(parts[2:]).split(","))
+
+
+def named_volume(volume: Any) -> str:
+    """The name of the volume that an entry of ``volumes`` mounts; empty for a path, a variable, or without a name."""
+    source = mount(volume).source
+    if is_path(source) or "$" in source:
+        return ""
+    if isinstance(volume, dict):
+        return source if volume.get("type") == "volume" else ""
+    return "" if len(source) == 1 or source.startswith("\\\\") else source  # a path of Windows
 
 
 def _clean(path: str) -> str:

@@ -52,7 +52,7 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _words, _references, _access, _single):
+    for rule in (_name, _words, _references, _volumes, _access, _single):
         yield from rule(written)
 
 
@@ -96,6 +96,19 @@ def _references(written: Written) -> Iterator[Diagnostic]:
             hint = did_you_mean(name, written.others)
             message = f"'{key}' of '{written.name}' names the unknown service '{name}'"
             yield _bad(written.place(key), message, hint)
+
+
+def _volumes(written: Written) -> Iterator[Diagnostic]:
+    """Named volumes that are not declared, which compose refuses; a test may set the variables of others."""
+    known = written.around.volumes
+    for item, volume in enumerate(written.plain.get("volumes") or ()):
+        name = host_access.named_volume(volume)
+        if name and name not in known:
+            steps = ("volumes", item, "source") if isinstance(volume, dict) else ("volumes", item)
+            near = did_you_mean(name, known)
+            hint = near if near.startswith("did") else f"declare it at the end of the file: 'volumes: {{{name}: }}'"
+            message = f"'{written.name}' mounts the volume '{name}', which the top-level 'volumes' do not declare"
+            yield _bad(place(written.node, steps, written.key), message, hint)
 
 
 def _access(written: Written) -> Iterator[Diagnostic]:

@@ -1,5 +1,7 @@
 """Mounts and references of services: hardware, the host, and other services."""
 
+from typing import Any
+
 import pytest
 
 from dodo_dsl.application import host_access
@@ -45,6 +47,26 @@ def test_what_a_mount_gives_access_to(source: str, hardware: bool, machine: bool
     assert host_access.is_hardware(found) is hardware
     assert host_access.is_machine(found) is machine
     assert host_access.is_shared_memory(found) is memory
+
+
+@pytest.mark.parametrize(
+    ("volume", "expected"),
+    [
+        ("maps:/maps", "maps"),
+        ("a/b:/maps:ro", "a/b"),
+        ("/maps", ""),
+        ("./maps:/maps", ""),
+        ("$MAPS:/maps", ""),
+        ("maps-${CAR}:/maps", ""),
+        ("d:/maps", ""),
+        ("\\\\server\\maps:/maps", ""),
+        ({"type": "volume", "source": "maps"}, "maps"),
+        ({"type": "volume"}, ""),
+        ({"type": "bind", "source": "maps"}, ""),
+    ],
+)
+def test_named_volumes(volume: Any, expected: str) -> None:
+    assert host_access.named_volume(volume) == expected
 
 
 def test_reading_is_harmless() -> None:

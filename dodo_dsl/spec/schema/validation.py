@@ -165,8 +165,8 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
     message = f"{place.name} {found}, expected {' or '.join(names)}"
     is_scalar = isinstance(error.instance, int | float)
-    hint = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
-    hint = hint or error.schema.get(_HINT, "")
+    in_quotes = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
+    hint = error.schema.get(_HINT, in_quotes)
     if not hint and wanted == "array" and "examples" in error.schema:
         hint = f"write for example {place.name[1:-1]}: [{', '.join(error.schema['examples'][0])}]"
     span = place.span

@@ -1,0 +1,110 @@
+"""Values of keys in a service of a compose file, right and wrong ones; the volume ``known`` is declared."""
+
+RIGHT = """
+stop_grace_period: 1m30s
+stop_grace_period: 1.5s
+stop_grace_period: "0"
+stop_grace_period: 5µs
+stop_grace_period: ${STOP:-5s}
+volumes: [known:/data, "${V:-known}:/more"]
+volumes: [./data:/data, /data]
+volumes: [{type: volume, source: known, target: /data}]
+volumes: [{type: volume, target: /data}, {type: tmpfs, target: /t}, {type: bind, source: ./data, target: /b}]
+volumes: ["d:/data"]
+restart: always
+restart: "no"
+restart: no
+restart: on-failure
+restart: on-failure:3
+restart: unless-stopped
+restart: ""
+restart: ${R:-always}
+cpus: 1
+cpus: 0.5
+cpus: "0.5"
+cpus: "1e1"
+cpus: .5
+cpus: 0x10
+cpus: ${C:-1}
+tmpfs: /run
+tmpfs: [/run, /var]
+tmpfs: "/run:size=3m"
+user: a
+user: "1000:1000"
+user: ${U}
+healthcheck: {test: a, interval: 5s, timeout: 1m, start_period: 1h2m, start_interval: 500ms, retries: 3}
+healthcheck: {test: [CMD, a], interval: "${I:-5s}", retries: "3"}
+healthcheck: {test: ["${T:-CMD}", a]}
+healthcheck: {disable: "yes"}
+healthcheck: {test: a, x-note: b}
+init: true
+init: "true"
+init: yes
+init: Y
+init: "OFF"
+init: ${I:-true}
+read_only: "yes"
+privileged: "no"
+labels: {a: b, c: 5, d: true, e: null, f: "${B}"}
+labels: [a=b, c]
+labels: []
+x-extra: {stop_grace_period: soon, init: perhaps}
+""".strip().splitlines()
+
+WRONG = """
+stop_grace_period: soon
+stop_grace_period: 10
+stop_grace_period: "10"
+stop_grace_period: 1m 30s
+stop_grace_period: 5S
+stop_grace_period:
+stop_grace_period: [5s]
+volumes: [data:/data]
+volumes: [known:/data, "data:/more:ro"]
+volumes: [a/b:/data]
+volumes: [{type: volume, source: data, target: /data}]
+restart: 3
+restart: [always]
+restart:
+cpus: many
+cpus: "0x10"
+cpus: ""
+cpus: true
+cpus: [1]
+tmpfs: {a: b}
+tmpfs: 3
+tmpfs: [3]
+user: [a]
+user: 1000
+user: {a: b}
+healthcheck: {test: a, interval: soon}
+healthcheck: {test: a, interval: 5}
+healthcheck: {test: a, timeout: soon}
+healthcheck: {test: a, start_period: soon}
+healthcheck: {test: a, start_interval: soon}
+healthcheck: {test: a, retries: many}
+healthcheck: {test: a, retries: -1}
+healthcheck: {test: [curl, a]}
+healthcheck: {disable: perhaps}
+init: perhaps
+init: 1
+init: "1"
+init: ""
+read_only: perhaps
+tty: perhaps
+stdin_open: perhaps
+privileged: perhaps
+labels: 5
+labels: a
+labels: {a: [b]}
+labels: [5]
+""".strip().splitlines()
+
+RIGHT_FOR_UP = ["restart: any", "restart: always:0", "restart: on-failure:+3"]
+"""These start, as well as those of ``RIGHT``; those of ``WRONG_FOR_UP`` do not, though compose reads them."""
+WRONG_FOR_UP = ["restart: sometimes", "restart: Always", "restart: always:3", "restart: on-failure:-1"]
+
+
+def compose_file(value: str, image: str = "x") -> str:
+    """A compose file with the value in its only service."""
+    return f"services:\n  a:\n    image: {image}\n    command: --cid=111\n    {value}\nvolumes: {{known: }}\n"

@@ -1,0 +1,38 @@
+"""Values in a compose file are refused where compose refuses them, and nowhere else."""
+
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.application.read import read_application
+from dodo_dsl.diagnostics import has_errors
+from tests.application.compose_values import RIGHT, RIGHT_FOR_UP, WRONG, WRONG_FOR_UP, compose_file
+from tests.emit.readers import compose
+
+
+@pytest.mark.parametrize(
+    ("value", "is_right"),
+    [(v, True) for v in (*RIGHT, *RIGHT_FOR_UP)] + [(v, False) for v in (*WRONG, *WRONG_FOR_UP)],
+)
+def test_dodo_judges(value: str, is_right: bool, tmp_path: Path) -> None:
+    file = tmp_path / "compose.yml"
+    file.write_text(compose_file(value))
+    _, problems = read_application(file)
+    assert has_errors(problems) != is_right, problems
+
+
+@pytest.mark.slow
+def test_compose_judges_alike(tmp_path: Path) -> None:
+    command = [*compose(), "-f", "-", "config", "-q"]
+
+    def is_right(value: str) -> bool:
+        text = compose_file(value)
+        return not subprocess.run(
+            command, input=text.encode(), cwd=tmp_path, capture_output=True, check=False
+        ).returncode
+
+    with ThreadPoolExecutor(2) as pool:
+        judged = dict(zip([*RIGHT, *WRONG], pool.map(is_right, [*RIGHT, *WRONG]), strict=True))
+    assert judged == dict.fromkeys(RIGHT, True) | dict.fromkeys(WRONG, False)
