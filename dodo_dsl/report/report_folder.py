@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
@@ -75,23 +76,22 @@ def write_report(
     past: check_history.Past | None = None,
     circumstances: results.Circumstances = results.NO_CIRCUMSTANCES,
     place: Path | None = None,
+    drawn: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> list[str]:
-    """Writes the results first, draws each drive, and returns sentences on what could not be drawn.
+    """Writes the results first, draws each test, and returns sentences on what could not be drawn.
 
     ``times`` are those of all runs of these tests on this machine, ``past`` what their checks measured in the latest;
-    they are drawn as well. ``place`` is where ``folder`` will be moved to, if it will.
+    they are drawn as well. ``place`` is where ``folder`` will be moved to, if it will. ``drawn`` are the slugs of tests
+    that ``draw_test`` has drawn, with its sentences.
     """
     outcomes = [results.writable(outcome) for outcome in outcomes]
     circumstances = results.writable_circumstances(circumstances)
     folder.mkdir(parents=True, exist_ok=True)
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
-    problems = []
-    for outcome in outcomes:
-        if outcome.slug in tests:
-            try:
-                _draw(folder / outcome.slug, outcome, tests[outcome.slug])
-            except Exception as error:  # noqa: BLE001  (the data comes from services, and no plot may cost a verdict)
-                problems.append(f"the drive of {outcome.name} cannot be drawn: {error}")
+    problems = [problem for outcome in outcomes for problem in drawn.get(outcome.slug, ())]
+    missing = [outcome for outcome in outcomes if outcome.slug in tests and outcome.slug not in drawn]
+    for outcome in missing:
+        problems += _draw_drive(folder, outcome, tests[outcome.slug])
     for name in OF_MACHINE:
         (folder / name).unlink(missing_ok=True)
     if past:
@@ -101,33 +101,50 @@ def write_report(
             atomic.write_text(folder / TIMES, draw_times(times, platform.node() or "this machine"))
         except Exception as error:  # noqa: BLE001  (as above)
             problems.append(f"the times of these tests cannot be drawn: {error}")
+    problems += _write_shared(folder, tests)
     # first, as the pages take the most room
     write_summaries(folder, outcomes, circumstances=circumstances, place=place)
-    problems += _write_pages(folder, outcomes, tests)
-    if tests:
+    if missing and (folder / viewer.SHARED).is_dir():
+        for outcome in missing:
+            problems += _write_page(folder, outcome, tests[outcome.slug])
         _write_linked(folder, outcomes, None, circumstances, place)
     return problems
 
 
-def _write_pages(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Drawable]) -> Iterator[str]:
-    """A page for each test, with sentences on what went wrong."""
+def draw_test(folder: Path, outcome: Outcome, test: Drawable) -> list[str]:
+    """Draws a test's drive and page in a report's ``folder``, and returns sentences on what could not be drawn."""
+    outcome = results.writable(outcome)
+    return [*_draw_drive(folder, outcome, test), *_write_page(folder, outcome, test)]
+
+
+def _draw_drive(folder: Path, outcome: Outcome, test: Drawable) -> Iterator[str]:
+    try:
+        _draw(folder / outcome.slug, outcome, test)
+    except Exception as error:  # noqa: BLE001  (the data comes from services, and no plot may cost a verdict)
+        yield f"the drive of {outcome.name} cannot be drawn: {error}"
+
+
+def _write_page(folder: Path, outcome: Outcome, test: Drawable) -> Iterator[str]:
     from dodo_dsl.report.viewer import page
 
-    if not tests:
-        return
     try:
-        page.write_shared(folder)
+        page.write(folder / outcome.slug, outcome, test.plan, test.folder)
+    except Exception as error:  # noqa: BLE001  (as for pictures)
+        yield f"the page of {outcome.name} cannot be written: {error}"
+
+
+def _write_shared(folder: Path, tests: Mapping[str, Drawable]) -> Iterator[str]:
+    """What the pages of all tests use; without it there is no page."""
+    from dodo_dsl.report.viewer import page
+
+    try:
+        if tests:
+            page.write_shared(folder)
     except OSError as error:
         shutil.rmtree(folder / viewer.SHARED, ignore_errors=True)
+        for slug in tests:
+            (folder / slug / viewer.PAGE).unlink(missing_ok=True)
         yield f"the pages of the tests cannot be written: {error}"
-        return
-    for outcome in outcomes:
-        if outcome.slug in tests:
-            test = tests[outcome.slug]
-            try:
-                page.write(folder / outcome.slug, outcome, test.plan, test.folder)
-            except Exception as error:  # noqa: BLE001  (as for pictures)
-                yield f"the page of {outcome.name} cannot be written: {error}"
 
 
 def write_summaries(

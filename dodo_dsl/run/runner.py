@@ -16,6 +16,7 @@ from dodo_dsl.run.schedule import CorePool, Schedule
 from dodo_dsl.run.standing import Standing
 
 BackendName = Literal["process", "docker", "mixed"]
+Finished = Callable[[Job, Outcome], None]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -51,6 +52,10 @@ class Policy:
     retries: int = 0
 
 
+def _nothing(_job: Job, _outcome: Outcome) -> None:
+    """The default of what is called when a test has ended."""
+
+
 class Runner:
     """Runs jobs, as many at once as ``schedule`` allows, in its order. Times are of the event loop's clock, in s.
 
@@ -75,6 +80,7 @@ class Runner:
         )
         self._undecided: dict[str, tuple[Job, Outcome]] = {}
         self._stop = False
+        self._finished: Finished = _nothing
 
     def not_run(self) -> list[NotRun]:
         """The tests that never began, in the order in which they would have."""
@@ -87,8 +93,12 @@ class Runner:
         """Sentences on the tests that were left running."""
         return self._attempts.kept
 
-    async def run(self, jobs: Sequence[Job]) -> list[Outcome]:
-        """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown."""
+    async def run(self, jobs: Sequence[Job], finished: Finished = _nothing) -> list[Outcome]:
+        """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown.
+
+        ``finished`` is called for each test as soon as its outcome is final.
+        """
+        self._finished = finished
         await self.backends.prepare([job.plan for job in jobs], self.progress.note)
         self._waiting = self.schedule.ordered(jobs)
         tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}
@@ -158,6 +168,7 @@ class Runner:
         self._began.pop(job.plan.slug, None)
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
+        self._finished(job, outcome)
         self._show_rest()
         return outcome
 

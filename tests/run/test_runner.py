@@ -47,6 +47,7 @@ class Scene:
     lengths: dict[str, float] = field(default_factory=dict)
     progress: Recorded = field(default_factory=Recorded)
     signals: tuple[tuple[float, int], ...] = ()
+    finished: Callable[[Job, Outcome], None] = lambda job, outcome: None
     begins: list[tuple[float, int]] = field(default_factory=list)
     """When attempts began, and how many tests ran then."""
 
@@ -58,7 +59,7 @@ class Scene:
     async def _run(self, given: list[Job]) -> list[Outcome]:
         for seconds, number in self.signals:
             send_signal_after(seconds, number)
-        return await self.runner.run(given)
+        return await self.runner.run(given, self.finished)
 
     def _expected(self, job: Job) -> float:
         return self.lengths.get(job.plan.slug, 1.0)
@@ -89,6 +90,13 @@ def test_the_longest_begins_first_and_outcomes_keep_the_order_of_the_jobs(scene:
     assert scene.progress.notes == ["prepared 3"]
     assert [left for _, left in scene.progress.rests] == [2, 1]
     assert scene.backends.closed == 1
+
+
+def test_each_test_is_handed_on_as_soon_as_it_has_ended(scene: Scene) -> None:
+    scene.capacity, seen = 1.0, []
+    scene.finished = lambda job, outcome: seen.append((job.plan.slug, outcome.outcome, len(scene.backends.began)))
+    scene.run(*plans("ab"))
+    assert seen == [("a", "passed", 1), ("b", "passed", 2)]
 
 
 @pytest.mark.parametrize(("capacity", "most"), [(1.0, 1), (2.5, 2), (9.0, 5)])

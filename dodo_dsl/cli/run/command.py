@@ -22,10 +22,11 @@ from dodo_dsl.cli.run.loading import Loading, loading
 from dodo_dsl.cli.run.profile import COMMAND, FILE_NAME, Profile, ProfiledProgress
 from dodo_dsl.cli.run.report_lock import reserved
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, signals_interrupt, undisturbed
-from dodo_dsl.cli.run.written import write
+from dodo_dsl.cli.run.written import drawable, write
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.report.drawn import Drawings
 from dodo_dsl.report.next_report import next_report
 from dodo_dsl.report.results import Circumstances
 from dodo_dsl.report.viewer.names import LOGS
@@ -203,8 +204,8 @@ def run(
     in_place = runner.keep
     with recording(source) as record, next_report(report.resolve(), slugs, kept, in_place) as target:
         jobs = [replace(job, report=target.folder / job.plan.slug) for job in jobs]
-        with runner.progress:
-            outcomes = asyncio.run(runner.run(jobs))
+        with Drawings(target.folder) as drawings, runner.progress:
+            outcomes = asyncio.run(runner.run(jobs, lambda job, outcome: drawings.begin(outcome, drawable(job))))
         not_run = runner.not_run()
         logs = {job.plan.slug: job.report / LOGS for job in jobs}
         summary.write(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, logs)
@@ -212,7 +213,9 @@ def run(
         profile.enter(COMMAND, "report")
         with undisturbed():
             circumstances = Circumstances((record(),), tuple(not_run))
-            written = write(target, report, jobs, runner.backends.name, outcomes, others, circumstances)
+            written = write(
+                target, report, jobs, runner.backends.name, outcomes, others, circumstances, drawings.problems()
+            )
     stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
     if said is not Verbosity.QUIET or not written.is_whole:
         stdout.write(f"{written.sentence}\n")

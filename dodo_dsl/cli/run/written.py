@@ -1,6 +1,6 @@
 """The end of a run on disk: its report, and the history of its tests."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,11 @@ class Written:
     is_whole: bool = True
 
 
+def drawable(job: Job) -> Drawable:
+    """What of a job is drawn in its report."""
+    return Drawable(job.plan, job.folder)
+
+
 def write(
     target: NextReport,
     shown: Path,
@@ -30,10 +35,12 @@ def write(
     outcomes: Sequence[Outcome],
     others: Sequence[Outcome],
     circumstances: results.Circumstances,
+    drawn: Mapping[str, Sequence[str]],
 ) -> Written:
     """Puts the report of these jobs in its place, which is ``shown`` to users; ``others`` are of an earlier run.
 
-    Where no test began, the report before stays.
+    ``drawn`` are the slugs of tests that are drawn already, with sentences on problems. Where no test began, the report
+    before stays.
     """
     if not outcomes and circumstances.not_run and (target.place / results.FILE_NAME).is_file():
         return Written(f"report: no test of this run began, so {shown / 'index.html'} is still that of the run before")
@@ -42,11 +49,11 @@ def write(
     history.add((tests[outcome.slug], outcome) for outcome in outcomes)
     times = history.times({(job.plan.spec, job.test) for job in jobs}, backend)
     past = {o.slug: history.checks(o.spec, tests[o.slug], o.backend, o.clock) for o in outcomes}
-    drawables = {job.plan.slug: Drawable(job.plan, job.folder) for job in jobs}
+    drawables = {job.plan.slug: drawable(job) for job in jobs}
     try:
         target.link_others()
         every = [*outcomes, *others]
-        problems = write_report(target.folder, every, drawables, times, past, circumstances, target.place)
+        problems = write_report(target.folder, every, drawables, times, past, circumstances, target.place, drawn)
         gone = target.take_place()
     except Exception as error:  # noqa: BLE001  (the outcomes are printed)
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"

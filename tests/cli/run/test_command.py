@@ -1,5 +1,6 @@
 """``dodo run``: what it prints, reports and exits with, on backends that report given events."""
 
+import asyncio
 import json
 import os
 import platform
@@ -21,6 +22,7 @@ from dodo_dsl.cli.run import command
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import to_json
+from dodo_dsl.report.viewer import page
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready
 from dodo_dsl.run.runner import Runner
@@ -245,10 +247,39 @@ def test_an_interrupt_leaves_the_other_tests_not_run(dodo: Command) -> None:
     assert [test["slug"] for test in document["not_run"]] == ["test--run-2", "test--run-3"]
 
 
+def test_an_interrupt_waits_for_no_page_of_a_test_before(dodo: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[str] = []
+    drawn_when_interrupted: list[str] = []
+    write = page.write
+
+    def written(folder: Path, *rest: Any) -> None:
+        write(folder, *rest)
+        drawn.append(folder.name)
+
+    class InterruptsLast(ScriptedBackend):
+        async def begin(self) -> None:
+            await super().begin()
+            if self.plan.slug == "test--run-3":
+                async with asyncio.timeout(100):
+                    while len(drawn) < 2:
+                        await asyncio.sleep(0.01)
+                drawn_when_interrupted.extend(drawn)
+                os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(page, "write", written)
+    dodo.backend = InterruptsLast
+    code, _, _ = dodo.run("-j", "1", "--repeat", "4")
+    assert code == 130
+    assert drawn_when_interrupted == ["test", "test--run-2"]
+    assert drawn == ["test", "test--run-2", "test--run-3"]
+    index = Path("report/index.html").read_text()
+    assert all(f'href="{slug}/drive.html"' in index for slug in drawn)
+
+
 def test_an_interrupt_before_any_test_leaves_the_report_before(dodo: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     dodo.run()
 
-    async def nothing(runner: Runner, jobs: Sequence[Job]) -> list[Outcome]:
+    async def nothing(runner: Runner, jobs: Sequence[Job], _: object) -> list[Outcome]:
         runner.interrupted, runner.skipped = True, list(jobs)
         return []
 
