@@ -41,6 +41,10 @@ class Fix:
     old: str
     new: str
 
+    def mended(self, text: str) -> str:
+        """The text at the span with the fix; as it is where it has changed meanwhile."""
+        return text.replace(self.old, self.new) if text.count(self.old) == 1 else text
+
 
 @dataclass(frozen=True, order=True)
 class Diagnostic:

@@ -4,9 +4,11 @@ from collections.abc import Callable
 from typing import Any, BinaryIO, TypeVar
 
 from lsprotocol import types
+from pygls.exceptions import JsonRpcInvalidParams
 
 from dodo_dsl.lsp.completion import TRIGGERS, completion
 from dodo_dsl.lsp.definition import definition
+from dodo_dsl.lsp.edits.rename import prepare, rename
 from dodo_dsl.lsp.hover import hover
 from dodo_dsl.lsp.outline import outline
 from dodo_dsl.lsp.scene import Scene
@@ -73,12 +75,28 @@ def _requests(server: DodoServer) -> None:
     def _outline(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol] | None:
         return _answer(server, params, outline)
 
+    @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
+    def _prepare_rename(params: types.PrepareRenameParams) -> types.Range | None:
+        return _answer(server, params, lambda scene: prepare(scene, params.position))
+
+    @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
+    def _rename(params: types.RenameParams) -> types.WorkspaceEdit | None:
+        return _answer(server, params, lambda scene: rename(scene, params.position, params.new_name))
+
+    @server.feature(
+        types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
+    )
+    def _code_action(params: types.CodeActionParams) -> list[types.CodeAction]:
+        return server.quick_fixes(params)
+
 
 def _answer(server: DodoServer, params: Any, work: Callable[[Scene], _Answer]) -> _Answer | None:
     """The answer to a request about a document; None where it fails, which the log then says."""
     try:
         scene = server.scene(params.text_document.uri)
         return work(scene) if scene else None
+    except JsonRpcInvalidParams:
+        raise  # a sentence for the user
     except Exception as error:  # noqa: BLE001
         log.exception("a request failed")
         server.say(f"a request failed: {type(error).__name__}: {error}")

@@ -9,11 +9,13 @@ from typing import Any
 
 from lsprotocol import types
 from lsprotocol.types import Diagnostic as ShownDiagnostic
+from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 
 from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.lsp.documents import Document, opened, path_of, saved_text, uri_of
+from dodo_dsl.lsp.edits.quick_fixes import quick_fixes
 from dodo_dsl.lsp.positions import Lines
 from dodo_dsl.lsp.project import Project, Projects, by_file, is_ours
 from dodo_dsl.lsp.scene import Scene, scene
@@ -37,6 +39,7 @@ class DodoServer(LanguageServer):
         self._task: asyncio.Task[None] | None = None
         self._stale = asyncio.Event()
         self._published: set[str] = set()
+        self._found: Mapping[Path, Sequence[Diagnostic]] = {}
 
     def lines(self, text: str) -> Lines:
         return Lines(text, self.workspace.position_codec)
@@ -48,11 +51,21 @@ class DodoServer(LanguageServer):
             return None
         return scene(path, self.lines(self.workspace.get_text_document(uri).source), self.projects)
 
+    def quick_fixes(self, params: types.CodeActionParams) -> list[types.CodeAction]:
+        """The fixes of the problems that the last check found in a document, of whatever kind its file is."""
+        uri = params.text_document.uri
+        path = path_of(uri)
+        found = self._found.get(path, ()) if path else ()
+        lines = self.lines(self.workspace.get_text_document(uri).source) if found else self.lines("")
+        return list(quick_fixes(found, uri, lines, params))
+
     def say(self, message: str) -> None:
         self.window_log_message(types.LogMessageParams(types.MessageType.Error, printable(message)))
 
     def report_server_error(self, error: Exception, source: Any) -> None:
-        """Errors are messages of the log and not of a window."""
+        """Errors are messages of the log and not of a window; what the editor's answer says needs none."""
+        if isinstance(error, JsonRpcInvalidParams):
+            return
         log.error("%s", error, exc_info=error)
         self.say(f"internal error: {error}")
 
@@ -94,7 +107,7 @@ class DodoServer(LanguageServer):
 
     def _publish(self, documents: Mapping[Path, Document], found: Iterable[Diagnostic]) -> None:
         """Shows the problems of each file, and clears files and open documents without any."""
-        grouped = by_file(found)
+        grouped = self._found = by_file(found)
         messages: dict[str, types.PublishDiagnosticsParams] = {}
         for path in {*grouped, *(path for path in documents if is_ours(path))}:
             document = documents.get(path)

@@ -47,11 +47,20 @@ class Editor:
         self.process.stdin.flush()
 
     def request(self, method: str, params: Any) -> Any:
+        answer = self._answer(method, params)
+        assert "error" not in answer, answer
+        return answer["result"]
+
+    def refusal(self, method: str, params: Any) -> str:
+        """The message with which the server refuses a request."""
+        message: str = self._answer(method, params)["error"]["message"]
+        return message
+
+    def _answer(self, method: str, params: Any) -> Message:
         number = next(self._ids)
         self.send(id=number, method=method, params=params)
         (answer,) = self.until(lambda m: m.get("id") == number and "method" not in m)
-        assert "error" not in answer, answer
-        return answer["result"]
+        return answer
 
     def until(self, *wanted: Callable[[Message], bool]) -> list[Message]:
         """The first message that each of the conditions holds for, of those that arrive from now on."""

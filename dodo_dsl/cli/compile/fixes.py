@@ -42,8 +42,7 @@ def _mended(path: Path, fixes: Fixes) -> str:
 
 def _line(line: str, span: Span, fix: Fix) -> str:
     start, end = span.column - 1, span.column - 1 + span.length
-    text = line[start:end]
-    return line[:start] + text.replace(fix.old, fix.new) + line[end:] if text.count(fix.old) == 1 else line
+    return line[:start] + fix.mended(line[start:end]) + line[end:]
 
 
 def _shown(lines: Iterable[str]) -> Iterator[str]:

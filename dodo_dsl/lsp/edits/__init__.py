@@ -1,0 +1,1 @@
+"""What the editor changes in a document for its user."""
