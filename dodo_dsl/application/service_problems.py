@@ -11,7 +11,7 @@ from dodo_dsl.application.access import filled
 from dodo_dsl.application.access.access_diagnostics import diagnostic, place
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, plain
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Node
 
 
@@ -58,10 +58,11 @@ def problems(written: Written) -> Iterator[Diagnostic]:
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
     """Unknown keys that begin like DoDo's."""
-    for word, entry in service.entries.items() if isinstance(service, source.Mapping) else ():
+    entries = service.entries if isinstance(service, source.Mapping) else {}
+    for word, entry in entries.items():
         if word.startswith("x-dodo") and word not in KEYS:
-            hint = did_you_mean(word, KEYS)
-            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint)
+            hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
+            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, fix=fix)
         elif word not in KEYS and word.startswith("x-do") and did_you_mean(word, KEYS).startswith("did"):
             message = f"neither compose nor DoDo uses the key '{word}'"
             yield Diagnostic(entry.key, "unknown-key", message, did_you_mean(word, KEYS), "warning")
@@ -95,7 +96,24 @@ def _references(written: Written) -> Iterator[Diagnostic]:
         else:
             hint = did_you_mean(name, written.others)
             message = f"'{key}' of '{written.name}' names the unknown service '{name}'"
-            yield _bad(written.place(key), message, hint)
+            fix = only_fix(name, written.others, _taken(written, key))
+            yield _bad(_of_name(written, key, name), message, hint, fix)
+
+
+def _taken(written: Written, key: str) -> list[str]:
+    """The services that a key cannot name, too: those that it names already, and the service itself."""
+    named = host_access.references(written.plain, written.containers)
+    return [written.name, *(name for other, name in named if other == key)]
+
+
+def _of_name(written: Written, key: str, name: str) -> Span:
+    """The place of a service's name in the value of a key."""
+    node = written.node.get(key)
+    if isinstance(node, source.Mapping) and name in node.entries:
+        return node.entries[name].key
+    items = node.items if isinstance(node, source.Sequence) else ()
+    fits = (item.span for item in items if isinstance(item, source.Scalar) and name in item.text.split(":"))
+    return next(fits, written.place(key))
 
 
 def _volumes(written: Written) -> Iterator[Diagnostic]:
@@ -105,10 +123,12 @@ def _volumes(written: Written) -> Iterator[Diagnostic]:
         name = host_access.named_volume(volume)
         if name and name not in known:
             steps = ("volumes", item, "source") if isinstance(volume, dict) else ("volumes", item)
-            near = did_you_mean(name, known)
-            hint = near if near.startswith("did") else f"declare it at the end of the file: 'volumes: {{{name}: }}'"
+            hint = did_you_mean(name, known)
+            hint = hint if hint.startswith("did") else f"declare it at the end of the file: 'volumes: {{{name}: }}'"
             message = f"'{written.name}' mounts the volume '{name}', which the top-level 'volumes' do not declare"
-            yield _bad(place(written.node, steps, written.key), message, hint)
+            near = only_fix(name, known)
+            fix = Fix(f"{name}:/", f"{near.new}:/") if near and isinstance(volume, str) else near
+            yield _bad(place(written.node, steps, written.key), message, hint, fix)
 
 
 def _access(written: Written) -> Iterator[Diagnostic]:
@@ -125,5 +145,5 @@ def _single(written: Written) -> Iterator[Diagnostic]:
             yield Diagnostic(written.place(key), "application-file", message, "", "warning")
 
 
-def _bad(span: Span, message: str, hint: str = "") -> Diagnostic:
-    return Diagnostic(span, "application-file", message, hint)
+def _bad(span: Span, message: str, hint: str = "", fix: Fix | None = None) -> Diagnostic:
+    return Diagnostic(span, "application-file", message, hint, fix=fix)

@@ -14,8 +14,8 @@ def diagnostic(finding: AccessFinding, node: Node, key: Span) -> Diagnostic:
     """A finding within a node, whose own key is at ``key``."""
     span = place(node, finding.steps, key)
     if finding.kind == "unknown":
-        last = finding.steps[-1]
-        return Diagnostic(_key(node, finding.steps, span), "unknown-key", finding.message, finding.hint or _new(last))
+        hint = finding.hint or _new(finding.steps[-1])
+        return Diagnostic(_key(node, finding.steps, span), "unknown-key", finding.message, hint, fix=finding.fix)
     if finding.kind == "limit":
         return Diagnostic(span, "application-limit", finding.message, finding.hint, "warning")
     if finding.kind == "left out":

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from dodo_dsl.application.access.compose_keys import Rows
-from dodo_dsl.diagnostics import did_you_mean
+from dodo_dsl.diagnostics import Fix, did_you_mean, only_fix
 
 Steps = tuple[str | int, ...]
 Kind = Literal["refused", "unknown", "hardware", "privilege", "port", "limit", "left out"]
@@ -41,9 +41,10 @@ class AccessFinding:
     message: str
     hint: str = ""
     kind: Kind = "refused"
+    fix: Fix | None = None
 
     def below(self, *steps: str | int) -> "AccessFinding":
-        return AccessFinding((*steps, *self.steps), self.message, self.hint, self.kind)
+        return AccessFinding((*steps, *self.steps), self.message, self.hint, self.kind, self.fix)
 
 
 def key_findings(what: str, rows: Rows, written: Mapping[str, Any], compiled: bool = False) -> Iterator[AccessFinding]:
@@ -52,7 +53,8 @@ def key_findings(what: str, rows: Rows, written: Mapping[str, Any], compiled: bo
         if str(key).startswith("x-"):
             continue
         if key not in rows:
-            yield AccessFinding((key,), f"unknown key '{key}' in {what}", did_you_mean(str(key), rows), "unknown")
+            hint, fix = did_you_mean(str(key), rows), only_fix(str(key), rows, written)
+            yield AccessFinding((key,), f"unknown key '{key}' in {what}", hint, "unknown", fix)
             continue
         treatment, why = rows[key]
         if value in (None, False, "", "false", [], {}):

@@ -39,6 +39,34 @@ FIXED = {
     "kind": ("closed-loop", "closed_loop"),
     "clock": ("lockstep", "lockstpe"),
 }
+COMPOSE = """\
+services:
+  perception: {image: team/perception, command: --cid=111, volumes: ["models:/models:ro"]}   # sees
+  steering:
+    image: team/steering
+    command: --cid=111
+    depends_on: [perception]
+    x-dodo: {out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}
+volumes: {models: }
+"""
+FIXED_APPLICATION = {
+    "service": ("depends_on: [perception]", "depends_on: [perceptoin]"),
+    "service as a key": ("depends_on: [perception]", "depends_on: {perceptoin: {condition: service_started}}"),
+    "service and its alias": ("depends_on: [perception]", 'links: ["perceptoin:eyes"]'),
+    "namespace": ("depends_on: [perception]", "ipc: service:perceptoin"),
+    "key": ("depends_on: [perception]", "depend_on: [perception]"),
+    "key of DoDo": ("x-dodo: {out:", "x-dodo: {outt:"),
+    "volume": ('"models:/models:ro"', '"modles:/modles:ro"'),
+    "volume in the long form": (
+        '["models:/models:ro"]',
+        "[{type: volume, source: modles, target: /m}]",
+    ),
+}
+LEFT_APPLICATION = {
+    "the service itself": ("depends_on: [perception]", "depends_on: [steerin]"),
+    "a service that is there already": ("depends_on: [perception]", "depends_on: [perception, perceptoin]"),
+    "a key that is there already": ("image: team/steering", "image: team/steering\n    imagee: team/steering"),
+}
 LEFT = {
     "a unit that may be one of several": ("freq: 10 Hz", "freq: 10"),
     "a line that may go on with the text above": ("# comments stay\n", "\nNote:without leaving it.\n"),
@@ -84,6 +112,37 @@ def test_line_ends_stay_and_all_is_fixed_at_once(spec: Path) -> None:
     spec.write_bytes(text.replace("\n", "\r\n").encode())
     assert check("--fix")[0] == 0
     assert spec.read_bytes() == SPEC.replace("\n", "\r\n").encode()
+
+
+def compose(spec: Path, text: str) -> Path:
+    """The compose file of an application, which the deployment of the test names."""
+    spec.write_text(SPEC)
+    file = spec.parents[2] / "docker-compose.yml"
+    file.write_text(text)
+    (spec.parents[2] / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
+    return file
+
+
+@pytest.mark.parametrize("case", FIXED_APPLICATION)
+def test_the_only_fix_of_a_compose_file_is_written(case: str, spec: Path) -> None:
+    right, wrong = FIXED_APPLICATION[case]
+    file = compose(spec, COMPOSE.replace(right, wrong))
+    assert check()[0] == 2
+    assert check("--fix")[0] == 0
+    expected = (
+        wrong.replace("perceptoin", "perception").replace("modles:/m", "models:/m").replace(": modles", ": models")
+    )
+    expected = expected.replace("depend_on", "depends_on").replace("outt", "out")
+    assert file.read_text() == COMPOSE.replace(right, expected)
+
+
+@pytest.mark.parametrize("case", LEFT_APPLICATION)
+def test_what_has_no_single_fix_in_a_compose_file_stays(case: str, spec: Path) -> None:
+    text = COMPOSE.replace(*LEFT_APPLICATION[case])
+    file = compose(spec, text)
+    assert check("--fix") == check()
+    assert check()[0] == 2
+    assert file.read_text() == text
 
 
 @pytest.mark.parametrize("case", LEFT)
