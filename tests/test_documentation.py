@@ -156,7 +156,8 @@ def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
 def test_the_readme_has_a_table_of_the_services() -> None:
     manifests = [(folder, yaml.safe_load((folder / "service.yml").read_text())) for folder in MANIFESTS]
     rows = [
-        f"| [{about['name']}](services/{folder.name}) | {', '.join(about['layers'])} | {about['description']} |"
+        f"| [{about['name']}](services/{folder.name}/README.md)"
+        f" | {', '.join(about['layers'])} | {about['description']} |"
         for folder, about in manifests
         if not about.get("automatic")
     ]
