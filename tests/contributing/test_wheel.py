@@ -1,0 +1,79 @@
+"""The wheel: the same bytes from the same sources, and enough in it to compile without the libraries of running."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("dodo_dsl", "locks", "schemas", "services", "templates", "tests_registry")
+FILES = ("pyproject.toml", "README.md", "LICENSE")
+RUNNING = ("av", "cv2", "docker", "matplotlib", "scipy", "trimesh")
+"""Libraries that draw, decode and run, which compiling has no use for."""
+WITHOUT = f"""\
+import sys
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {RUNNING!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Missing())
+sys.path.insert(0, sys.argv.pop(1))
+from dodo_dsl import package_data
+from dodo_dsl.__main__ import run
+assert package_data.root().name == "_data", "the wheel's own files"
+sys.exit(run())
+"""
+
+
+def built(sources: Path, date: int, umask: int) -> Path:
+    """The wheel of a checkout of its own, whose files have this date and these permissions."""
+    skipped = shutil.ignore_patterns("__pycache__", "*.pyc")
+    before = os.umask(umask)
+    try:
+        for name in PARTS:
+            shutil.copytree(ROOT / name, sources / name, ignore=skipped, copy_function=shutil.copyfile)
+        for name in FILES:
+            shutil.copyfile(ROOT / name, sources / name)
+    finally:
+        os.umask(before)
+    for path in sources.rglob("*"):
+        os.utime(path, (date, date))
+    words = ("-m", "hatchling", "build", "--target", "wheel")
+    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"}
+    subprocess.run([sys.executable, *words], cwd=sources, env=environment, check=True, capture_output=True)
+    (wheel,) = (sources / "dist").iterdir()
+    return wheel
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built(tmp_path_factory.mktemp("first"), 1_500_000_000, 0o022)
+
+
+def test_two_builds_have_the_same_bytes(wheel: Path, tmp_path: Path) -> None:
+    again = built(tmp_path, 1_700_000_001, 0o027)
+    assert again.name == wheel.name
+    with ZipFile(wheel) as one, ZipFile(again) as other:
+        described = [[(i.filename, i.CRC, i.date_time, i.external_attr) for i in z.infolist()] for z in (one, other)]
+    assert described[0] == described[1]
+    assert again.read_bytes() == wheel.read_bytes()
+
+
+def test_tests_compile_without_the_libraries_of_running(wheel: Path, tmp_path: Path) -> None:
+    with ZipFile(wheel) as packed:
+        packed.extractall(tmp_path / "site")
+    repository = tmp_path / "repository"
+    repository.mkdir()
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    for words in (["new", "--deployment"], ["new", "sil-first"], ["compile", "--check"], ["compile"]):
+        command = [sys.executable, "-I", "-c", WITHOUT, str(tmp_path / "site"), *words]
+        done = subprocess.run(command, cwd=repository, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert (repository / "generated/sil-first/test.json").is_file()
+    assert (repository / "generated/child.gitlab-ci.yml").is_file()
