@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from dodo_dsl import package_data
+from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
@@ -208,6 +208,10 @@ def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
 def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{place.name} is {_shown(error.instance)}, expected {error.validator_value}"
     hint = f"write '{place.name[1:-1]}: {error.validator_value}'"
+    if place.name == "'dodo'" and type(error.instance) is int and error.instance > error.validator_value:
+        message = f"the file is of language version {error.instance}, the installed DoDo {__version__} reads "
+        message += f"{error.validator_value}"
+        hint = f"install a DoDo that reads version {error.instance}, or, if the number is a mistake, {hint}"
     yield Diagnostic(place.span, "wrong-value", message, hint)
 
 

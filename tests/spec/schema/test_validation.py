@@ -2,6 +2,7 @@
 
 import pytest
 
+from dodo_dsl import __version__
 from dodo_dsl.spec.schema.validation import validate
 from tests.check import examples
 from tests.source.nodes import mapping
@@ -22,7 +23,12 @@ CASES = {
     ),
     "level:": ("wrong-value", None, None),
     "level: sill": ("wrong-value", "'sill' is not a value of 'level', expected sil, dil, hil", "did you mean 'sil'?"),
-    "dodo: 2": ("wrong-value", "'dodo' is '2', expected 1", "write 'dodo: 1'"),
+    "dodo: 2": (
+        "wrong-value",
+        f"the file is of language version 2, the installed DoDo {__version__} reads 1",
+        "install a DoDo that reads version 2, or, if the number is a mistake, write 'dodo: 1'",
+    ),
+    "dodo: 0": ("wrong-value", "'dodo' is '0', expected 1", "write 'dodo: 1'"),
     "timeout: 60": ("wrong-unit", "'timeout': '60' has no unit, expected a time in s", "write for example '60 s'"),
     "timeout: 60 m": ("wrong-unit", None, "write for example '60 s'"),
     "response: {over: 5 %}": ("missing-key", "'response' has 'over' without 'max'", ""),
