@@ -18,15 +18,15 @@ from benchmarks.ledger.ledger import Bench
 SECONDS = {
     "bench_bus": 36,
     "bench_camera": 37,
-    "bench_compile": 85,
+    "bench_compile": 80,
     "bench_docker": 60,
-    "bench_lockstep": 75,
-    "bench_parallel": 75,
+    "bench_lockstep": 70,
+    "bench_parallel": 70,
     "bench_pull": 25,
     "bench_rec": 38,
     "bench_recorder": 36,
-    "bench_replay": 45,
-    "bench_report": 30,
+    "bench_replay": 40,
+    "bench_report": 20,
     "bench_services": 37,
 }
 """Budgets of the benchmarks; of ten minutes they leave some for those that have to be ended."""
