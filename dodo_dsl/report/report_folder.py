@@ -1,10 +1,12 @@
 """A run's report folder."""
 
 import contextlib
+import errno
+import functools
 import os
 import platform
 import shutil
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -87,8 +89,10 @@ def write_report(
     outcomes = [results.writable(outcome) for outcome in outcomes]
     circumstances = results.writable_circumstances(circumstances)
     folder.mkdir(parents=True, exist_ok=True)
-    atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
     problems = [problem for outcome in outcomes for problem in drawn.get(outcome.slug, ())]
+    with_room = functools.partial(_with_room, folder, drawn, problems.append)
+    text = results.to_json(outcomes, circumstances)
+    with_room(lambda: atomic.write_text(folder / results.FILE_NAME, text))
     missing = [outcome for outcome in outcomes if outcome.slug in tests and outcome.slug not in drawn]
     for outcome in missing:
         problems += _draw_drive(folder, outcome, tests[outcome.slug])
@@ -103,12 +107,31 @@ def write_report(
             problems.append(f"the times of these tests cannot be drawn: {error}")
     problems += _write_shared(folder, tests)
     # first, as the pages take the most room
-    write_summaries(folder, outcomes, circumstances=circumstances, place=place)
+    with_room(lambda: write_summaries(folder, outcomes, circumstances=circumstances, place=place))
     if missing and (folder / viewer.SHARED).is_dir():
         for outcome in missing:
             problems += _write_page(folder, outcome, tests[outcome.slug])
         _write_linked(folder, outcomes, None, circumstances, place)
     return problems
+
+
+def _with_room(folder: Path, drawn: Collection[str], say: Callable[[str], None], write: Callable[[], None]) -> None:
+    """Writes what counts more than the pages of tests, of which some are drawn: on a full disk without them."""
+    try:
+        write()
+    except OSError as error:
+        if error.errno != errno.ENOSPC or not drawn:
+            raise
+        for slug in drawn:
+            _without_page(folder / slug)
+        write()
+        say(f"the pages of the tests are left out: {error.strerror}")
+
+
+def _without_page(place: Path) -> None:
+    for name in viewer.FILES:
+        with contextlib.suppress(OSError):
+            (place / name).unlink(missing_ok=True)
 
 
 def draw_test(folder: Path, outcome: Outcome, test: Drawable) -> list[str]:
@@ -130,6 +153,7 @@ def _write_page(folder: Path, outcome: Outcome, test: Drawable) -> Iterator[str]
     try:
         page.write(folder / outcome.slug, outcome, test.plan, test.folder)
     except Exception as error:  # noqa: BLE001  (as for pictures)
+        _without_page(folder / outcome.slug)
         yield f"the page of {outcome.name} cannot be written: {error}"
 
 
@@ -143,7 +167,7 @@ def _write_shared(folder: Path, tests: Mapping[str, Drawable]) -> Iterator[str]:
     except OSError as error:
         shutil.rmtree(folder / viewer.SHARED, ignore_errors=True)
         for slug in tests:
-            (folder / slug / viewer.PAGE).unlink(missing_ok=True)
+            _without_page(folder / slug)
         yield f"the pages of the tests cannot be written: {error}"
 
 

@@ -50,3 +50,29 @@ def test_pages_without_what_they_share_go(tmp_path: Path, monkeypatch: pytest.Mo
     problems = write_report(tmp_path, [OUTCOME], {"test": test}, drawn=drawings.problems())
     assert problems == ["the pages of the tests cannot be written: no room"]
     assert "drive.html" not in (tmp_path / "index.html").read_text()
+
+
+def test_on_a_full_disk_results_have_the_room_of_pages(small_disk: Path, tmp_path: Path) -> None:
+    test = Drawable(Bench(tmp_path).plan(), tmp_path)
+    with Drawings(small_disk) as drawings:
+        drawings.begin(OUTCOME, test)
+    data = small_disk / OUTCOME.slug / "drive.js"
+    data.write_bytes(data.read_bytes() + bytes(28_000))
+    with (small_disk / "full").open("wb", buffering=0) as file, pytest.raises(OSError, match="No space left"):
+        while True:
+            file.write(bytes(4096))
+    problems = write_report(small_disk, [OUTCOME], {OUTCOME.slug: test}, drawn=drawings.problems())
+    assert "the pages of the tests are left out: No space left on device" in problems
+    assert OUTCOME.name in (small_disk / "results.json").read_text()
+    assert not data.exists()
+
+
+def test_half_a_page_is_none(small_disk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: Path) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr(page, "write_html", refuse)
+    with Drawings(small_disk) as drawings:
+        drawings.begin(OUTCOME, Drawable(Bench(tmp_path).plan(), tmp_path))
+    assert drawings.problems()[OUTCOME.slug] == [f"the page of {OUTCOME.name} cannot be written: no room"]
+    assert not (small_disk / OUTCOME.slug / "drive.js").exists()
