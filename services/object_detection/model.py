@@ -14,6 +14,9 @@ from services.object_detection.score import DetectionLimits, Rules, Score
 from services.object_detection.silence import JudgedFrame, Silence
 from services.object_detection.truth import Truth
 
+_OTHER_CLOCK = 10.0
+"""Sample times farther than this, in s, from when their frame came are of another clock."""
+
 
 class DetectionEvaluator(Evaluator):
     """Consumes detections, and the truth where ``truth`` is None, in test time (microseconds).
@@ -169,9 +172,14 @@ class DetectionEvaluator(Evaluator):
             return
         counts = compare(frame.found.labelled(), true, self._rules.iou, self._rules.labels)
         order = frame.key.number if self._truth and self._truth.frames == "number" else frame.key.time
-        time = self.elapsed(frame.since)
+        time = self._time(frame)
         key = {"time": time, "sample-time": frame.key.time, "sample-id": frame.key.number}
         self._count(counts, JudgedFrame(order, f"at {time:.2f} s", frame.answered), key)
+
+    def _time(self, frame: DetectedFrame) -> float:
+        """When a frame was sampled, in s; when it came, where its sample time is of another clock, as in recordings."""
+        is_near = abs(frame.key.time - frame.since) <= _OTHER_CLOCK * MICROSECONDS
+        return self.elapsed(frame.key.time if is_near else frame.since)
 
     def _true(self, frame: DetectedFrame) -> Sequence[LabelledBox] | None:
         """The true boxes of a frame; each picture of a file holds for one frame, unless there is one for all."""

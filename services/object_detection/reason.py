@@ -1,5 +1,7 @@
 """The verdict on a perception in one sentence."""
 
+from collections.abc import Sequence
+
 from services.base import Check, Verdict
 from services.object_detection.score import MEASURES, DetectionLimits, Score
 
@@ -9,8 +11,9 @@ def verdict(score: Score, limits: DetectionLimits, during: str) -> Verdict:
     checks = score.checks(limits)
     if not score.answered:
         return Verdict("failed", _silence(score, during), checks)
-    faults = [_fault(check, score) for check in checks if not check.ok]
-    if faults:
+    broken = [check for check in checks if not check.ok]
+    if broken:
+        faults = [_fault(check, score) for check in _telling(broken, [label for label, _ in score.counts])]
         return Verdict("failed", "; ".join(faults) + _kinds(score) + _worst(score) + _aside(score), checks)
     total = score.counts.total()
     kept = ", ".join(
@@ -18,6 +21,20 @@ def verdict(score: Score, limits: DetectionLimits, during: str) -> Verdict:
     )
     found = f"found {total.hits} of {total.hits + total.missed} objects in {_count(score.frames, 'frame')}"
     return Verdict("passed", f"{found}, with {_count(total.false, 'false detection')}: {kept}{_aside(score)}", checks)
+
+
+def _telling(broken: Sequence[Check], labels: Sequence[str]) -> list[Check]:
+    """Without those that others imply: F1 beside precision or recall, and classes where all of them fail alike."""
+    names = {check.name for check in broken}
+    told = []
+    for check in broken:
+        measure, _, label = check.name.partition("-")
+        of = f"-{label}" if label else ""
+        is_implied = measure == "f1" and bool({f"precision{of}", f"recall{of}"} & names)
+        alike = {f"{measure}-{each or 'unnamed'}" for each in labels}
+        if not is_implied and not (label and measure in MEASURES and {measure, *alike} <= names):
+            told.append(check)
+    return told
 
 
 def _silence(score: Score, during: str) -> str:

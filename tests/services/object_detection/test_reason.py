@@ -45,3 +45,34 @@ def test_a_measure_without_a_value_says_why() -> None:
         "precision has no value (at least 0.1), as nothing was detected; "
         "recall has no value (at least 0.1), as there was nothing to detect"
     )
+
+
+ALL = DetectionLimits(precision=0.9, recall=0.9, f1=0.9, each_class=True)
+
+
+def by_class(**counts: Counts) -> Score:
+    return Score(CountsByClass(counts), frames=2, answered=2)
+
+
+def test_what_all_classes_do_alike_is_told_once() -> None:
+    """The classes, and F1, say no more then; the checks still have them."""
+    failed = verdict(by_class(yellow=Counts(0, 2, 2), blue=Counts(0, 1, 1)), ALL, "")
+    assert failed.reason == (
+        "precision is 0 (at least 0.9), with 3 false detections beside 0 found; "
+        "recall is 0 (at least 0.9), with 3 missed beside 0 found"
+    )
+    assert sum(not check.ok for check in failed.checks) == 9
+
+
+def test_a_class_that_is_worse_than_another_is_named() -> None:
+    reason = verdict(by_class(yellow=Counts(0, 0, 3), blue=Counts(3, 0, 0)), ALL, "").reason
+    assert reason == (
+        "recall is 0.5 (at least 0.9), with 3 missed beside 3 found; "
+        "precision of yellow has no value (at least 0.9), as nothing was detected; "
+        "recall of yellow is 0 (at least 0.9), with 3 missed beside 0 found"
+    )
+
+
+def test_f1_alone_is_told() -> None:
+    reason = verdict(score(8, 1, 1), DetectionLimits(precision=0.8, recall=0.8, f1=0.9), "").reason
+    assert reason == "F1 is 0.8889 (at least 0.9), with 1 false detection and 1 missed beside 8 found"
