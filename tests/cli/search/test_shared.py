@@ -106,7 +106,8 @@ def test_four_workers_of_which_one_is_killed_search_like_one(
     together = sum((drives[name] for name in names), Counter[str]())
     again = {slug: number - drives[alone][slug] for slug, number in together.items()}
     assert together.keys() == drives[alone].keys()
-    assert {slug: more for slug, more in again.items() if more} == {begun("a")[-1]: 1}, "only its last drive was lost"
+    lost = begun("a")[-1]  # which may have been its second try, after an error
+    assert {slug: more for slug, more in again.items() if more} == {lost: begun("a").count(lost)}
     ((rows, points, numbers),) = database.sql(
         "select count(*), count(distinct point), count(distinct number) from dodo_drive"
     )
