@@ -1,7 +1,6 @@
 """An application that harms whom it can reach, and drives nobody.
 
-It ends when there is a file /stop/now, at the latest after ten minutes. It leaves others some of the processor: what it
-does is tried, not how much of it.
+It ends when there is a file /stop/now, at the latest after ten minutes.
 
 python3 hostile.py --cid=111 --name=video0.argb --harm=flood|groups|memory|tmp
 """
@@ -32,12 +31,12 @@ def request(name: str, **fields: float) -> bytes:
 
 
 def flood() -> None:
-    """Some 2,000 datagrams a second, garbage and large ones, on the test's own bus."""
+    """Some 15,000 datagrams a second, garbage and large ones, on the test's own bus."""
     junk = encode_frame(Envelope(5000, os.urandom(20_000), 0, 0, 0, 0))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for turn in itertools.count():
             sender.sendto(junk if turn % 2 else os.urandom(100), group(CID))
-            if turn % 20 == 0:
+            if turn % 200 == 0:
                 time.sleep(0.01)
 
 
@@ -52,7 +51,7 @@ def groups() -> None:
                 if cid != CID:
                     for datagram in (steering, pedal, frame):
                         sender.sendto(datagram, group(cid))
-            time.sleep(0.25)
+            time.sleep(0.05)
 
 
 def memory() -> None:
@@ -67,7 +66,7 @@ def memory() -> None:
             segment = sysv_ipc.SharedMemory(int(line.split()[0]))
             segment.write(b"\0" * segment.size)
             segment.detach()
-        time.sleep(0.1)
+        time.sleep(0.02)
 
 
 def tmp() -> None:
