@@ -36,7 +36,7 @@ class Bodies:
         self._radius = np.repeat([copies.shape.radius for copies in models], counts)
         self._middle = np.concatenate([np.zeros((0, 3)), *map(_middles, models)])
         self.middles = self._middle
-        """The middle (3,) of each body's bounding sphere, in the world."""
+        """The middle (3,) of each body's bounding sphere, in the world; solids, which come later, are none of these."""
         self._leaf = tree.locate(self._middle)
         self.names = [copies.name for copies in models for _ in copies.turns]
         """The model's name of each body."""

@@ -35,8 +35,7 @@ class Optics:
         self._development = Development(sensor or Sensor())
         shape = (self.wide.height, self.wide.width, 4)
         self._ideal = np.empty(shape, np.uint8)
-        self._sum = np.zeros(shape, np.uint16) if shutter > 0.0 else None
-        self._part = np.empty(shape, np.uint16)
+        self._sums = np.empty((2, *shape), np.uint16) if shutter > 0.0 else None
 
     def expose(
         self, renderer: Renderer, motion: CameraMotion, mounted: CameraPose, sample_time: int, out: Image
@@ -47,10 +46,10 @@ class Optics:
         """
         ideal = self._ideal if self.lens else out
         steps = motion.steps(self.wide, self._shutter)
-        if self._sum is None or steps == 1:
+        if self._sums is None or steps == 1:
             renderer.render(motion.pose.carrying(mounted), ideal)
         else:
-            self._blend(renderer, motion, mounted, steps, self._sum, ideal)
+            self._blend(renderer, motion, mounted, steps, self._sums, ideal)
         if self.lens:
             self.lens.apply(ideal, out)
         for overlay in self._overlays:
@@ -63,14 +62,15 @@ class Optics:
         motion: CameraMotion,
         mounted: CameraPose,
         steps: int,
-        total: npt.NDArray[np.uint16],
+        sums: npt.NDArray[np.uint16],
         ideal: Image,
     ) -> None:
         """The mean of ``steps`` pictures while the shutter is open, that of the middle of it drawn whole."""
         poses = [motion.after(((step + 0.5) / steps - 0.5) * self._shutter).carrying(mounted) for step in range(steps)]
         middle = poses.pop(steps // 2)
+        total, wide = sums
         total.fill(0)
         for picture in renderer.render_around(middle, poses, ideal):
-            np.copyto(self._part, picture)
-            cv2.add(total, self._part, dst=total)  # faster than to add numbers of two sizes
+            np.copyto(wide, picture)  # as to add numbers of two sizes takes longer
+            cv2.add(total, wide, dst=total)
         cv2.convertScaleAbs(total, dst=ideal, alpha=1 / steps)
