@@ -23,9 +23,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from benchmarks.gl_peer import GlPeer, ssim
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, cost_row, rate_row, report
+from benchmarks.pictures.gl_peer import GlPeer, ssim
 from dodo_dsl import package_data
 from services.virtual_camera.camera import CameraPose, Pinhole
 from services.virtual_camera.draw.light import Light

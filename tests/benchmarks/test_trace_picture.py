@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from benchmarks.trace_picture import main
+from benchmarks.pictures.trace_picture import main
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -20,7 +20,7 @@ FOVY = math.radians(48.8)
 @pytest.fixture(scope="module")
 def peer():
     pytest.importorskip("moderngl", reason="the package moderngl is not here")
-    from benchmarks import gl_peer
+    from benchmarks.pictures import gl_peer
 
     try:
         gl_peer.GlPeer(MAPS / "straight", 64, 48, FOVY)

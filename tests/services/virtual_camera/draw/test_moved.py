@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.gl_peer import ssim
+from benchmarks.pictures.gl_peer import ssim
 from dodo_dsl import package_data
 from services.virtual_camera.camera import CameraPose
 from services.virtual_camera.draw.render import Renderer
