@@ -10,21 +10,19 @@ from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.rules import (
     camera_sources,
     clocks,
-    files,
     goals,
     layers,
     levels,
-    limits,
     memories,
     messages,
     names,
     parameters,
     producers,
-    references,
     rigs,
     services,
     variables,
 )
+from dodo_dsl.check.rules.inputs import files, limits, references
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from lsprotocol import types
 
-from dodo_dsl.check.rules import references
+from dodo_dsl.check.rules.inputs import references
 from dodo_dsl.lsp import schema_keys
 from dodo_dsl.lsp.hover import parameter_text, service_text
 from dodo_dsl.lsp.incomplete import Cursor, cursor

@@ -6,7 +6,7 @@ from pathlib import Path
 from lsprotocol import types
 from pygls.workspace import PositionCodec
 
-from dodo_dsl.check.rules.references import MAP
+from dodo_dsl.check.rules.inputs.references import MAP
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.lsp.documents import saved_text, uri_of
 from dodo_dsl.lsp.positions import Lines

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl.check import context
-from dodo_dsl.check.rules import files, references
+from dodo_dsl.check.rules.inputs import files, references
 from dodo_dsl.compiler import Checked, load, plan, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.lsp.texts import LoadedSpecs, Texts

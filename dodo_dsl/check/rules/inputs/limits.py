@@ -6,7 +6,7 @@ A test that can only pass says nothing about the application.
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.rules.references import entries
+from dodo_dsl.check.rules.inputs.references import entries
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.arguments import ResolvedService
 

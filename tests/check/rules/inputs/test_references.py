@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules.references import check
+from dodo_dsl.check.rules.inputs.references import check
 from tests.check.contexts import context, found
 
 GOAL = "evaluation: {track: {uses: collision, with: {goal: finnish}}}\n"
