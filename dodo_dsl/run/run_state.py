@@ -160,7 +160,8 @@ class RunState:
     def _when(self) -> str:
         if self.began is None:
             return "during set-up"
-        return f"after {self.clock() - self.began:.1f} s"
+        wall = " of wall time" if self.plan.lockstep else ""  # the time of the test is another one then
+        return f"after {self.clock() - self.began:.1f} s{wall}"
 
     def _first_application(self) -> str:
         """The application's service whose last lines may explain why there is no answer."""

@@ -411,6 +411,14 @@ def clocked(*events: tuple[float, Event], wall_s: float = 60.0) -> ScriptedBacke
     return ScriptedBackend(plan(lockstep=wall_s), {**READY, "begin": events})
 
 
+def test_a_crash_in_lockstep_is_told_after_wall_time() -> None:
+    """The page of the drive counts the time of the test, which is another one."""
+    found = outcome(clocked((0.1, Time(40.0, False)), (3.0, Exited("app", 1)), (3.0, Time(40.5, True))))
+    assert found.reason == (
+        "application service 'app' ended with exit code 1 after 3.0 s of wall time, before the test was decided"
+    )
+
+
 def test_lockstep_has_the_time_of_its_clock() -> None:
     found = outcome(clocked((0.1, Time(0.0, False)), (30.0, PASSED), (30.0, ENDED), (31.0, Time(120.0, True))))
     assert (found.outcome, found.sim_s, found.execution_s) == ("passed", 120.0, 30.0)
