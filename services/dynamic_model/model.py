@@ -5,7 +5,8 @@ explicit Euler. SI units; body frame x forward, y left, yaw rate positive to the
 """
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, replace
 
 from dodo_dsl.opendlv.inputs.car import KIWI, Car
 
@@ -46,16 +47,47 @@ def step(motion: BodyMotion, wheel: float, pedal: float, dt: float, car: Car = K
     return BodyMotion(next_vx, next_vy, next_r)
 
 
+@dataclass(frozen=True)
+class Condition:
+    """How a car differs from its data sheet: worn tyres, a weak battery, a bent steering rod, slow actuators."""
+
+    grip: float = 1.0
+    """Factor of both axles' cornering stiffness"""
+    power: float = 1.0
+    """Factor of the pedal's force, forward and in reverse"""
+    steering_offset: float = 0.0
+    """rad, added to the front wheel's angle whatever is requested; positive is to the left"""
+    latency: float = 0.0
+    """s from a request to its effect, a pure delay; counted from the update before the request"""
+
+    def of(self, car: Car) -> Car:
+        """The car with its tyres and motor in this condition."""
+        return replace(
+            car,
+            cornering_front=car.cornering_front * self.grip,
+            cornering_rear=car.cornering_rear * self.grip,
+            gain_forward=car.gain_forward * self.power,
+            gain_reverse=car.gain_reverse * self.power,
+        )
+
+
+AS_NEW = Condition()
+
+
 class Vehicle:
     """The car through test time: it holds its last requests and advances only in `update`."""
 
-    def __init__(self, freq: float, car: Car = KIWI, steps: int = 1) -> None:
+    def __init__(self, freq: float, car: Car = KIWI, steps: int = 1, condition: Condition = AS_NEW) -> None:
         """`freq` in Hz: the equations are stepped `steps` times or more in each of its periods."""
         self.motion = BodyMotion()
         self.rejected = 0
-        self.car = car
+        self.car = condition.of(car)
+        self._offset = condition.steering_offset
+        self._latency = round(condition.latency * MICROSECONDS)
+        self._coming: deque[tuple[int, float | None, float | None]] = deque()
+        """When a request takes effect (us), and the wheel's angle or the pedal that it sets."""
         self._longest = math.ceil(MICROSECONDS / (freq * steps))
-        self._wheel = 0.0
+        self._wheel = self._offset
         self._pedal = 0.0
         self._now: int | None = None
 
@@ -63,20 +95,21 @@ class Vehicle:
         """Take a ground steering request in rad; False, and nothing changes, when it is not finite."""
         if not self._accepts(request):
             return False
-        self._wheel = wheel_angle(request, self.car)
+        self._take(wheel_angle(request, self.car) + self._offset, None)
         return True
 
     def press(self, request: float) -> bool:
         """Take a pedal position request; False, and nothing changes, when it is not finite."""
         if not self._accepts(request):
             return False
-        self._pedal = pedal_position(request, self.car)
+        self._take(None, pedal_position(request, self.car))
         return True
 
     def reset(self) -> None:
         """Stand still, with the wheel straight and the pedal let go."""
         self.motion = BodyMotion()
-        self._wheel = self._pedal = 0.0
+        self._coming.clear()
+        self._wheel, self._pedal = self._offset, 0.0
 
     def update(self, now: int) -> BodyMotion:
         """Advance to `now` (microseconds) with the requests held; the first call only takes the time.
@@ -86,14 +119,34 @@ class Vehicle:
         elapsed = 0 if self._now is None else now - self._now
         if elapsed < 0:
             raise ValueError(f"time ran backwards by {-elapsed} us")
+        while self._coming and self._coming[0][0] <= now:
+            due, wheel, pedal = self._coming.popleft()
+            self._advance(due - (now - elapsed))
+            elapsed = now - due
+            self._apply(wheel, pedal)
+        self._advance(elapsed)
         self._now = now
+        if not math.isfinite(self.motion.vx + self.motion.vy + self.motion.yaw_rate):
+            raise ArithmeticError("the single-track model ran out of bounds: choose a higher freq or more steps")
+        return self.motion
+
+    def _take(self, wheel: float | None, pedal: float | None) -> None:
+        """Sets the wheel or the pedal, now or after the latency."""
+        if self._latency and self._now is not None:
+            self._coming.append((self._now + self._latency, wheel, pedal))
+        else:
+            self._apply(wheel, pedal)
+
+    def _apply(self, wheel: float | None, pedal: float | None) -> None:
+        self._wheel = self._wheel if wheel is None else wheel
+        self._pedal = self._pedal if pedal is None else pedal
+
+    def _advance(self, elapsed: int) -> None:
+        """Steps through `elapsed` us with the wheel and the pedal held."""
         steps = -(-elapsed // self._longest)
         for index in range(steps):
             dt = elapsed * (index + 1) // steps - elapsed * index // steps
             self.motion = step(self.motion, self._wheel, self._pedal, dt / MICROSECONDS, self.car)
-        if not math.isfinite(self.motion.vx + self.motion.vy + self.motion.yaw_rate):
-            raise ArithmeticError("the single-track model ran out of bounds: choose a higher freq or more steps")
-        return self.motion
 
     def _accepts(self, request: float) -> bool:
         self.rejected += not math.isfinite(request)

@@ -1,11 +1,12 @@
 """The single-track model on the bus."""
 
+import math
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv.inputs.car import KIWI, read_car
 from services.base import Context, Output, Service, period_of
-from services.dynamic_model.model import Vehicle
+from services.dynamic_model.model import Condition, Vehicle
 
 RESET = "reset"
 
@@ -18,8 +19,9 @@ class DynamicModel(Service):
         flags = context.flags
         self.period = period_of(flags["freq"])
         car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
-        self.vehicle = Vehicle(flags["freq"], car, flags["steps"])
-        stable = car.stable_above(flags["freq"] * flags["steps"])
+        condition = Condition(flags["grip"], flags["power"], math.radians(flags["steering-offset"]), flags["latency"])
+        self.vehicle = Vehicle(flags["freq"], car, flags["steps"], condition)
+        stable = self.vehicle.car.stable_above(flags["freq"] * flags["steps"])
         self._log.debug("the steps are stable above %.3f m/s; sideways the car moves above %g", stable, car.slip_speed)
         self.inputs = {
             ("opendlv.proxy.GroundSteeringRequest", None): self._steer,

@@ -107,10 +107,9 @@ def open_truth(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[SceneT
 
 def _scene(flags: Flags) -> Scene:
     light = Light.of_flags(flags["light.azimuth"], flags["light.elevation"], flags["light.ambient"])
-    lines = tuple(flags["lines"])
-    return load_scene(
-        Path(flags["map-path"]), SceneOptions(light, lines, flags["line-width"], flags["clutter"], flags["seed"])
-    )
+    numbers = {name: flags[name] for name in ("clutter", "displaced", "seed")}
+    options = SceneOptions(light, tuple(flags["lines"]), flags["line-width"], **numbers)
+    return load_scene(Path(flags["map-path"]), options)
 
 
 def _optics(flags: Flags, scene: Scene) -> Optics:

@@ -17,6 +17,7 @@ from services.virtual_camera.draw.lines import line_faces, pick
 from services.virtual_camera.draw.raster import Colour
 from services.virtual_camera.draw.shape import Shape, make_shape
 from services.virtual_camera.map.clutter import clutter
+from services.virtual_camera.map.displaced import displaced
 from services.virtual_camera.map.meshes import load_obj
 from services.virtual_camera.map.textures import Texture, default_ground, load_picture
 
@@ -30,12 +31,14 @@ MAX_TEXTURE_BYTES = 1 << 30
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """What a scene has beyond its map: the light, lines of these obstacles on the ground, and boxes around it."""
+    """What a scene has beyond its map: the light, lines of these obstacles on the ground, boxes around it, and how far
+    (m) its models stand from their places."""
 
     light: Light = field(default_factory=Light.usual)
     lines: tuple[str, ...] = ()
     line_width: float = 0.02
     clutter: int = 0
+    displaced: float = 0.0
     seed: int = 0
 
 
@@ -127,7 +130,7 @@ def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
     around = clutter(options.clutter, options.seed, models)
     shade = options.light.on(np.array([0.0, 0.0, 1.0]))
     return Scene(
-        models=models + around,
+        models=displaced(models, options.displaced, options.seed) + around,
         faces=tuple(_faces(entries, options)),
         ground=(*(min(part * shade, 255.0) for part in GROUND[:3]), 255.0),
         light=options.light,

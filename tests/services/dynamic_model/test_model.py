@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.inputs.car import KIWI
-from services.dynamic_model.model import BodyMotion, Vehicle, pedal_position, step, wheel_angle
+from services.dynamic_model.model import BodyMotion, Condition, Vehicle, pedal_position, step, wheel_angle
 
 SECOND = 1_000_000
 
@@ -197,3 +197,60 @@ def test_steps_too_long_for_the_tyres_are_an_error_and_not_a_state() -> None:
     vehicle.steer(0.1)
     with pytest.raises(ArithmeticError, match="higher freq"):
         drive(vehicle, 600, period=100_000)
+
+
+@given(latency=st.integers(0, 300_000), period=st.sampled_from([10_000, 7_000, 50_000]))
+def test_a_request_acts_after_the_latency_and_not_before(latency: int, period: int) -> None:
+    late, prompt = (Vehicle(100, condition=Condition(latency=seconds)) for seconds in (latency / SECOND, 0))
+    late.update(0)
+    late.press(0.1)
+    for now in range(period, 1_000_001, period):
+        moved = late.update(now).vx
+        assert (moved > 0) == (now > latency)
+    prompt.update(latency)
+    prompt.press(0.1)
+    while late.motion.vx < 0.4:
+        now += period
+        late.update(now)
+    assert prompt.update(now).vx == pytest.approx(late.motion.vx, rel=0.02)
+
+
+def test_requests_that_come_while_others_are_under_way_act_in_their_order() -> None:
+    vehicle = Vehicle(100, condition=Condition(latency=0.1))
+    speeds = []
+    for now in range(0, 1_000_001, 10_000):
+        speeds.append(vehicle.update(now).vx)
+        vehicle.press(0.1 if now < 50_000 else 0.0)
+    assert speeds[10] == 0 and speeds[15] > speeds[11] > 0
+    assert speeds[16] < speeds[15], "the pedal was let go at 50 ms and is at 150 ms"
+
+
+def test_a_reset_forgets_what_is_under_way() -> None:
+    vehicle = Vehicle(100, condition=Condition(latency=0.1))
+    vehicle.update(0)
+    vehicle.press(0.1)
+    vehicle.reset()
+    assert drive(vehicle, 1).vx == 0
+
+
+def test_half_the_power_has_half_the_speed_and_less_grip_a_wider_turn() -> None:
+    def steady(condition: Condition) -> BodyMotion:
+        vehicle = Vehicle(100, condition=condition)
+        vehicle.press(0.14)
+        vehicle.steer(0.05)
+        return drive(vehicle, 10)
+
+    assert steady(Condition(power=0.5)).vx == pytest.approx(0.455, abs=1e-6)
+    full, worn = steady(Condition()), steady(Condition(grip=0.5))
+    slip = steady(Condition(grip=0.5)).vy - full.vy
+    assert worn.vx == pytest.approx(full.vx) and slip < -0.01, "tyres with less grip slip more to the outside"
+
+
+def test_the_offset_of_the_steering_is_that_of_the_wheel_in_degrees_of_a_request() -> None:
+    bent, asked = Vehicle(100, condition=Condition(steering_offset=wheel_angle(0.05))), Vehicle(100)
+    for vehicle in (bent, asked):
+        vehicle.press(0.1)
+    asked.steer(0.05)
+    assert drive(bent, 2) == drive(asked, 2)
+    bent.steer(-0.05)
+    assert drive(bent, 4, start=2_010_000).yaw_rate == pytest.approx(0, abs=1e-6)

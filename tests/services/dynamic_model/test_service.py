@@ -14,7 +14,16 @@ SECOND = 1_000_000
 STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
 
 
-FLAGS = {"freq": 100.0, "steps": 1, "vehicle": None, "frame-id": 3}
+FLAGS = {
+    "freq": 100.0,
+    "steps": 1,
+    "vehicle": None,
+    "frame-id": 3,
+    "latency": 0.0,
+    "grip": 1.0,
+    "power": 1.0,
+    "steering-offset": 0.0,
+}
 
 
 def service(**flags: object) -> DynamicModel:
@@ -46,6 +55,17 @@ def test_what_is_no_number_is_said_once(caplog: pytest.LogCaptureFixture) -> Non
         "ignored a PedalPositionRequest of nan, and will ignore all that are not finite"
     ]
     assert model.vehicle.rejected == 2
+
+
+def test_the_condition_of_the_flags() -> None:
+    model = service(**{"grip": 0.5, "power": 0.8, "steering-offset": 3.0, "latency": 0.05})
+    car = model.vehicle.car
+    assert (car.cornering_front, car.cornering_rear, car.gain_forward, car.gain_reverse) == (7.5, 7.5, 20.8, 4.0)
+    model.update(0)
+    model.inputs[PEDAL, None](MessageSet.standard().type(PEDAL)(position=0.1), 0)
+    for now in range(10_000, 1_000_001, 10_000):
+        model.update(now)
+    assert model.vehicle.motion.yaw_rate > 0.05
 
 
 def test_another_car_and_finer_steps(tmp_path: Path) -> None:

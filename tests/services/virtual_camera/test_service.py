@@ -49,6 +49,7 @@ PICTURED = {
     "lines": ([], "left,finish"),
     "line-width": (["--lines=left"], "0.05"),
     "clutter": ([], "60"),
+    "displaced": ([], "0.05"),
     "exposure": ([], "0.4"),
     "gain": ([], "2"),
     "noise": ([], "0.02"),
