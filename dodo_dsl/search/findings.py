@@ -75,6 +75,7 @@ class Findings:
     worst: Drive | None
     failures: tuple[Failure, ...]
     left_out: tuple[Failure, ...]
+    ended_early: bool = False
     shrunk: tuple[Shrunk, ...] = ()
 
 

@@ -41,6 +41,7 @@ EXAMPLES = """examples:
   dodo search sil-my-drive --runs 1000 -j 4
   dodo search sil-my-drive --minutes 30    as many drives as fit into half an hour
   dodo search sil-my-drive --save          keep a test of each failure among your tests
+  dodo search sil-my-drive --until-failure --runs 400    end as soon as one is found
   dodo search sil-my-drive --sweep         only measure how often it fails
   dodo search sil-my-drive --storage postgresql://dodo@server/dodo    together with other machines
 
@@ -71,6 +72,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="M",
         help="look for failures no longer than that; to shrink them takes further drives",
     )
+    parser.add_argument("--until-failure", action="store_true", help="end soon after the first failure, and shrink it")
     parser.add_argument("--save", action="store_true", help="put a test of each failure beside TEST, to be kept")
     parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of the search (default: 0)")
     parser.add_argument(
@@ -133,7 +135,7 @@ def _search(
 ) -> tuple[Findings, bool]:
     """What was found, and whether an interrupt ended it."""
     runs = min(options.runs or (_MOST_BY_TIME if options.minutes else _RUNS), _MOST_RUNS)
-    course = Course(Itinerary(study.space, runs, options.seed, not options.sweep), store)
+    course = Course(Itinerary(study.space, runs, options.seed, not options.sweep), store, options.until_failure)
     deployment = study.checked.deployment
     backends = Kept(Processes(deployment.cids, options.isolation, (load.descriptor,), [deployment.root], load.take))
     order = schedule(options.jobs, expectation(backends.name))
@@ -145,7 +147,7 @@ def _search(
     at_nominal = store.get(texts(nominal(study.space)))
     swept, proposed = course.known(True), course.known(False)
     findings = find(study.test.spec.title, options.seed, study.space, at_nominal, swept, proposed)
-    return replace(findings, shrunk=tuple(shrinker.found)), interrupted
+    return replace(findings, ended_early=course.ended_early, shrunk=tuple(shrinker.found)), interrupted
 
 
 def _deadline(options: argparse.Namespace) -> float | None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from dodo_dsl.cli.search.drives import Drives
-from dodo_dsl.search.itinerary import Candidate, Itinerary, key
+from dodo_dsl.search.itinerary import FIRST, Candidate, Itinerary, key
 from dodo_dsl.search.space import nominal, texts
 from dodo_dsl.search.store import Drive, Store
 from dodo_dsl.spec.instances.vary import Values
@@ -12,23 +12,35 @@ from dodo_dsl.spec.instances.vary import Values
 
 @dataclass
 class Course:
-    """Follows an itinerary; ``done`` are the candidates that were driven, in their order."""
+    """Follows an itinerary; ``done`` are the candidates that were driven, in their order.
+
+    ``until_failure`` is whether it ends after the few drives of which one has failed.
+    """
 
     itinerary: Itinerary
     store: Store
+    until_failure: bool = False
     done: list[Candidate] = field(default_factory=list)
 
     async def follow(self, drives: Drives) -> None:
         """Drives the nominal values and the itinerary as far as time suffices. Raises Interrupted."""
         await drives.drive([nominal(self.itinerary.space)], 0)
         margins: dict[tuple[str, ...], float | None] = {}
-        for batch in self.itinerary.generations(margins):
-            try:
-                await drives.drive([one.values for one in batch], 1 + len(self.done))
-            finally:
-                self._take(batch, margins)
-            if any(key(one.values) not in margins for one in batch):
-                return
+        for generation in self.itinerary.generations(margins):
+            size = FIRST if self.until_failure else len(generation)
+            for begin in range(0, len(generation), size):
+                batch = generation[begin : begin + size]
+                try:
+                    await drives.drive([one.values for one in batch], 1 + len(self.done))
+                finally:
+                    self._take(batch, margins)
+                if any(key(one.values) not in margins for one in batch) or self.ended_early:
+                    return
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether a failure ended it."""
+        return self.until_failure and bool(self.failed())
 
     def _take(self, batch: Sequence[Candidate], margins: dict[tuple[str, ...], float | None]) -> None:
         """What is known of the candidates, up to the first that was not driven."""

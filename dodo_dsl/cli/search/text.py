@@ -46,6 +46,8 @@ def _rate(findings: Findings) -> Iterator[str]:
             f"{findings.failed} of {findings.judged} drives failed: {findings.rate:.2%}, "
             f"{CONFIDENCE:.0%} interval {findings.low:.2%} to {findings.high:.2%}"
         )
+    if findings.ended_early:
+        yield "a failure ended the search, so this rate says little"
     if findings.proposed:
         share = f"{findings.proposed_failed} of {findings.proposed}"
         yield f"{share} further drives failed, where failures were expected: they do not count in this rate"

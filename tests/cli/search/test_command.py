@@ -112,6 +112,20 @@ def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
     assert (driven > 17, search.driven) == (True, [])
 
 
+@pytest.mark.parametrize("sweep", [[], ["--sweep"]])
+def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) -> None:
+    code, out = search("example", "--runs", "64", "--until-failure", *sweep)
+    early = result()
+    drives = early["judged"] + early["errors"] + early["proposed"]
+    assert (code, early["ended_early"], drives % 8, drives < 64) == (1, True, 0, True)
+    assert "a failure ended the search" in out and bool(early["shrunk"]) is not bool(sweep)
+    search("example", "--runs", "64", *sweep, report="whole")
+    first = min(one["worst"]["number"] for one in early["failures"])
+    assert first > drives - 8 and not result("whole")["ended_early"]
+    search("example", "--runs", "64", *sweep)
+    assert {**result(), "shrunk": []} == {**result("whole"), "shrunk": []}, "it goes on from there"
+
+
 def test_what_is_saved_replaces_no_other_test(search: Search) -> None:
     search("example", "--runs", "8", "--save")
     (shrunk,) = result()["shrunk"]
