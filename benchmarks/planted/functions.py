@@ -1,6 +1,6 @@
 """How many drives dodo search needs until it finds a planted bug, beside uniform random drives and VerifAI.
 
-    python benchmarks/planted_bugs.py [--seeds 5] [--most 400]
+    python benchmarks/planted/functions.py [--seeds 5] [--most 400]
 
 A drive is stood in for by a function: an application that fails in a corner of two to four of its ranges, whatever the
 others are, and whose margin elsewhere falls off in some of the ranges, or in none of those of the bug. No program runs,
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # this checkout
 
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.search.itinerary import Itinerary, key
@@ -72,7 +72,7 @@ BUGS = (
 
 
 def space_of(bug: Bug) -> Space:
-    nowhere = Span("planted_bugs.py")
+    nowhere = Span("planted/functions.py")
     ends = tuple(Scalar(nowhere, number, str(number)) for number in (0, 1))
     middle = Scalar(nowhere, 0.5, "0.5")
     return Space(tuple(Range(f"r{number}", middle, ends) for number in range(bug.ranges)))
