@@ -1,8 +1,8 @@
-"""Twelve mistakes of a steering program, each of which shows only in a corner of the conditions of ``planted.dodo.yml``.
+"""Twelve mistakes of a steering program, each of which shows only in a corner of the ranges of ``planted.dodo.yml``.
 
 A corner is within limits in some of the ranges, whatever the other conditions are; limits are shares of a range, 0 at
-its ``from``. With ``onset`` the program already steers a little wrong in the corner's neighbourhood, as mistakes do that
-grow; without it, nothing tells of them before.
+its ``from``. With ``onset`` the program already steers a little wrong in the corner's neighbourhood, as mistakes do
+that grow; without it, nothing tells of them before.
 """
 
 import math
