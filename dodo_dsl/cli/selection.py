@@ -76,7 +76,11 @@ def select(
         if paths:
             checked = load([*paths, *checked.deployment.registry], application, settings=settings)
         others = [spec for spec in checked.specs if spec.path not in given]
-        chosen = {spec.slug for word in names for spec in _named(word, others, checked.deployment)}
+        try:
+            chosen = {spec.slug for word in names for spec in _named(word, others, checked.deployment)}
+        except NoSuchTest:
+            checked_deployment()  # its problems come first: without them there may be such a test
+            raise
         checked = _narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
         given |= {spec.path for spec in others if any(_is_meant(word, spec) for word in names)}
     if levels:

@@ -62,6 +62,9 @@ def no_value(failure: Failure) -> Iterator[Slip]:
     found = re.search(r"[\w.-]+$", failure.before)
     if "unexpected ':'" in failure.problem and found:
         message = f"nothing stands behind the colon of '{found[0]}'"
-        yield Slip(failure.mark[0], found.start(), message, f"write '{found[0]}: value', with a space after the colon")
+        hint = f"write '{found[0]}: value', with a space after the colon"
+        if re.search(r"\[[^\[\]{}]*$", failure.before):
+            hint = f'if the colon belongs to the text, quote it: "{found[0]}:"'
+        yield Slip(failure.mark[0], found.start(), message, hint)
     elif "node content" in failure.problem and failure.here.startswith(","):
         yield Slip(*failure.mark, "nothing stands before this comma", "remove it")

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.selection import NoSuchTest, select
 from dodo_dsl.compiler import load
 
@@ -37,6 +38,14 @@ def test_a_shipped_test_that_the_deployment_leaves_out(repository: Path, word: s
     with pytest.raises(NoSuchTest) as problem:
         select([word], (), ())
     assert str(problem.value) == f"there is no test '{word}'; {said}: add \"dodo:\" to 'registry' in dodo.yml"
+
+
+def test_problems_of_the_deployment_come_before_names_that_it_may_have(repository: Path) -> None:
+    deployment(repository, "tests, dodo:")
+    with pytest.raises(
+        UsageError, match=r'yaml-syntax(?s:.*)hint: if the colon belongs to the text, quote it: "dodo:"'
+    ):
+        select(["my-test"], (), ())
 
 
 def test_who_has_the_shipped_tests_is_not_told_to_add_them(repository: Path) -> None:
