@@ -10,7 +10,7 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
-from dodo_dsl.images.names import Image, choose, known
+from dodo_dsl.images.names import PLATFORM, Image, choose, known, of_platforms, tagged
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -18,7 +18,9 @@ EXAMPLES = """examples:
   dodo images build                                   all images, named as in dodo.yml
   dodo images build collision virtual-camera          two images
   dodo images build --offline-wheels                  if a build cannot reach the package index
+  dodo images build --platform linux/arm64            for a Raspberry Pi, on another machine with QEMU
   dodo images push --prefix registry.example.org/dodo
+  dodo images push --platform linux/amd64,linux/arm64 --prefix registry.example.org/dodo
   dodo images sbom --output build/sbom                a bill of materials of each image, and of this Python
 """
 _INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"
@@ -42,6 +44,11 @@ def _action(
     actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str
 ) -> argparse.ArgumentParser:
     action = actions.add_parser(name, help=text, description=text)
+    action.add_argument(
+        "--platform", type=_platforms, default=[], metavar="P,...",
+        help="machines that the images are for, such as linux/arm64 (default: the engine's); several of them have the "
+        "tags T-amd64 and T-arm64, and 'push' makes T a list of these"
+    )  # fmt: skip
     action.add_argument("name", nargs="*", metavar="NAME", help="services, sandbox, base or vision (default: all)")
     action.add_argument(
         "--prefix", metavar="P", help="prefix of the images' names (default: images.prefix of dodo.yml, or dodo)"
@@ -52,6 +59,14 @@ def _action(
     return action
 
 
+def _platforms(text: str) -> list[str]:
+    found = list(dict.fromkeys(text.split(",")))
+    for one in found:
+        if not PLATFORM.fullmatch(one):
+            raise argparse.ArgumentTypeError(f"there is no platform '{one}'; write them as linux/amd64,linux/arm64")
+    return found
+
+
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     images = _chosen(options, selection.checked_deployment())
     if options.action == "sbom" and options.no_images:
@@ -60,7 +75,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         docker_command.require_engine()
     if options.action == "sbom":
         return _sbom(images, Path(options.output), stdout)
-    return _build(options, images, stdout) if options.action == "build" else _push(images, stdout)
+    if options.action == "push":
+        return _push(images, options.platform, stdout)
+    docker_command.require_buildx()
+    for platform in options.platform or [""]:
+        _build(options, [one for one in of_platforms(images, options.platform) if one.platform == platform], stdout)
+    return Exit.OK
 
 
 def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
@@ -71,11 +91,11 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     return choose(options.name, names, prefix, options.tag or deployment.image_tag)
 
 
-def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> int:
-    docker_command.require_buildx()
-    packages = (
-        _packages(options.base_image or build_context.default_base_image(), stdout) if options.offline_wheels else None
-    )
+def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> None:
+    """Builds images of one platform."""
+    packages = None
+    if options.offline_wheels:
+        packages = _packages(options.base_image or build_context.default_base_image(), images[0].platform, stdout)
     with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
         folder = Path(name) / "dodo-images"
         folder.mkdir()
@@ -90,11 +110,10 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
     width = max(len(image.reference) for image in images)
     for image in images:
         stdout.write(f"built {image.reference:<{width}}  {docker_command.size(image.reference) / 1e6:.0f} MB\n")
-    return Exit.OK
 
 
-def _packages(base_image: str, stdout: TextIO) -> Path:
-    python = wheels.python_of(base_image)
+def _packages(base_image: str, platform: str, stdout: TextIO) -> Path:
+    python = wheels.python_of(base_image, platform)
     stdout.write(f"downloading packages for Python {python.tag} on {python.machine} with pip\n")
     stdout.flush()
     return wheels.provide(python, wheels.cache_folder())
@@ -103,8 +122,13 @@ def _packages(base_image: str, stdout: TextIO) -> Path:
 def _require_built(images: list[Image]) -> None:
     missing = [image for image in images if not docker_command.is_local(image.reference)]
     if missing:
-        names = " ".join(image.name for image in missing)
-        raise UsageError(f"{missing[0].reference} is not on this machine; build it first: dodo images build {names}")
+        platforms = ",".join(dict.fromkeys(image.platform for image in images if image.platform))
+        words = [*(["--platform", platforms] if platforms else []), *dict.fromkeys(image.name for image in missing)]
+        command = f"dodo images build {' '.join(words)}"
+        raise UsageError(f"{missing[0].reference} is not on this machine; build it first: {command}")
+    for image in images:
+        if image.platform and (found := docker_command.platform(image.reference)) != image.platform:
+            raise UsageError(f"{image.reference} is for {found}, not for {image.platform}")
 
 
 def _sbom(images: list[Image], folder: Path, stdout: TextIO) -> int:
@@ -117,13 +141,24 @@ def _sbom(images: list[Image], folder: Path, stdout: TextIO) -> int:
     return Exit.OK
 
 
-def _push(images: list[Image], stdout: TextIO) -> int:
-    _require_built(images)
-    for number, image in enumerate(images, 1):
-        stdout.write(f"[{number}/{len(images)}] {image.reference}\n")
-        code, output = docker_command.show(("push", image.reference), stdout)
-        if code:
-            denied = any(word in output for word in ("denied", "unauthorized", "no basic auth"))
-            hint = f"; log in with: docker login {image.reference.partition('/')[0]}" if denied else ""
-            raise docker_command.DockerError(f"{image.reference} cannot be pushed; the output above says why{hint}")
+def _push(images: list[Image], platforms: list[str], stdout: TextIO) -> int:
+    pushed = of_platforms(images, platforms)
+    _require_built(pushed)
+    for number, image in enumerate(pushed, 1):
+        stdout.write(f"[{number}/{len(pushed)}] {image.reference}\n")
+        _send(("push", image.reference), image.reference, stdout)
+    if len(platforms) > 1:
+        docker_command.require_buildx()
+        for image in images:
+            stdout.write(f"{image.reference}: a list of {', '.join(platforms)}\n")
+            parts = [tagged(image, platform) for platform in platforms]
+            _send(("buildx", "imagetools", "create", "--tag", image.reference, *parts), image.reference, stdout)
     return Exit.OK
+
+
+def _send(words: tuple[str, ...], reference: str, stdout: TextIO) -> None:
+    code, output = docker_command.show(words, stdout)
+    if code:
+        denied = any(word in output for word in ("denied", "unauthorized", "no basic auth"))
+        hint = f"; log in with: docker login {reference.partition('/')[0]}" if denied else ""
+        raise docker_command.DockerError(f"{reference} cannot be pushed; the output above says why{hint}")

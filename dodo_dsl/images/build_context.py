@@ -59,6 +59,7 @@ def define(folder: Path, images: Sequence[Image], base_image: str | None, source
             "args": arguments,
             "tags": [image.reference],
             "output": ["type=docker"],
+            **({"platforms": [image.platform]} if image.platform else {}),
         }
         for image in images
     }

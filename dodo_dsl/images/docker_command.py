@@ -54,6 +54,11 @@ def size(reference: str) -> int:
     return int(ask("image", "inspect", "--format", "{{.Size}}", reference))
 
 
+def platform(reference: str) -> str:
+    """What an image of the engine is for, such as ``linux/arm64``."""
+    return ask("image", "inspect", "--format", "{{.Os}}/{{.Architecture}}", reference)
+
+
 def show(words: Sequence[str], stdout: TextIO, folder: Path | None = None) -> tuple[int, str]:
     """Runs a docker command with its progress on ``stdout``: exit code, and its output where that is not a terminal.
 

@@ -1,7 +1,8 @@
 """The images and their names in a deployment."""
 
+import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.manifest import Manifest
@@ -9,6 +10,10 @@ from dodo_dsl.spec.manifest import Manifest
 SANDBOX = "sandbox"
 SHARED = ("base", "vision")
 """Stages that applications may use as base images."""
+
+
+PLATFORM = re.compile(r"linux/[a-z0-9]+(/v[0-9]+)?")
+"""Such as linux/arm64, as Docker writes it."""
 
 
 class NoSuchImage(Exception):
@@ -21,6 +26,20 @@ class Image:
 
     name: str
     reference: str
+    platform: str = ""
+    """That of the engine where it is empty."""
+
+
+def of_platforms(images: Sequence[Image], platforms: Sequence[str]) -> list[Image]:
+    """The images for each platform; where there are several, the tag names it: ``collision:1-arm64``."""
+    if len(platforms) < 2:
+        return [replace(image, platform=platform) for platform in platforms for image in images] or list(images)
+    return [replace(image, reference=tagged(image, one), platform=one) for one in platforms for image in images]
+
+
+def tagged(image: Image, platform: str) -> str:
+    """The reference of an image that is one of a manifest list."""
+    return f"{image.reference}-{platform.partition('/')[2].replace('/', '-')}"
 
 
 def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:

@@ -39,17 +39,19 @@ class Python:
         return [*names, f"manylinux2014_{self.machine}"]
 
 
-def python_of(image: str) -> Python:
-    """Asks an image; the engine pulls it when it is missing. Raises WheelsError."""
+def python_of(image: str, platform: str = "") -> Python:
+    """Asks an image, of a platform; the engine pulls it when it is missing. Raises WheelsError."""
+    words = ("--platform", platform) if platform else ()
     try:
         answer = docker_command.ask(
-            "run", "--rm", "--network", "none", "--entrypoint", "python3", image, "-c", _QUESTION
+            "run", "--rm", *words, "--network", "none", "--entrypoint", "python3", image, "-c", _QUESTION
         )
         major, minor, machine, glibc = answer.split()
         glibc_major, glibc_minor = glibc.split(".")[:2]
         return Python((int(major), int(minor)), machine, (int(glibc_major), int(glibc_minor)))
     except docker_command.DockerError as error:
-        raise WheelsError(f"base image {image} does not run python3: {error}") from None
+        foreign = f" for {platform}, which this machine may not run without QEMU" if platform else ""
+        raise WheelsError(f"base image {image} does not run python3{foreign}: {error}") from None
     except ValueError:
         raise WheelsError(f"base image {image} has no Python with glibc, which the wheels need") from None
 

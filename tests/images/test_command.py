@@ -1,5 +1,6 @@
 """dodo images: what it says and how it ends when something is missing."""
 
+import json
 from io import StringIO
 from pathlib import Path
 
@@ -124,3 +125,54 @@ def test_a_broken_deployment_is_usage(docker: Path, tmp_path: Path) -> None:
     code, said = run("build")
     assert code == Exit.USAGE
     assert "dodo.yml:2:" in said
+
+
+def bake(docker: Path) -> None:
+    """A docker command that keeps each definition that it is to build."""
+    keep = f'cp docker-bake.json "$(mktemp {docker.parent}/bake-XXXXXX.json)"'
+    size = 'case "$2" in inspect) echo 7000000;; *) echo 1;; esac'
+    script(docker, f'PATH=/usr/bin:/bin; case "$1-$2" in buildx-bake) {keep};; image-*) {size};; esac')
+
+
+def test_images_for_one_platform_have_the_usual_names(docker: Path) -> None:
+    bake(docker)
+    code, said = run("build", "collision", "--tag", "1", "--platform", "linux/arm64")
+    (file,) = docker.parent.glob("bake-*.json")
+    target = json.loads(file.read_text())["target"]["collision"]
+    assert (code, target["platforms"], target["tags"]) == (0, ["linux/arm64"], ["dodo/collision:1"]), said
+
+
+def test_images_for_several_platforms_have_their_own_tags(docker: Path) -> None:
+    bake(docker)
+    code, said = run("build", "collision", "--tag", "1", "--platform", "linux/arm64,linux/arm/v7")
+    targets = [json.loads(file.read_text())["target"]["collision"] for file in docker.parent.glob("bake-*.json")]
+    assert code == 0 and {(one["platforms"][0], one["tags"][0]) for one in targets} == {
+        ("linux/arm64", "dodo/collision:1-arm64"),
+        ("linux/arm/v7", "dodo/collision:1-arm-v7"),
+    }
+    assert said.count("7 MB") == 2
+
+
+def test_several_platforms_are_pushed_as_a_list(docker: Path) -> None:
+    platform = 'case "$5" in *amd64) echo linux/amd64;; *) echo linux/arm64;; esac'
+    script(docker, f'case "$1-$2" in image-inspect) {platform};; image-ls) echo 1;; *) echo "$@";; esac')
+    words = ("push", "collision", "--prefix", "registry.example.org/a", "--tag", "1")
+    code, said = run(*words, "--platform", "linux/amd64,linux/arm64")
+    image = "registry.example.org/a/collision:1"
+    assert code == 0
+    assert f"push {image}-amd64\n" in said and f"push {image}-arm64\n" in said
+    assert f"buildx imagetools create --tag {image} {image}-amd64 {image}-arm64\n" in said
+
+
+def test_what_was_built_for_another_platform_is_not_pushed(docker: Path) -> None:
+    script(docker, 'case "$1-$2" in image-inspect) echo linux/amd64;; *) echo 1;; esac')
+    code, said = run("push", "base", "--prefix", "registry.example.org/a", "--tag", "1", "--platform", "linux/arm64")
+    assert (code, said) == (
+        Exit.USAGE,
+        "dodo images: registry.example.org/a/base:1 is for linux/amd64, not for linux/arm64\n",
+    )
+
+
+def test_a_wrong_platform_says_how_to_write_them(docker: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("build", "--platform", "arm64")[0] == Exit.USAGE
+    assert "there is no platform 'arm64'; write them as linux/amd64,linux/arm64" in capsys.readouterr().err

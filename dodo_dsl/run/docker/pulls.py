@@ -9,6 +9,10 @@ from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.protocol import BackendError
 
 Say = Callable[[str], None]
+_UNKNOWN = "unknown"
+"""Of an image that does not say what it is for."""
+_SMALLER = {"amd64": "386", "arm64": "arm"}
+"""Whose programs most machines run, too."""
 
 
 class Pulls:
@@ -20,7 +24,10 @@ class Pulls:
         self._interrupted = threading.Event()
 
     async def provide(self, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
-        """Makes the images local; returns notes on local images that could not be updated. Raises BackendError."""
+        """Makes the images local; returns notes on those that could not be updated, or are for another kind of machine.
+
+        Raises BackendError.
+        """
         waits = [self._pull_once(image, self._own, say) for image in sorted(set(own))]
         waits += [self._pull_once(image, self._application, say) for image in sorted(set(application))]
         return [note for note in await asyncio.gather(*waits) if note]
@@ -52,29 +59,43 @@ class Pulls:
             del self._tasks[key]
 
     def _own(self, image: str, say: Say) -> str:
-        if not self._is_local(image):
+        if not self._architecture(image):
             self._pull(image, say)
-        return ""
+        return self._foreign(image)
 
     def _application(self, image: str, say: Say) -> str:
         try:
             self._pull(image, say)
         except BackendError as error:
-            if not self._is_local(image):
+            if not self._architecture(image):
                 raise
-            return f"{error}; the local image is used"
-        return ""
+            return "; ".join(filter(None, (f"{error}; the local image is used", self._foreign(image))))
+        return self._foreign(image)
 
-    def _is_local(self, image: str) -> bool:
+    def _foreign(self, image: str) -> str:
+        """A sentence where the image is for another kind of machine than the engine's."""
+        from docker.errors import DockerException
+
+        try:
+            here = str(self._client.api.version().get("Arch", ""))
+        except (DockerException, OSError) as error:
+            raise BackendError(f"the Docker engine does not say its version: {error}") from error
+        there = self._architecture(image)
+        if not here or there in ("", here, _UNKNOWN, _SMALLER.get(here)):
+            return ""
+        return f"image {image} is for {there}, this engine's machine is {here}: it runs only by emulation, if at all"
+
+    def _architecture(self, image: str) -> str:
+        """What a local image is for, such as ``arm64``; empty where there is no such image."""
         from docker.errors import DockerException, ImageNotFound
 
         try:
-            self._client.api.inspect_image(image)
+            found = self._client.api.inspect_image(image)
         except ImageNotFound:
-            return False
+            return ""
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot inspect image {image}: {error}") from error
-        return True
+        return str(found.get("Architecture") or _UNKNOWN)
 
     def _pull(self, image: str, say: Say) -> None:
         from docker.errors import DockerException

@@ -1,10 +1,13 @@
 """Work that tests of a run share: once while it succeeds, again when it failed."""
 
 import asyncio
+import subprocess
 from collections.abc import Callable, Coroutine
+from pathlib import Path
 
 import pytest
 
+from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.protocol import BackendError
 
@@ -45,3 +48,22 @@ def test_what_failed_is_tried_again_and_then_kept() -> None:
 
     assert asyncio.run(scene()) == ["pulled", "pulled"]
     assert len(tries) == 2
+
+
+@pytest.mark.engine
+def test_an_image_for_another_kind_of_machine_is_noted_before_the_test(tmp_path: Path) -> None:
+    name = "dodo-test-foreign-machine"
+    (tmp_path / "Dockerfile").write_text("FROM scratch\nCOPY Dockerfile /\n")
+    command = ["docker", "buildx", "build", "--quiet", "--load", "--platform", "linux/s390x", "--tag", name, tmp_path]
+    subprocess.run(command, check=True, capture_output=True)
+    client = connect()
+    try:
+        notes = asyncio.run(Pulls(client).provide([name], [], lambda _: None))
+        here = client.api.version()["Arch"]
+        expected = f"image {name} is for s390x, this engine's machine is {here}: it runs only by emulation, if at all"
+        assert notes == [expected]
+        subprocess.run([*command[:6], f"linux/{here}", *command[7:]], check=True, capture_output=True)
+        assert asyncio.run(Pulls(client).provide([name], [], lambda _: None)) == []
+    finally:
+        subprocess.run(["docker", "image", "rm", name], check=True, capture_output=True)
+        client.close()
