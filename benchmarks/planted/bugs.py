@@ -20,6 +20,9 @@ RANGES: dict[str, tuple[float, float]] = {
 }
 """Variables of the environment and the ranges in ``planted.dodo.yml``, in the same units."""
 
+UNITS = " cmdegs"
+"""Letters of these units."""
+
 Driving = Callable[[float, float], tuple[float, float]]
 """Steering (rad) and pedal as they should be, and as they are sent."""
 

@@ -29,7 +29,7 @@ from dodo_dsl.source import Scalar
 from dodo_dsl.spec.instances.vary import Range
 
 LEARNS_BELOW = 0.35
-_SPARE, _LEAST, _FAILED = 0.5, 0.02, -0.4
+_SPARE, _LEAST, FAILED = 0.5, 0.02, -0.4
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Bug:
 
     def margin(self, point: list[float]) -> float:
         if all(low <= point[one] <= high for one, (low, high) in self.trigger.items()):
-            return _FAILED
+            return FAILED
         return max(_SPARE - sum(slope * abs(point[one] - 0.5) for one, slope in self.slopes.items()), _LEAST)
 
 

@@ -6,14 +6,12 @@ import sys
 import bugs
 import driver
 
-_UNITS = " cmdegs"
-
 
 def shares() -> dict[str, float]:
     """Where in its range each condition lies."""
     found = {}
     for name, (low, high) in bugs.RANGES.items():
-        found[name] = (float(os.environ[name].rstrip(_UNITS)) - low) / (high - low)
+        found[name] = (float(os.environ[name].rstrip(bugs.UNITS)) - low) / (high - low)
     return found
 
 
