@@ -90,14 +90,14 @@ class Engine:
         return await self.backend.close(keep)
 
     async def _collect_losses(self) -> None:
-        """Losses, lateness and notes that were reported during teardown; other events no longer count then.
+        """Losses, lateness, notes and the time of the clock as reported in teardown; other events no longer count then.
 
         But for what the application must not send: only when all is read is it known that nothing was.
         """
         while (event := await self._next(0.0)) is not None:
             if isinstance(event, Foreign):
                 self.state.add_finding("failed", event.reason)
-            if isinstance(event, Overrun | Late | Noted):
+            if isinstance(event, Overrun | Late | Noted | Time):
                 self.state.take(event)
 
     async def _set_up(self) -> None:

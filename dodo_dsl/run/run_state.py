@@ -59,6 +59,8 @@ class RunState:
     setup_s: float | None = None
     input_ended: bool = False
     time: Time | None = None
+    _ended_by: str = ""
+    """The service whose end was that of the test."""
 
     def __post_init__(self) -> None:
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
@@ -142,17 +144,23 @@ class RunState:
 
     def _take_exit(self, service: str, code: int, out_of_memory: bool) -> None:
         layer, when = self.layer_of.get(service, "application"), self._when()
-        ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}"
+        ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
         if layer == "application":
             is_done = code == 0 and self.input_ended
             if not is_done and not self._all_verdicts_given():
-                self.end("failed", f"application service '{service}' {ended}, before the test was decided", service)
+                self._end_by_exit(
+                    "failed", f"application service '{service}' {ended}, before the test was decided", service
+                )
         elif code != 0:
-            self.end("error", f"service '{service}' of layer {layer} {ended}", service)
+            self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}", service)
         elif service not in self.ready and self.began is None:
-            self.end("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
+            self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
         elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
-            self.end("error", f"evaluator '{service}' ended without a verdict {when}", service)
+            self._end_by_exit("error", f"evaluator '{service}' ended without a verdict {when}", service)
+
+    def _end_by_exit(self, result: Result, reason: str, service: str) -> None:
+        self._ended_by = service
+        self.end(result, reason, service)
 
     def _all_verdicts_given(self) -> bool:
         return all(self.facts.verdicts.get(name) for name in self.facts.evaluators)
@@ -160,8 +168,14 @@ class RunState:
     def _when(self) -> str:
         if self.began is None:
             return "during set-up"
-        wall = " of wall time" if self.plan.lockstep else ""  # the time of the test is another one then
-        return f"after {self.clock() - self.began:.1f} s{wall}"
+        return "" if self.plan.lockstep else f"after {self.clock() - self.began:.1f} s"
+
+    def _timed(self, finding: Finding) -> Finding:
+        """With the time that the clock of a lockstep test had reached, where the end of a service decided."""
+        is_decided_so = self.began is not None and self._ended_by and finding.service == self._ended_by
+        if not is_decided_so or not self.plan.lockstep or self.time is None or not self.time.last:
+            return finding
+        return replace(finding, reason=f"{finding.reason}, after {self.time.seconds:.1f} s of test time")
 
     def _first_application(self) -> str:
         """The application's service whose last lines may explain why there is no answer."""
@@ -172,7 +186,7 @@ class RunState:
         plan = self.plan
         answers = judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
         considered = consider(decide(self.facts, answers.findings), self._load())
-        finding = considered.finding
+        finding = self._timed(considered.finding)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(

@@ -39,8 +39,8 @@ KINDS = {
 }
 
 ENDS = {
-    "ends": ("failed", "application service 'app' ended with exit code 0 after"),
-    "ends-early": ("failed", "application service 'app' ended with exit code 7 after"),
+    "ends": ("failed", "application service 'app' ended with exit code 0"),
+    "ends-early": ("failed", "application service 'app' ended with exit code 7"),
     "no-program": ("error", "service 'app' could not be started: "),
 }
 

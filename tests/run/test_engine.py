@@ -411,12 +411,24 @@ def clocked(*events: tuple[float, Event], wall_s: float = 60.0) -> ScriptedBacke
     return ScriptedBackend(plan(lockstep=wall_s), {**READY, "begin": events})
 
 
-def test_a_crash_in_lockstep_is_told_after_wall_time() -> None:
-    """The page of the drive counts the time of the test, which is another one."""
+def test_a_crash_in_lockstep_is_told_at_its_test_time() -> None:
+    """The same in every run, and as the page of the drive counts: wall time is neither."""
     found = outcome(clocked((0.1, Time(40.0, False)), (3.0, Exited("app", 1)), (3.0, Time(40.5, True))))
     assert found.reason == (
-        "application service 'app' ended with exit code 1 after 3.0 s of wall time, before the test was decided"
+        "application service 'app' ended with exit code 1, before the test was decided, after 40.5 s of test time"
     )
+    assert found.sim_s == 40.5
+
+
+def test_a_crash_in_lockstep_has_no_time_that_the_clock_did_not_tell() -> None:
+    found = outcome(clocked((0.1, Time(40.0, False)), (3.0, Exited("app", 1))))
+    assert found.reason == "application service 'app' ended with exit code 1, before the test was decided"
+
+
+def test_a_failed_verdict_has_no_other_time_than_its_own() -> None:
+    failed = VerdictEvent("track", False, "hit wall left after 2.10 s", ())
+    found = outcome(clocked((1.0, failed), (1.0, ENDED), (1.5, Time(2.1, True))))
+    assert found.reason == "hit wall left after 2.10 s"
 
 
 def test_lockstep_has_the_time_of_its_clock() -> None:
