@@ -51,6 +51,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.rec.excerpt import NothingSelected
     from dodo_dsl.rec.frames import FramesError
     from dodo_dsl.rec.outputs import OutputExists
+    from dodo_dsl.rec.parts import SplitError
     from dodo_dsl.rec.truth import TruthError
     from dodo_dsl.report.joined.child_jobs import NoChildJobs
     from dodo_dsl.report.results import ResultsError
@@ -63,6 +64,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
         LabelError,
         FramesError,
         OutputExists,
+        SplitError,
         TruthError,
         NotAFile,
         NotReplaceable,

@@ -106,7 +106,7 @@ def detections(
     return by_time
 
 
-@dataclass(frozen=True)
+@dataclass
 class Export:
     """How frames are written into ``folder``: as ``png`` or ``jpg``, only those with a label or ``everything``.
 
@@ -118,24 +118,35 @@ class Export:
     everything: bool
     progress: Callable[[int], None]
     problem: Callable[[str], None]
+    result: DataSet = field(default_factory=DataSet)
 
-    def write(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]]) -> DataSet:
-        """Write pictures and annotations.json; raises LabelError where not one frame is wanted, and OSError."""
-        result = DataSet()
-        (self.folder / PICTURES).mkdir()
+    def add(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]], name: str = "") -> None:
+        """Writes the pictures of a recording, which has a ``name`` where there are several; raises OSError."""
+        (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
         for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
             wanted = labels.get(packet.sample_time, ())
             if frame is None:
-                result.lost += 1
+                self.result.lost += 1
             elif wanted or self.everything:
-                name = f"{PICTURES}/{packet.sender_stamp}-{packet.sample_time}.{self.picture_type}"
-                write_picture(self.folder / name, frame)
-                _add(result, packet, frame, name, wanted)
+                parts = [*([name] if name else []), packet.sender_stamp, packet.sample_time]
+                path = f"{PICTURES}/{'-'.join(map(str, parts))}.{self.picture_type}"
+                write_picture(self.folder / path, frame)
+                _add(self.result, packet, frame, path, wanted)
+                if name:
+                    self.result.images[-1]["recording"] = str(recording.path)
             self.progress(done)
-        if not result.images:
+
+    def finish(self) -> None:
+        """Writes annotations.json; raises OSError."""
+        (self.folder / ANNOTATIONS).write_text(self.result.text(), encoding="utf-8")
+
+    def write(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]]) -> DataSet:
+        """Writes pictures and annotations.json; raises LabelError where not one frame is wanted, and OSError."""
+        self.add(recording, images, labels)
+        if not self.result.images:
             raise LabelError(f"no frame of {recording.path} could be decoded at the sample time of a detection")
-        (self.folder / ANNOTATIONS).write_text(result.text(), encoding="utf-8")
-        return result
+        self.finish()
+        return self.result
 
 
 def _take(detection: Detection, kind: str, message: Any) -> None:

@@ -11,12 +11,20 @@ from dodo_dsl.cli.rec.message_sets import messages_for
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.rec import contents, cut
 from dodo_dsl.rec.contents_text import contents_text
+from dodo_dsl.rec.excerpt import NothingSelected
 from dodo_dsl.rec.frames import IMAGE
 from dodo_dsl.terminal import json_text
 
 
 def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
     """Carries out one action; raises OSError and what else ``cli.errors`` has a sentence for."""
+    if options.action == "export":
+        from dodo_dsl.cli.rec import datasets
+
+        options.file = _only_one(options) if not datasets.is_data_set(options) else options.files[0]
+        if datasets.is_data_set(options):
+            datasets.run(options, stdout, stderr)
+            return
     path: Path = options.file
     with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
         recording = Recording(path, progress)
@@ -31,6 +39,14 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
             from dodo_dsl.cli.rec import exports
 
             exports.EXPORTS[options.format](job)
+
+
+def _only_one(options: argparse.Namespace) -> Path:
+    """The recording, for what takes one; raises NothingSelected for several."""
+    files: list[Path] = options.files
+    if len(files) > 1:
+        raise NothingSelected(f"--{options.format} takes one recording; only --coco and --steering join several")
+    return files[0]
 
 
 def _info(job: Job, version: str) -> None:

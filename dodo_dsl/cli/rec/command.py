@@ -30,10 +30,13 @@ _EXPORT = """examples:
   dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
   dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
   dodo rec export desk.rec --coco -o labelled --truth desk.json
+  dodo rec export drive.rec old.rec --coco -o set --labels 3 --validation 50%
+  dodo rec export drive.rec old.rec --steering -o pairs --validation 50%
 """
 _FORMATS = {
     "csv": "write one table per message and sender stamp",
     "coco": "write pictures with the boxes of the detections",
+    "steering": "write pictures with the steering and the pedal that answered them, for programs that learn to drive",
     "frames": "write the camera's frames as pictures, named by sender stamp and sample time",
     "video": "write the camera's packets into an MP4, h264 as recorded and other formats encoded again",
     "mcap": "write an MCAP file for Foxglove, Lichtblick or rerun (needs DoDo's extra 'mcap')",
@@ -72,6 +75,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     export.add_argument(
         "--truth", metavar="FILE.json", type=Path, help="truth file with the boxes for --coco, the same for every frame"
     )
+    export.add_argument(
+        "--validation", metavar="SHARE", type=_share, default=0.0,
+        help="with --coco or --steering: folders train and validation, the latter with this share of the recordings",
+    )  # fmt: skip
+    export.add_argument("--seed", metavar="N", type=_stamp, default=0, help="chooses those recordings (default: 0)")
     export.add_argument("--all", action="store_true", help="with --coco: also export frames without a detection")
     for action in (cut, export):
         _selection(action)
@@ -83,7 +91,12 @@ def _action(
     action = actions.add_parser(
         name, help=text, description=text, epilog=examples, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    action.add_argument("file", metavar="FILE.rec", type=Path)
+    if name == "export":
+        action.add_argument(
+            "files", metavar="FILE.rec", type=Path, nargs="+", help="--coco and --steering take several"
+        )
+    else:
+        action.add_argument("file", metavar="FILE.rec", type=Path)
     action.add_argument(
         "--messages",
         metavar="SET",
@@ -113,6 +126,16 @@ def _stamp(text: str) -> int:
     if not is_whole(text):
         raise argparse.ArgumentTypeError(f"'{text}' is not a sender stamp, expected a whole number")
     return whole(text)
+
+
+def _share(text: str) -> float:
+    try:
+        value = number(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a share, expected more than 0% and less than 100%")
+    return value
 
 
 def _seconds(text: str) -> float:

@@ -1,11 +1,12 @@
 """The exports of ``dodo rec export``, by the option that asks for one."""
 
 from collections.abc import Callable, Mapping
+from typing import TextIO
 
 import numpy as np
 
 from dodo_dsl import atomic
-from dodo_dsl.cli.rec.job import Job
+from dodo_dsl.cli.rec.job import Job, tell
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.rec import coco, csv_table, labels
 from dodo_dsl.rec.excerpt import NothingSelected
@@ -56,8 +57,8 @@ def _tell_skipped(job: Job, undecodable: Mapping[int, int], unknown: list[int]) 
 
 def _coco(job: Job) -> None:
     recording, options, folder = job.recording, job.options, job.folder()
-    images, rows = _images(job, "choose senders with --camera and --labels")
-    boxes = _labels(job, rows, images)
+    images, rows = images_for(job, "choose senders with --camera and --labels")
+    boxes = boxes_of(job, rows, images)
     if not boxes and not options.all:
         raise NothingSelected(f"{recording.path} has no detections with a box; --all exports frames without them")
     refuse_existing([folder / coco.ANNOTATIONS], options.force)
@@ -68,7 +69,7 @@ def _coco(job: Job) -> None:
     job.stdout.write(f"{folder}: {len(result.images)} frames with {len(result.boxes)} boxes\n")
 
 
-def _images(job: Job, instead: str) -> tuple[Numbers, Numbers]:
+def images_for(job: Job, instead: str) -> tuple[Numbers, Numbers]:
     """The selected frames of one camera, and all selected rows."""
     if job.options.message:
         raise NothingSelected(f"--message does not apply to --{job.options.format}; {instead}")
@@ -76,7 +77,8 @@ def _images(job: Job, instead: str) -> tuple[Numbers, Numbers]:
     return images_of(job.recording, rows, job.options.camera), rows
 
 
-def _labels(job: Job, rows: Numbers, images: Numbers) -> Mapping[int, list[coco.Detection]]:
+def boxes_of(job: Job, rows: Numbers, images: Numbers) -> Mapping[int, list[coco.Detection]]:
+    """The boxes that label the frames, by sample time; raises NothingSelected."""
     if job.options.truth is None:
         return coco.detections(job.recording, job.messages, rows, job.options.labels)
     if job.options.labels is not None:
@@ -89,9 +91,15 @@ def _tell_lost(job: Job, lost: int, of: int) -> None:
         job.tell(f"{lost} of {of} packets cannot be decoded")
 
 
+def tell_lost(stderr: TextIO, lost: int) -> None:
+    """Says how many packets of all recordings gave no frame."""
+    if lost:
+        tell(stderr, f"{lost} packet{'s' * (lost > 1)} cannot be decoded")
+
+
 def _frames(job: Job) -> None:
     recording, options, folder = job.recording, job.options, job.folder()
-    images, _ = _images(job, "choose a sender with --camera")
+    images, _ = images_for(job, "choose a sender with --camera")
     names = frame_files.names(recording, images, options.pictures)
     refuse_existing([folder / name for name in names], options.force)
     with atomic.files_into(folder) as place, job.progress("decoding frames", len(images)) as progress:
@@ -102,7 +110,7 @@ def _frames(job: Job) -> None:
 
 def _video(job: Job) -> None:
     output = job.file(".mp4")
-    images, _ = _images(job, "choose a sender with --camera")
+    images, _ = images_for(job, "choose a sender with --camera")
     with atomic.replacing(output) as place, job.progress(f"writing {output.name}", len(images)) as progress:
         video = video_file.write(job.recording, images, place, progress, job.tell)
     if lost := len(images) - video.frames:

@@ -30,6 +30,7 @@ def test_the_lines_shown_run(
         for time in range(11)
         for name, sender_stamp in (("opendlv.proxy.DistanceReading", 0), ("opendlv.proxy.GroundSteeringRequest", 0))
     ]
+    others += [message("opendlv.proxy.GroundSteeringRequest", BEGIN + n * 100_000) for n in range(1, 4)]
     box = [message("opendlv.logic.perception.DetectionBoundingBox", BEGIN + 100_000, stamp) for stamp in (0, 3)]
     for name in ("drive.rec", "old.rec", "desk.rec"):
         record([*video(4), *others, *box], name)
