@@ -1,0 +1,54 @@
+"""The learned driver learns from recorded drives, and drives by it."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl import package_data
+
+ROOT = Path(__file__).resolve().parents[2]
+DODO = [sys.executable, "-m", "dodo_dsl"]
+START, HEADING = [-7, -2, 3, 8], [80, 88]
+
+
+def call(folder: Path, *words: str) -> str:
+    """What the command printed, which has to succeed."""
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def collect(folder: Path) -> None:
+    """The shipped test from several starts, with all its pictures kept."""
+    shutil.copytree(package_data.registry() / "maps" / "straight", folder / "tests" / "maps" / "straight")
+    spec = (package_data.registry() / "sil-closed-straight" / "sil-closed-straight.dodo.yml").read_text()
+    matrix = f"matrix:\n  start: {[f'{s} cm' for s in START]}\n  heading: {[f'{h} deg' for h in HEADING]}\n"
+    spec, changes = re.subn(r"vary:\n(?:  .*\n)+", f"{matrix}record: {{frames: always, rate: 10 Hz}}\n", spec)
+    assert changes == 1
+    spec = spec.replace("name: sil-closed-straight", "name: sil-collect").replace("vary.", "matrix.")
+    (folder / "tests" / "sil-collect").mkdir()
+    (folder / "tests" / "sil-collect" / "sil-collect.dodo.yml").write_text(spec)
+    (folder / "dodo.yml").write_text('dodo: 1\nregistry: [tests, "dodo:"]\n')
+    for name in ("kiwi", "learned"):
+        shutil.copytree(ROOT / "examples" / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+
+
+@pytest.mark.slow
+def test_it_learns_from_drives_and_drives(tmp_path: Path) -> None:
+    collect(tmp_path)
+    call(tmp_path, *DODO, "run", "sil-collect", "--application", "kiwi/docker-compose.yml")
+    recordings = sorted(str(path) for path in tmp_path.glob("dodo-report/*/test.rec"))
+    assert len(recordings) == len(START) * len(HEADING)
+    call(tmp_path, *DODO, "rec", "export", *recordings, "--steering", "-o", "pairs", "--validation", "25%")
+    said = call(tmp_path / "learned", sys.executable, "train.py", "../pairs", "model.npz")
+    errors = [float(text) for text in re.findall(r"(0\.\d+) rad", said)]
+    assert errors[1] < errors[2] / 2, said
+    words = ["run", "sil-closed-straight", "--application", "learned/docker-compose.yml", "--report", "learned-report"]
+    call(tmp_path, *DODO, *words)
+    (test,) = json.loads((tmp_path / "learned-report" / "results.json").read_text())["tests"]
+    assert test["outcome"] == "passed", test["reason"]
