@@ -130,7 +130,7 @@ class Session:
         """Stops receiving, so that messages no longer wake this process; sending goes on."""
         if self.is_member:
             membership = _membership(group(self.cid)[0])
-            self._receiver.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
+            _set_if_known(self._receiver, socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
             self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
             self.is_member = False
 
@@ -225,8 +225,8 @@ def _receiver(bus: Address) -> socket.socket:
     try:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        receiver.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
-        receiver.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+        _set_if_known(receiver, socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        _set_if_known(receiver, socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
         receiver.bind(bus)
         receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
         receiver.setblocking(False)
@@ -234,6 +234,15 @@ def _receiver(bus: Address) -> socket.socket:
         receiver.close()
         raise
     return receiver
+
+
+def _set_if_known(of: socket.socket, level: int, option: int, value: int) -> None:
+    """Sets an option that a session can do without: QEMU's emulation of other processors lacks some."""
+    try:
+        of.setsockopt(level, option, value)
+    except OSError as error:
+        if error.errno != errno.ENOPROTOOPT:
+            raise
 
 
 def _membership(host: str) -> bytes:

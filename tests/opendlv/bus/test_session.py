@@ -195,3 +195,19 @@ def test_a_session_knows_the_address_that_others_see(cid: int) -> None:
         session.send(STEERING())
         assert other.receive(5.0) is not None
         assert other.source == session.address
+
+
+def test_what_an_emulated_kernel_lacks_is_left_out() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plain:
+        sessions._set_if_known(plain, socket.SOL_SOCKET, 9999, 1)
+        with pytest.raises(OSError, match="Invalid argument"):
+            sessions._set_if_known(plain, socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 100_000)
+
+
+def test_without_the_kernel_s_time_a_datagram_came_now(cid: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions, "_set_if_known", lambda *_: None)
+    before = time.time_ns() // 1000
+    with Session(cid) as one, Session(cid) as two:
+        one.send(one.messages.type("opendlv.proxy.PedalPositionRequest")(position=0.5))
+        envelope = two.receive(5)
+    assert envelope and before <= envelope.received <= time.time_ns() // 1000 and two.lost == 0
