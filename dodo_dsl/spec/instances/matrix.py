@@ -80,8 +80,18 @@ def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
             yield Diagnostic(value.span, "matrix-value", message)
         elif slug in seen:
             message = f"'{value.text}' and '{seen[slug].text}' of '{name}' would both be called '{slug}'"
-            yield Diagnostic(value.span, "matrix-value", message)
+            yield Diagnostic(value.span, "matrix-value", message, _otherwise(value.text))
         seen.setdefault(slug, value)
+
+
+def _otherwise(text: str) -> str:
+    """A hint how to write a value so that its name is another one: signs are no part of names, digits are."""
+    whole = re.match(r"[+-]?\d+(?![\d.])", text)
+    if not whole:
+        return "names have letters and digits only: write one of them otherwise"
+    return (
+        f"names have letters and digits only: write one of them otherwise, such as '{whole[0]}.0{text[whole.end() :]}'"
+    )
 
 
 def problems(node: Mapping) -> Iterator[Diagnostic]:
