@@ -14,6 +14,11 @@ from dodo_dsl.spec.instances.vary import Values
 
 FIRST, SWEPT, PROPOSED = 8, 4, 4
 """Drives of the sweep before the first proposals, and those of each later generation."""
+PATIENCE = 12
+"""Generations whose proposals may all pass; from then on, all but one drive of each are of the sweep.
+
+The margin says nothing of a failure then, and what lies within the ranges is found soonest by an even cover.
+"""
 
 
 @dataclass(frozen=True)
@@ -44,18 +49,23 @@ class Itinerary:
         done: list[Candidate] = []
         number, is_exhausted = 0, False
         while len(done) < self.runs and not is_exhausted:
-            first = self.runs if not self.proposes else FIRST if number == 0 else SWEPT
+            proposed_now = PROPOSED if number <= PATIENCE or _has_failed(done, margins) else 1
+            first = self.runs if not self.proposes else FIRST if number == 0 else SWEPT + PROPOSED - proposed_now
             batch = [Candidate(values, True) for values in itertools.islice(points, first)]
             if number and self.proposes:
                 tried = list(_tried(self.space, done, margins))
                 seen = {key(one.values) for one in (*done, *batch)}
-                proposed = propose(self.space, tried, seen, PROPOSED, (self.seed, number), self.enough)
+                proposed = propose(self.space, tried, seen, proposed_now, (self.seed, number), self.enough)
                 is_exhausted = bool(tried) and not proposed
                 batch += [Candidate(values, False) for values in proposed]
             batch = batch[: self.runs - len(done)]
             yield batch
             done += batch
             number += 1
+
+
+def _has_failed(done: Sequence[Candidate], margins: Mapping[tuple[str, ...], float | None]) -> bool:
+    return any((margins[key(one.values)] or 0.0) < 0 for one in done)
 
 
 def key(values: Values) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.search.itinerary import FIRST, PROPOSED, SWEPT, Candidate, Itinerary, key
+from dodo_dsl.search.itinerary import FIRST, PATIENCE, PROPOSED, SWEPT, Candidate, Itinerary, key
 from dodo_dsl.search.space import Space, sweep, texts
 from tests.search.test_space import space
 
@@ -42,6 +42,24 @@ def test_more_drives_go_on_with_fewer() -> None:
 def test_a_corner_of_a_hundredth_is_found(seed: int) -> None:
     """Uniform random drives need 69 in the median; these find it in half of that."""
     assert any(found < 0 for _, found in driven(34, seed))
+
+
+def of_each(failing: bool) -> list[list[bool]]:
+    """Whether the candidates of each generation are of the sweep, where one of the first fails, or none ever."""
+    margins: dict[tuple[str, ...], float | None] = {}
+    found = []
+    for batch in Itinerary(SPACE, FIRST + 8 * (PATIENCE + 3), 0).generations(margins):
+        found.append([one.swept for one in batch])
+        margins.update({key(one.values): -0.5 if failing and not margins else 0.5 for one in batch})
+    return found
+
+
+def test_the_sweep_gets_more_where_proposals_find_nothing() -> None:
+    patient, impatient = [True] * SWEPT + [False] * PROPOSED, [True] * 7 + [False]
+    _, *generations = of_each(failing=False)
+    assert generations == [patient] * PATIENCE + [impatient] * 3
+    _, *generations = of_each(failing=True)
+    assert generations == [patient] * (PATIENCE + 3)
 
 
 def test_a_space_that_is_exhausted_ends_the_search() -> None:
