@@ -143,6 +143,8 @@ class Drives:
     async def _round(self, candidates: dict[int, Values], repeat: int) -> None:
         folder = self.work / f"round-{min(candidates)}"
         jobs = self._jobs(candidates, folder)
+        for job in jobs.values():
+            shutil.rmtree(job.report, ignore_errors=True)  # what a killed search left of the same drive
         by_slug = {job.plan.slug: number for number, job in jobs.items()}
         runner = Runner(self.progress, self.backends, self.order, Policy(retries=RETRIES))
 

@@ -1,6 +1,7 @@
 """Drives of tunings: tests with candidates' values as variables of the application, those of the store only once."""
 
 import itertools
+import re
 import shutil
 import time
 from collections.abc import Sequence
@@ -28,6 +29,7 @@ _SCENARIO = "#scenario"
 """No name of a variable."""
 _ROUND = 4
 """Drives a core in a round."""
+_NUMBERED = re.compile(r"--run-([0-9]{1,9})$")
 
 Pair = tuple[Values, Scenario]
 
@@ -50,7 +52,13 @@ class Trials:
     report: Path
     deadline: float | None = None
     _number: int = 0
+    """Of the next drive; those of an earlier call that did not pass, or that was killed, keep theirs."""
     _counted: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        names = [path.name for path in self.report.iterdir()] if self.report.is_dir() else []
+        numbers = [int(found[1]) for name in names if (found := _NUMBERED.search(name))]
+        self._number = max(numbers, default=-1) + 1
 
     @property
     def is_over(self) -> bool:

@@ -158,6 +158,17 @@ def test_an_interrupted_search_goes_on_to_the_same_result(search: Search, ends_a
     assert len(before & set(search.driven)) <= 1
 
 
+def test_what_a_killed_search_left_of_a_drive_is_gone_when_it_drives_again(search: Search) -> None:
+    """The recorder replaces no recording, so the drive would end in error."""
+    drives = Path("report/search/example/drives")
+    left = [drives / f"example--run-{number}" / "test.rec" for number in (1, 2)]
+    for path in left:
+        path.parent.mkdir(parents=True)
+        path.write_text("half of a drive")
+    search("example", "--runs", "2", "--sweep", "-j", "1")
+    assert len(search.driven) >= 3 and not any(path.exists() for path in left)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_search_is_interrupted_between_drives_too(
     search: Search, monkeypatch: pytest.MonkeyPatch, number: signal.Signals

@@ -132,6 +132,18 @@ def test_an_interrupted_tuning_goes_on_to_the_same_result(tune: Tune, more: tupl
     assert (tune(*words)[0], tune.driven) == (0, [])
 
 
+def test_drives_of_an_earlier_call_keep_their_folders(tune: Tune) -> None:
+    """The recorder replaces no recording, so a drive in such a folder would end in error."""
+    tune("example", "--runs", "1")
+    (folder,) = {path.parent for path in Path("report").rglob("*--run-*")} or {Path("report/tune/drives")}
+    kept = folder / f"{tune.driven[-1].rpartition('--')[0]}--run-7" / "test.rec"
+    kept.parent.mkdir(parents=True)
+    kept.write_text("why it failed")
+    tune("example", "--runs", "3")
+    assert kept.read_text() == "why it failed"
+    assert min(int(slug.rpartition("-")[2]) for slug in tune.driven) == 8
+
+
 def test_samples_held_out_are_others(tune: Tune) -> None:
     _, out = tune("example", "--runs", "4", "--samples", "2")
     found = result()
