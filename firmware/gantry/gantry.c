@@ -2,21 +2,27 @@
 
 #include <string.h>
 
+#include "drivers/circle.h"
 #include "drivers/rig.h"
 #include "line.h"
+#include "memory/record.h"
 #include "motion/homing.h"
 #include "motion/motion.h"
 #include "port.h"
 #include "supervision/driver_monitor.h"
 #include "supervision/supervision.h"
+#include "supervision/turns.h"
 
 static struct line line;
 static uint32_t ticked;
 
 static void answer_error(uint8_t error)
 {
-    char text[] = "$ERROR:0";
-    text[sizeof text - 2] = (char)('0' + error);
+    char text[] = "$ERROR:10", *at = text + sizeof text - 3;
+    if (error >= 10)
+        at++;
+    *at++ = (char)('0' + error % 10);
+    *at = '\0';
     port_send_line(text);
 }
 
@@ -52,10 +58,52 @@ static uint8_t answer_position(void)
     return 0;
 }
 
+static void answer_limits(void)
+{
+    char text[8 + LIMITS * 10 + 2] = "$LIMITS:", *at = text + 8;
+    for (uint8_t i = 0; i < LIMITS; i++) {
+        at = line_number(at, record_limits[i]);
+        *at++ = ',';
+    }
+    *at++ = (char)('0' + record_source);
+    *at = '\0';
+    port_send_line(text);
+}
+
+/* Why the limits, and that home is known, may not change now; 0 when they may. */
+static uint8_t engaged(void)
+{
+    if (rig.mode == MODE_HOMING)
+        return ERROR_HOMING;
+    if (rig.trouble != 0)
+        return ERROR_TROUBLE;
+    return rig.mode != MODE_REST || rig_moving() || record_source == SOURCE_WRITING ? ERROR_BUSY : 0;
+}
+
+static uint8_t forget(void)
+{
+    uint8_t error = engaged();
+    if (error == 0)
+        rig_void_position();
+    return error;
+}
+
+static uint8_t set_limits(const int32_t *set)
+{
+    uint8_t error = engaged();
+    if (error != 0)
+        return error;
+    if (rig.calibrated)
+        return ERROR_BUSY;
+    return record_write(set) ? 0 : ERROR_BOUNDS;
+}
+
 static uint8_t calibrate(void)
 {
     if (rig.mode == MODE_HOMING)
         return ERROR_HOMING;
+    if (record_source == SOURCE_WRITING)
+        return ERROR_BUSY;
     homing_start();
     return 0;
 }
@@ -66,8 +114,24 @@ static void stop(void)
     rig_acknowledge();
 }
 
+static uint8_t execute_circle(const struct request *request)
+{
+    if (request->command == COMMAND_KIND) {
+        port_send_line(KIND_ANSWER);
+        return 0;
+    }
+    uint8_t error = motion_goto(request->numbers);
+    if (error == 0)
+        circle.way = request->command == COMMAND_GOTO       ? WAY_SHORTEST
+                     : request->command == COMMAND_GOTOLEFT ? WAY_LEFT
+                                                            : WAY_RIGHT;
+    return error;
+}
+
 static uint8_t execute(const struct request *request)
 {
+    if (RIG_KIND == KIND_CIRCLE && (request->command == COMMAND_GOTO || request->command >= COMMAND_GOTOLEFT))
+        return execute_circle(request);
     if (request->command == COMMAND_STOP || request->command == COMMAND_CALIBRATE)
         rig.resumed = false;
     switch (request->command) {
@@ -82,6 +146,13 @@ static uint8_t execute(const struct request *request)
         return calibrate();
     case COMMAND_POSITION:
         return answer_position();
+    case COMMAND_LIMITS:
+        answer_limits();
+        return 0;
+    case COMMAND_SETLIMITS:
+        return set_limits(request->numbers);
+    case COMMAND_FORGET:
+        return forget();
     default:
         answer_status();
         return 0;
@@ -115,7 +186,10 @@ void gantry_start(void)
 {
     memset(&line, 0, sizeof line);
     memset(&rig, 0, sizeof rig);
+    if (RIG_KIND == KIND_CIRCLE)
+        memset(&circle, 0, sizeof circle);
     ticked = port_now();
+    record_start();
     homing_restore();
 }
 
@@ -127,8 +201,11 @@ void gantry_tick(void)
     ticked = now;
     rig_poll();
     supervision_tick();
+    if (RIG_KIND == KIND_CIRCLE)
+        turns_tick();
     supervise_host(now);
     motion_tick(now);
     driver_monitor_tick(now);
     homing_tick(now);
+    record_tick();
 }

@@ -7,7 +7,7 @@
 
 #include "protocol.h"
 
-#define NUMBERS 3
+#define NUMBERS LIMITS /* of the longest command */
 
 enum line_state { LINE_OPEN, LINE_DONE, LINE_DAMAGED };
 

@@ -2,6 +2,7 @@
 #ifndef PORT_H
 #define PORT_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* Exchange one byte with each driver of the chain while chip select is low; the answers replace the bytes. The first
@@ -16,6 +17,11 @@ void port_hold_drivers(void);
 
 /* Milliseconds since the start; wraps around. */
 uint32_t port_now(void);
+
+/* A byte of the memory that needs no power, read, or begun to be written: not while it is busy, for 3.4 ms. */
+uint8_t port_memory_read(uint8_t address);
+void port_memory_write(uint8_t address, uint8_t byte);
+bool port_memory_busy(void);
 
 /* Queue a line for the host, without its end; the whole line is dropped when there is no room. Never blocks. */
 void port_send_line(const char *line);

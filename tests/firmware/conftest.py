@@ -26,6 +26,22 @@ def bench_program() -> Path:
 
 
 @pytest.fixture(scope="session")
+def circle_program(bench_program: Path) -> Path:
+    """The core of a rig that turns without end."""
+    return Path(os.environ["BENCH"]) if "BENCH" in os.environ else BUILT / "bench-circle"
+
+
+@pytest.fixture
+def circle(circle_program: Path) -> Iterator[Bench]:
+    """The same, calibrated and in the middle, looking forward."""
+    with Bench(circle_program, CLOSE) as bench:
+        bench.calibrate()
+        bench.go(0, 0, 0)
+        bench.extremes()
+        yield bench
+
+
+@pytest.fixture(scope="session")
 def firmware() -> None:
     """The binary and its emulator are there."""
     if shutil.which("avr-gcc") is None or not SIMAVR.is_file():

@@ -13,7 +13,7 @@ from services.gantry.rig_table import MICROSTEP, Status
 
 ROOT = Path(__file__).parents[2]
 BUILT = ROOT / "build" / "firmware"
-ELF = BUILT / "gantry.elf"
+ELF, CIRCLE_ELF = BUILT / "gantry.elf", BUILT / "gantry-circle.elf"
 EMULATOR = BUILT / "rig-emulator"
 MIDDLE = (0.1, -0.1, 11.0)
 """Where rigs stand at first; m, m, degrees."""
@@ -132,9 +132,11 @@ class Program:
             self.status()
 
     def is_true(self, microsteps: float = 1.0) -> bool:
-        """Whether the measured position is the true one."""
+        """Whether the measured position is the true one; a heading may have the name of another turn."""
         pose, measured = self.pose(), self.position()
-        return all(abs(pose[a] - m) <= microsteps * MICROSTEP[a] for a, m in zip(MICROSTEP, measured, strict=True))
+        off = {axis: abs(pose[axis] - m) for axis, m in zip(MICROSTEP, measured, strict=True)}
+        off["yaw"] = min(off["yaw"], abs(2 * math.pi - off["yaw"]))
+        return all(off[axis] <= microsteps * step for axis, step in MICROSTEP.items())
 
     def speed(self) -> float:
         """True speed over the ground."""
@@ -155,9 +157,9 @@ class Bench(Program):
 class Rig(Program):
     """The emulated rig: the firmware's binary behind a serial port."""
 
-    def __init__(self, *options: str, place: tuple[float, float, float] = NEAR_HOME) -> None:
+    def __init__(self, *options: str, place: tuple[float, float, float] = NEAR_HOME, elf: Path = ELF) -> None:
         where = ",".join(map(str, place))
-        super().__init__(str(EMULATOR), "--stepped", "--pose-rate", "0", "--start", where, *options, str(ELF))
+        super().__init__(str(EMULATOR), "--stepped", "--pose-rate", "0", "--start", where, *options, str(elf))
         self.path = self._ready()
         self.port: serial.Serial | None = None
         self._rest, self._got = b"", 0

@@ -1,6 +1,7 @@
 """The firmware's binary on the emulated rig: the port, the drivers, the true pose, faults."""
 
 import json
+import math
 import os
 import signal
 import socket
@@ -33,6 +34,17 @@ def test_calibrate_goto_run_and_position(new_rig: Rig) -> None:
     assert all(fast <= most for fast, most in zip(extremes["speed"], SPEED.values(), strict=True))
     assert all(ramp <= most for ramp, most in zip(extremes["ramp"], ACCELERATION.values(), strict=True))
     assert new_rig.events == [one for one in new_rig.events if one["event"] in ("reset", "closed", "open")]
+
+
+def test_a_rig_that_differs_from_the_table(firmware: None) -> None:
+    with Rig("--scale", "1.03,1,0.99", "--shift", "0.007,0,2") as rig:
+        rig.open()
+        rig.calibrate()
+        rig.go(0.3, -0.2, 1)
+        x, y, yaw = rig.position()
+        pose = rig.pose()
+        true = (1.03 * x + 0.007, y, 0.99 * yaw + math.radians(2))
+        assert (pose["x"], pose["y"], pose["yaw"]) == pytest.approx(true, abs=3e-6)
 
 
 def test_run_brakes_before_the_edge(rig: Rig) -> None:

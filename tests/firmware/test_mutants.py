@@ -23,4 +23,4 @@ def test_a_mutant_whose_text_is_gone_is_an_error(monkeypatch: pytest.MonkeyPatch
     script = runpy.run_path(str(ROOT / "scripts" / "mutate-firmware"), run_name="mutate")
     gone = script["Mutant"]("gone", "motion/motion.c", "no such text", "", "limits")
     with pytest.raises(ValueError, match=r"stands 0 times in motion/motion\.c"):
-        script["survives"](gone, [])
+        script["survives"](gone, {})

@@ -45,6 +45,7 @@ def test_the_numbers_are_those_of_table_4_2_and_of_the_workspace() -> None:
 
 
 def test_commands_and_codes_are_those_of_table_4_1() -> None:
-    assert set(rig_table.COMMANDS) == {"GOTO", "RUN", "STOP", "CALIBRATE", "POSITION", "STATUS"}
+    own = {"LIMITS", "SETLIMITS", "FORGET"}
+    assert set(rig_table.COMMANDS) == {"GOTO", "RUN", "STOP", "CALIBRATE", "POSITION", "STATUS"} | own
     assert [status.value for status in rig_table.Status] == list(range(9))
     assert len({error.value for error in rig_table.Error}) == len(rig_table.Error)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import pytest
 
 from services.gantry.rig_table import ACCELERATION, WATCHDOG, Status
-from tests.firmware.programs import Rig
+from tests.firmware.programs import CIRCLE_ELF, Rig
 
 VELOCITY = "0.3,0.2,0.4"
 SEEN = 0.03
@@ -124,6 +124,22 @@ def test_the_rig_stops_at_once_without_power(rig: Rig, pull: Callable[[Rig], Non
     pull(rig)
     assert max(speeds(rig, (0.25 if pull is hold_in_reset else 0) + AT_ONCE)[-1]) < 0.002
     assert rig.happened("crash") == []
+
+
+@pytest.mark.parametrize("pull", [pull_cable, hang, pull_cable_and_power], ids=lambda pull: pull.__name__)
+def test_a_yaw_that_turns_without_end_stops_past_its_index(firmware: None, pull: Callable[[Rig], None]) -> None:
+    """Nothing ends its turn but the firmware, or the motors' current."""
+    with Rig("--kind", "circle", place=(-0.85, -0.65, -178), elf=CIRCLE_ELF) as rig:
+        rig.open()
+        rig.calibrate()
+        rig.go(-0.8, -0.6, 2.6)
+        rig.keep_running("0,0,0.8", 1)
+        pull(rig)
+        rig.run(0.05)
+        assert (rig.pose()["vyaw"] > 0.7) == (pull is not pull_cable_and_power)
+        rig.run(WATCHDOG + SEEN + 0.8 / ACCELERATION["yaw"] * 1.1)
+        assert not rig.pose()["moves"] and abs(rig.pose()["vyaw"]) < 0.005
+        assert rig.happened("slip") == [] or pull is pull_cable_and_power
 
 
 def test_after_the_cable_alone_it_goes_on_where_it_was(rig: Rig) -> None:

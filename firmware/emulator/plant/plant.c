@@ -15,7 +15,8 @@
 #define FRICTION 20000.0          /* full steps/s2 of a rotor without a holding field, 6 m/s2 */
 #define CAUGHT 0.6                /* of a turn of four steps; at one half a rotor can fall either way */
 
-static const struct axis_constants constants[AXES] = AXIS_ROWS;
+static const struct axis_constants kinds[KINDS][AXES] = {AXIS_ROWS_DYNAMIC, AXIS_ROWS_CIRCLE};
+static const struct axis_constants *constants = kinds[KIND_DYNAMIC];
 static const enum axis axis_of[MOTORS] = MOTOR_AXES;
 
 /* In m or degrees: from step 0 to where the switch at home closes, from the highest position to where the other one
@@ -23,6 +24,8 @@ static const enum axis axis_of[MOTORS] = MOTOR_AXES;
 static const struct {
     double closes, beyond, hysteresis, frame;
 } ends[AXES] = {{0.001, 0.005, 0.001, 0.02}, {0.001, 0.005, 0.001, 0.02}, {1, 1.5, 1, 8}};
+
+#define INDEX_HYSTERESIS 1.0 /* degrees at each end of a circle's index */
 
 double plant_unit(enum motor motor)
 {
@@ -53,15 +56,34 @@ static bool bounces(const struct plant *plant, const struct carriage *c)
     return left > 0 && (int)(left / BOUNCE) % 2 == 1;
 }
 
-static void update_switch(struct plant *plant, enum motor motor)
+/* Whether an axis turns without end. */
+static bool endless(enum motor motor)
 {
-    struct carriage *c = &plant->carriages[motor];
+    return constants == kinds[KIND_CIRCLE] && axis_of[motor] == AXIS_YAW;
+}
+
+/* The index is closed below 0, and opens behind either end of its arc. */
+static bool at_index(const struct carriage *c, enum motor motor)
+{
+    double turn = TURN / MICRO, width = INDEX_WIDTH / MICRO, slack = steps_of(motor, INDEX_HYSTERESIS);
+    double above = c->at - turn * floor(c->at / turn + 0.5);
+    return c->closed ? above < 0 && above > -width - slack : above < -slack && above > -width;
+}
+
+static bool at_end(const struct carriage *c, enum motor motor)
+{
     enum axis axis = axis_of[motor];
     double high = length_of(motor) + steps_of(motor, ends[axis].beyond);
     double back = c->closed ? 1 : 0;
     bool low_end = c->at < steps_of(motor, ends[axis].closes) * (back - 1);
     bool high_end = c->at > high - back * steps_of(motor, ends[axis].hysteresis);
-    bool closed = low_end || high_end;
+    return low_end || high_end;
+}
+
+static void update_switch(struct plant *plant, enum motor motor)
+{
+    struct carriage *c = &plant->carriages[motor];
+    bool closed = endless(motor) ? at_index(c, motor) : at_end(c, motor);
     if (closed != c->closed)
         c->bounces_until = plant->time + BOUNCING + BOUNCE / 2;
     c->closed = closed;
@@ -145,7 +167,8 @@ static void step_motor(struct plant *plant, enum motor motor)
     record_extremes(plant, motor, before, field);
     if (!plant->carriages[motor].torn) {
         move_rotor(plant, motor, chip->speed / MICRO);
-        limit_to_frame(plant, motor);
+        if (!endless(motor))
+            limit_to_frame(plant, motor);
         detect_slip(plant, motor);
     }
     update_switch(plant, motor);
@@ -158,8 +181,9 @@ void plant_step(struct plant *plant)
     plant->time += PLANT_DT;
 }
 
-void plant_start(struct plant *plant, const double *place)
+void plant_start(struct plant *plant, enum kind kind, const double *place)
 {
+    constants = kinds[kind];
     memset(plant, 0, sizeof *plant);
     for (int m = 0; m < MOTORS; m++) {
         struct carriage *c = &plant->carriages[m];
@@ -189,6 +213,12 @@ struct pose plant_pose(const struct plant *plant)
         pose.place[axis] += half * (c->at - constants[axis].offset / MICRO) * unit;
         pose.speed[axis] += half * c->speed * unit;
     }
+    for (int a = 0; a < AXES; a++) {
+        pose.place[a] = pose.place[a] * (1 + plant->longer[a]) + plant->shift[a];
+        pose.speed[a] *= 1 + plant->longer[a];
+    }
+    if (endless(MOTOR_ALPHA))
+        pose.place[AXIS_YAW] -= 2 * M_PI * floor(pose.place[AXIS_YAW] / (2 * M_PI) + 0.5);
     pose.skew = (plant->carriages[MOTOR_Y1].at - plant->carriages[MOTOR_Y2].at) * plant_unit(MOTOR_Y1);
     return pose;
 }

@@ -29,18 +29,20 @@ struct plant {
     struct extremes extremes[MOTORS];
     double time; /* s */
     unsigned long crashes;
+    double longer[AXES], shift[AXES]; /* how the rig differs from Table 4.2: a share, and m, m, rad */
 };
 
 struct pose {
-    double place[AXES], speed[AXES], skew; /* m, m, rad */
+    double place[AXES], speed[AXES], skew; /* m, m, rad; a circle's yaw from -pi up to pi */
 };
 
-/* Set up a rig that stands at a place (m, m, rad), with all power on. */
-void plant_start(struct plant *plant, const double *place);
+/* Set up a rig of a kind that stands at a place (m, m, rad), with all power on. */
+void plant_start(struct plant *plant, enum kind kind, const double *place);
 
 /* Let PLANT_DT pass. */
 void plant_step(struct plant *plant);
 
+/* Where the rig truly is: as Table 4.2 has it, longer by a share and shifted. */
 struct pose plant_pose(const struct plant *plant);
 
 /* Whether any driver moves its field. */

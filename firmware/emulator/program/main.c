@@ -38,9 +38,15 @@ int main(int argc, char **argv)
         fputs("rig-emulator: expected options as --help shows them, and the firmware's ELF file\n", stderr);
         return 2;
     }
-    plant_start(&emulator.plant, emulator.place);
+    plant_start(&emulator.plant, emulator.kind, emulator.place);
+    memcpy(emulator.plant.longer, emulator.longer, sizeof emulator.longer);
+    memcpy(emulator.plant.shift, emulator.shift, sizeof emulator.shift);
     if (!board_start(&emulator.plant, elf, emulator.boot)) {
         fprintf(stderr, "rig-emulator: %s is no firmware that can be read: build it with make firmware\n", elf);
+        return 2;
+    }
+    if (emulator.memory != NULL && !board_load_memory(emulator.memory)) {
+        fprintf(stderr, "rig-emulator: %s cannot be the memory: expected a file of 1024 bytes, as the EEPROM has, or a new one\n", emulator.memory);
         return 2;
     }
     begin();
@@ -50,6 +56,10 @@ int main(int argc, char **argv)
     }
     pace_run();
     cable_unplug();
+    if (emulator.memory != NULL && !board_save_memory(emulator.memory)) {
+        fprintf(stderr, "rig-emulator: %s cannot be written: %s\n", emulator.memory, strerror(errno));
+        return 1;
+    }
     if (!board_crashed())
         return 0;
     fputs("rig-emulator: the controller's program ended, which it must not\n", stderr);

@@ -3,6 +3,7 @@
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "plant/plant_commands.h"
 #include "program/state.h"
@@ -17,8 +18,12 @@ static const char *const help =
     "  --link PATH        make PATH a symbolic link to the terminal\n"
     "  --pose-rate HZ     of the true pose (100); 0 for none\n"
     "  --publish PATH     send each line to this Unix datagram socket as well\n"
+    "  --kind KIND        of the rig, dynamic or circle, as the firmware's build (dynamic)\n"
     "  --start X,Y,YAW    where the rig stands at first, m and degrees (0.1,-0.1,11)\n"
+    "  --scale X,Y,YAW    true m (rad) for each that the firmware's constants give (1,1,1); --start is by those constants\n"
+    "  --shift X,Y,YAW    true place where they give 0, m and degrees (0,0,0)\n"
     "  --boot S           how long a boot loader delays the firmware after a reset (0)\n"
+    "  --memory FILE      keep the controller's EEPROM in a file between starts\n"
     "  --fast             as fast as possible instead of in real time\n"
     "  --stepped          time passes only by the command `run S`\n"
     "  --help\n\n"
@@ -39,14 +44,33 @@ static const char *const help =
     "It ends with `quit`, on SIGTERM, and when standard input is a pipe that ends.\n\n"
     "example: rig-emulator --link /tmp/rig build/firmware/gantry.elf\n";
 
-static bool place_of(const char *text)
+static bool numbers_of(const char *text, double *numbers)
 {
-    double degrees;
     char rest;
-    if (sscanf(text, "%lf,%lf,%lf%c", &emulator.place[0], &emulator.place[1], &degrees, &rest) != 3)
+    return sscanf(text, "%lf,%lf,%lf%c", &numbers[0], &numbers[1], &numbers[2], &rest) == 3;
+}
+
+static bool place_of(const char *text, double *place)
+{
+    bool read = numbers_of(text, place);
+    place[2] *= 3.14159265358979323846 / 180;
+    return read;
+}
+
+static bool scale_of(const char *text)
+{
+    double scale[AXES];
+    if (!numbers_of(text, scale))
         return false;
-    emulator.place[2] = degrees * 3.14159265358979323846 / 180;
+    for (int a = 0; a < AXES; a++)
+        emulator.longer[a] = scale[a] - 1;
     return true;
+}
+
+static bool kind_of(const char *text)
+{
+    emulator.kind = strcmp(text, "circle") == 0 ? KIND_CIRCLE : KIND_DYNAMIC;
+    return emulator.kind == KIND_CIRCLE || strcmp(text, "dynamic") == 0;
 }
 
 static bool option(int which, const char *value)
@@ -55,8 +79,12 @@ static bool option(int which, const char *value)
     case 'l': emulator.link = value; return true;
     case 'r': emulator.rate = strtod(value, NULL); return emulator.rate >= 0;
     case 'p': return telemetry_publish(value) == 0;
-    case 's': return place_of(value);
+    case 'k': return kind_of(value);
+    case 's': return place_of(value, emulator.place);
+    case 'c': return scale_of(value);
+    case 'o': return place_of(value, emulator.shift);
     case 'b': emulator.boot = strtod(value, NULL); return emulator.boot >= 0;
+    case 'm': emulator.memory = value; return true;
     case 'f': emulator.pace = FAST; return true;
     case 't': emulator.pace = STEPPED; return true;
     default: return false;
@@ -68,7 +96,9 @@ const char *options_read(int argc, char **argv)
     static const struct option all[] = {
         {"link", required_argument, NULL, 'l'},    {"pose-rate", required_argument, NULL, 'r'},
         {"publish", required_argument, NULL, 'p'}, {"start", required_argument, NULL, 's'},
-        {"boot", required_argument, NULL, 'b'},    {"fast", no_argument, NULL, 'f'},
+        {"scale", required_argument, NULL, 'c'},   {"shift", required_argument, NULL, 'o'},
+        {"kind", required_argument, NULL, 'k'},    {"boot", required_argument, NULL, 'b'},
+        {"memory", required_argument, NULL, 'm'},  {"fast", no_argument, NULL, 'f'},
         {"stepped", no_argument, NULL, 't'},       {"help", no_argument, NULL, 'h'},
         {NULL, 0, NULL, 0},
     };
@@ -81,5 +111,6 @@ const char *options_read(int argc, char **argv)
         if (!option(which, optarg))
             return NULL;
     }
-    return optind == argc - 1 ? argv[optind] : NULL;
+    bool turns = emulator.kind == KIND_CIRCLE && emulator.longer[AXIS_YAW] != 0; /* a turn is a turn */
+    return optind == argc - 1 && !turns ? argv[optind] : NULL;
 }

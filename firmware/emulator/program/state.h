@@ -11,9 +11,10 @@ enum pace { REALTIME, FAST, STEPPED };
 
 struct emulator {
     struct plant plant;
-    const char *link;
+    const char *link, *memory;
     enum pace pace;
-    double rate, boot, place[AXES], until, next_pose, late;
+    enum kind kind;
+    double rate, boot, place[AXES], longer[AXES], shift[AXES], until, next_pose, late;
     double base_wall, base_time;
     bool stdin_ends, running, waiting;
     char input[65536]; /* commands that wait */

@@ -1,4 +1,5 @@
 /* The ATmega328P of an Arduino UNO R3: pins, clock, watchdog, and the loop. Pins are listed in firmware/README.md. */
+#include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
@@ -57,6 +58,21 @@ void port_reset_drivers(void)
     _delay_ms(1);
     PORTD |= 1 << DRIVERS_ALIVE;
     _delay_ms(2);
+}
+
+uint8_t port_memory_read(uint8_t address)
+{
+    return eeprom_read_byte((const uint8_t *)(uintptr_t)address);
+}
+
+void port_memory_write(uint8_t address, uint8_t byte)
+{
+    eeprom_write_byte((uint8_t *)(uintptr_t)address, byte);
+}
+
+bool port_memory_busy(void)
+{
+    return !eeprom_is_ready();
 }
 
 /* The pull-up comes before the output, so that a short reset does not reach the drivers. */

@@ -1,10 +1,19 @@
 #include "drivers/drivers.h"
 
+#include "drivers/circle.h"
 #include "drivers/units.h"
+#include "memory/limits.h"
 #include "port.h"
+
+static uint32_t mark_of(uint8_t motor)
+{
+    return circle_motor(motor) && circle.far ? DRIVER_MARK_FAR : DRIVER_MARK;
+}
 
 static uint32_t config_of(uint8_t motor)
 {
+    if (circle_motor(motor))
+        return DRIVER_CONFIG_INDEX;
     return motor == 0 ? DRIVER_CONFIG_FIRST : DRIVER_CONFIG_OTHERS;
 }
 
@@ -86,7 +95,7 @@ static void configure_ramps(void)
 {
     uint32_t ramps[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        ramps[m] = axes[units_axis(m)].ramp_register;
+        ramps[m] = limits[units_axis(m)].ramp_register;
     drivers_set(REG_ACC, 2, ramps);
     drivers_set(REG_DEC, 2, ramps);
 }
@@ -95,7 +104,7 @@ void drivers_set_top_speeds(bool homing)
 {
     uint32_t tops[MOTORS];
     for (uint8_t m = 0; m < MOTORS; m++)
-        tops[m] = homing ? axes[units_axis(m)].homing_top_register : axes[units_axis(m)].top_register;
+        tops[m] = homing ? axes[units_axis(m)].homing_top_register : limits[units_axis(m)].top_register;
     drivers_set(REG_MAX_SPEED, 2, tops);
 }
 
@@ -122,7 +131,20 @@ bool drivers_position_valid(void)
     drivers_get(REG_CONFIG, 2, configs);
     drivers_get(REG_MARK, 3, marks);
     for (uint8_t m = 0; m < MOTORS; m++)
-        if (configs[m] != config_of(m) || marks[m] != DRIVER_MARK)
+        if (configs[m] != config_of(m) || marks[m] != mark_of(m))
             return false;
+    return true;
+}
+
+bool drivers_limited(void)
+{
+    uint32_t tops[MOTORS], ramps[MOTORS];
+    drivers_get(REG_MAX_SPEED, 2, tops);
+    drivers_get(REG_ACC, 2, ramps);
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        const struct axis_limits *held = &limits[units_axis(m)];
+        if (tops[m] != held->top_register || ramps[m] != held->ramp_register)
+            return false;
+    }
     return true;
 }

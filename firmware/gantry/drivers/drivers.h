@@ -19,6 +19,8 @@ enum { /* commands; add FORWARD to move forward; GO_UNTIL copies the position to
     FORWARD = 0x01
 };
 
+#define DRIVER_MARK_FAR (DRIVER_MARK + 1UL) /* of alpha, see circle.h */
+
 enum { /* flags of STATUS */
     FLAG_SW_CLOSED = 1 << 2, FLAG_SW_EVENT = 1 << 3, FLAG_FORWARD = 1 << 4, FLAG_MOTION = 3 << 5,
     FLAG_NOT_PERFORMED = 1 << 7, FLAG_WRONG = 1 << 8, FLAG_UVLO_NOT = 1 << 9, FLAG_WARM_NOT = 1 << 10,
@@ -55,5 +57,8 @@ void drivers_set_top_speeds(bool homing);
 
 /* Whether all drivers are configured and hold the mark of a valid position. */
 bool drivers_position_valid(void);
+
+/* Whether all drivers have the speeds and ramps of the limits that hold; not while homing. */
+bool drivers_limited(void);
 
 #endif

@@ -1,5 +1,6 @@
 #include "drivers/rig.h"
 
+#include "drivers/circle.h"
 #include "drivers/units.h"
 #include "port.h"
 
@@ -10,8 +11,11 @@ struct rig rig;
 
 void rig_poll(void)
 {
+    int32_t alpha = rig.position[MOTOR_ALPHA];
     drivers_status(rig.status, false);
     drivers_position(rig.position);
+    if (circle_motor(MOTOR_ALPHA))
+        rig.position[MOTOR_ALPHA] = circle_follow(alpha, rig.position[MOTOR_ALPHA]);
 }
 
 bool rig_moving(void)
@@ -24,7 +28,8 @@ bool rig_moving(void)
 
 int32_t rig_position(enum axis axis)
 {
-    return units_micro(axis, rig.position[units_motor(axis)]);
+    int32_t steps = rig.position[units_motor(axis)];
+    return units_micro(axis, circle_axis(axis) ? circle_heading(steps) : steps);
 }
 
 void rig_stop(uint8_t hard)

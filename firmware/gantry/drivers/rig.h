@@ -28,7 +28,7 @@ struct rig {
     bool held;              /* the drivers are held in reset, as commands do not reach them */
     uint8_t missed_polls;   /* consecutive polls that a driver did not answer */
     uint16_t status[MOTORS];
-    int32_t position[MOTORS];
+    int32_t position[MOTORS]; /* microsteps; a circle's alpha counts on beyond its turn, and its counter's 22 bits */
     bool switch_handled[MOTORS]; /* the switch closed, and that was handled */
     int32_t target[AXES];        /* micro/s, of the last RUN */
     int32_t commanded[AXES];     /* units of SPEED, of the last command */
@@ -51,7 +51,7 @@ void rig_poll(void);
 /* Whether any motor moves. */
 bool rig_moving(void);
 
-/* The measured position of an axis, micro. */
+/* The measured position of an axis, micro; of a circle's yaw from -pi up to pi. */
 int32_t rig_position(enum axis axis);
 
 /* Brake all axes; those in the mask hard (1 << axis) stop at once. */

@@ -36,28 +36,3 @@ int32_t units_speed(enum axis axis, int32_t micro_s)
 {
     return scaled(micro_s, axes[axis].speed_q32);
 }
-
-bool units_inside(enum axis axis, int32_t micro)
-{
-    return micro >= axes[axis].low && micro <= axes[axis].high && units_steps(axis, micro) >= 0;
-}
-
-static uint16_t root(uint32_t square)
-{
-    uint16_t result = 0;
-    for (uint16_t bit = 0x8000; bit != 0; bit >>= 1) {
-        uint16_t guess = result | bit;
-        if ((uint32_t)guess * guess <= square)
-            result = guess;
-    }
-    return result;
-}
-
-int32_t units_braking_speed(enum axis axis, int32_t room)
-{
-    if (room <= 0)
-        return 0;
-    uint32_t longest = UINT32_MAX / axes[axis].edge;
-    uint32_t clear = (uint32_t)room < longest ? (uint32_t)room : longest;
-    return 100L * root(axes[axis].edge * clear);
-}

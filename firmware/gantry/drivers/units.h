@@ -2,7 +2,6 @@
 #ifndef UNITS_H
 #define UNITS_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "protocol.h"
@@ -19,11 +18,5 @@ int32_t units_micro(enum axis axis, int32_t steps);
 
 /* Convert micro/s to units of the drivers' SPEED, w = c v, signed. */
 int32_t units_speed(enum axis axis, int32_t micro_s);
-
-/* Whether a position is within the workspace and not behind home. */
-bool units_inside(enum axis axis, int32_t micro);
-
-/* The speed (micro/s, a multiple of 100) from which an axis stops within room (micro), 0 without room. */
-int32_t units_braking_speed(enum axis axis, int32_t room);
 
 #endif

@@ -2,13 +2,15 @@
 
 #include <stdlib.h>
 
+#include "drivers/circle.h"
 #include "drivers/rig.h"
 #include "drivers/switches.h"
 #include "drivers/units.h"
 #include "port.h"
 
 /* SETTLE: brake. START: reset the drivers, which makes rotors jump by up to two steps, and hold them. LEAVE: leave a
- * closed switch at either end. APPROACH: go to the switch at home. RELEASE: go until it opens. */
+ * closed switch at either end. APPROACH: go to the switch at home, or to a circle's index from either side. RELEASE: go forward until
+ * it opens. */
 enum phase { SETTLE, START, LEAVE, APPROACH, RELEASE };
 
 #define QUIET_POLLS 10 /* without motion or a bouncing switch, before the next phase begins */
@@ -50,6 +52,8 @@ static bool leave_switches(void)
             return false;
         uint32_t distance = (uint32_t)(axes[units_axis(m)].back_off * abs(times));
         uint8_t op = times > 0 ? OP_MOVE + FORWARD : times < 0 ? OP_MOVE : OP_NOP;
+        if (circle_motor(m) && times != 0)
+            circle.forward = times < 0;
         commands[m] = (struct driver_command){op, distance};
     }
     rig.attempts++;
@@ -61,8 +65,10 @@ static bool leave_switches(void)
 static void approach(void)
 {
     struct driver_command commands[MOTORS];
-    for (uint8_t m = 0; m < MOTORS; m++)
-        commands[m] = (struct driver_command){OP_GO_UNTIL, (uint32_t)axes[units_axis(m)].homing_speed};
+    for (uint8_t m = 0; m < MOTORS; m++) {
+        uint8_t op = circle_motor(m) && circle.forward ? OP_GO_UNTIL + FORWARD : OP_GO_UNTIL;
+        commands[m] = (struct driver_command){op, (uint32_t)axes[units_axis(m)].homing_speed};
+    }
     drivers_send(commands, 3);
     enter(APPROACH);
 }
@@ -76,6 +82,8 @@ static void release(void)
         commands[m] = (struct driver_command){OP_RELEASE + FORWARD, 0};
     }
     drivers_send(zero, 0);
+    if (circle_motor(MOTOR_ALPHA))
+        rig.position[MOTOR_ALPHA] = 0;
     rig_poll();
     drivers_send(commands, 0);
     enter(RELEASE);
@@ -99,14 +107,15 @@ static void fail(void)
     rig_fail(STATUS_FAULT, (1 << AXES) - 1);
 }
 
-/* Whether an axis moved farther than its length, or than a switch needs to open, or y1 and y2 drift apart. */
+/* Whether an axis moved farther than its length or turn, or than a switch needs to open, or y1 and y2 drift apart. */
 static bool too_far(void)
 {
     if (rig.phase != APPROACH && rig.phase != RELEASE)
         return false;
     for (uint8_t m = 0; m < MOTORS; m++) {
         enum axis axis = units_axis(m);
-        int32_t length = units_steps(axis, axes[axis].high) + 4 * axes[axis].back_off;
+        int32_t whole = circle_axis(axis) ? TURN : units_steps(axis, axes[axis].high);
+        int32_t length = whole + 4 * axes[axis].back_off;
         if (travelled(m) > (rig.phase == APPROACH ? length : 2 * axes[axis].back_off))
             return true;
     }
@@ -123,6 +132,8 @@ static void finish(void)
     drivers_set_top_speeds(false);
     drivers_set_all(REG_MARK, 3, DRIVER_MARK);
     rig.calibrated = true;
+    if (circle_axis(AXIS_YAW))
+        circle.far = false;
     rig.mode = MODE_REST;
     for (uint8_t a = 0; a < AXES; a++)
         rig.blocked[a] = 0;
@@ -147,6 +158,8 @@ void homing_start(void)
 {
     rig_acknowledge();
     rig_stop(0);
+    if (circle_axis(AXIS_YAW))
+        circle.forward = rig.calibrated && circle_heading(rig.position[MOTOR_ALPHA]) > TURN / 2;
     rig_void_position();
     rig.mode = MODE_HOMING;
     rig.phase = SETTLE;
@@ -173,7 +186,7 @@ void homing_restore(void)
 {
     rig_poll();
     int32_t skew = rig.position[MOTOR_Y1] - rig.position[MOTOR_Y2];
-    rig.calibrated = drivers_position_valid() && labs(skew) <= axes[AXIS_Y].square;
+    rig.calibrated = drivers_position_valid() && drivers_limited() && labs(skew) <= axes[AXIS_Y].square;
     if (rig.calibrated) {
         rig.resumed = true;
         rig_stop(0);

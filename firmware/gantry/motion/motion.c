@@ -2,7 +2,9 @@
 
 #include <stdlib.h>
 
+#include "drivers/circle.h"
 #include "drivers/units.h"
+#include "memory/limits.h"
 
 #define LAG_MS 4 /* the longest time from a measurement to the driver's reaction */
 #define RESEND_MS 50 /* after which a command is sent again, as it may be lost */
@@ -12,12 +14,15 @@ static int8_t sign(int32_t value)
     return (int8_t)((value > 0) - (value < 0));
 }
 
-/* Limit a velocity (micro/s) so that the axis can brake before the edge. */
+/* Limit a velocity (micro/s) to what the driver goes, and so that the axis can brake before the edge. */
 static int32_t limited(enum axis axis, int32_t velocity)
 {
-    int32_t at = rig_position(axis), size = labs(velocity);
-    int32_t room = velocity > 0 ? axes[axis].high - at : at - axes[axis].low;
-    int32_t fastest = units_braking_speed(axis, room - size * LAG_MS / 1000);
+    int32_t at = rig_position(axis), most = limits[axis].quickest, size = labs(velocity);
+    size = size < most ? size : most;
+    if (circle_axis(axis))
+        return sign(velocity) * size;
+    int32_t room = velocity > 0 ? limits[axis].high - at : at - limits[axis].low;
+    int32_t fastest = limits_braking_speed(axis, room - size * LAG_MS / 1000);
     return sign(velocity) * (size < fastest ? size : fastest);
 }
 
@@ -65,7 +70,7 @@ uint8_t motion_run(const int32_t *velocity, uint32_t now)
     if (error != 0)
         return error;
     for (uint8_t a = 0; a < AXES; a++)
-        if (labs(velocity[a]) > axes[a].fastest)
+        if (labs(velocity[a]) > limits[a].fastest)
             return ERROR_BOUNDS;
     if (rig.mode != MODE_RUN && rig.mode != MODE_REST)
         rig_stop(0);
@@ -82,7 +87,7 @@ uint8_t motion_goto(const int32_t *position)
     bool timed_out = rig.trouble == STATUS_WATCHDOG;
     uint8_t error = timed_out ? 0 : refusal();
     for (uint8_t a = 0; a < AXES && error == 0; a++)
-        error = units_inside(a, position[a]) ? 0 : ERROR_BOUNDS;
+        error = limits_inside(a, position[a]) ? 0 : ERROR_BOUNDS;
     if (error != 0)
         return error;
     if (timed_out)
@@ -99,6 +104,9 @@ uint8_t motion_goto(const int32_t *position)
 static void start_goto(void)
 {
     struct driver_command commands[MOTORS];
+    int32_t alpha = rig.position[MOTOR_ALPHA];
+    if (circle_axis(AXIS_YAW))
+        rig.goal[AXIS_YAW] = alpha + circle_distance(alpha, rig.goal[AXIS_YAW], circle.way);
     for (uint8_t m = 0; m < MOTORS; m++) {
         enum axis axis = units_axis(m);
         commands[m] = (struct driver_command){OP_GOTO, (uint32_t)rig.goal[axis] & 0x3FFFFFUL};

@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include "drivers/circle.h"
 #include "drivers/rig.h"
 #include "drivers/switches.h"
 #include "drivers/units.h"
@@ -89,7 +90,8 @@ void supervision_tick(void)
     bool homing = rig.mode == MODE_HOMING;
     if (!homing && broken_axes() == 0)
         for (uint8_t m = 0; m < MOTORS; m++)
-            check_switch(m);
+            if (!circle_motor(m)) /* its index stops nothing, see turns.c */
+                check_switch(m);
     if (check_drivers() && !homing)
         check_square();
 }
