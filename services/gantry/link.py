@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+from services.gantry.conversion import Conversion
 from services.gantry.port import PortError, SerialLine
-from services.gantry.protocol import LATCHED, LineReader, Position, Refusal, Status, Word, command
+from services.gantry.protocol import LATCHED, Circle, Limits, LineReader, Position, Refusal, Status, Word, command
 
 SILENCE = 1.0
 """s without an answer after which a line counts as lost."""
@@ -30,6 +31,8 @@ class LinkAnswers(NamedTuple):
     at: Position | None = None
     status: Status | None = None
     refusals: tuple[Refusal, ...] = ()
+    circle: Circle | None = None
+    limits: Limits | None = None
 
 
 class Link:
@@ -39,10 +42,15 @@ class Link:
     """
 
     def __init__(
-        self, name: str, open_port: Callable[[], SerialLine], now: Callable[[], float] = time.monotonic
+        self,
+        name: str,
+        open_port: Callable[[], SerialLine],
+        now: Callable[[], float] = time.monotonic,
+        conversion: Conversion | None = None,
     ) -> None:
-        """``now`` in s; the line is opened by the first exchange."""
+        """``now`` in s; the line is opened by the first exchange. Positions that it gives are true ones."""
         self.name = name
+        self.conversion = conversion or Conversion()
         self._open, self._now = open_port, now
         self._port: SerialLine | None = None
         self._lines = LineReader()
@@ -94,18 +102,22 @@ class Link:
         _log.warning("the rig at %s did not confirm that it stopped: %s", self.name, reason)
 
     def _answers(self, port: SerialLine, patience: float) -> LinkAnswers:
-        at, status, refusals = None, None, []
+        at, status, circle, limits, refusals = None, None, None, None, []
         end = self._now() + patience
         while status is None and (left := end - self._now()) > 0:
             for answer in self._lines.feed(port.read(left)):
                 self._last_state, self._found = self._now(), True
                 if isinstance(answer, Position):
-                    at = answer
+                    at = self.conversion.to_true(answer)
                 elif isinstance(answer, Status):
                     status = self._status = answer
+                elif isinstance(answer, Circle):
+                    circle = answer
+                elif isinstance(answer, Limits):
+                    limits = answer
                 else:
                     refusals.append(answer)
-        return LinkAnswers(at, status, tuple(refusals))
+        return LinkAnswers(at, status, tuple(refusals), circle, limits)
 
     def _opened(self) -> bool:
         now = self._now()

@@ -5,15 +5,17 @@ for the vehicle's centre of mass.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
+from services.gantry.conversion import Conversion
 from services.gantry.protocol import Position
-from services.gantry.rig_table import BOUNDS
+from services.gantry.rig_table import BOUNDS, LIMITS
 
 HOME = Position(*(BOUNDS[axis][0] for axis in ("x", "y", "yaw")))
 """Where the limit switches are, rounded to the inside: step 0 of Table 4.2's conversions."""
 FARTHEST = Position(*(BOUNDS[axis][1] for axis in ("x", "y", "yaw")))
-"""The other end of the workspace of 1.9 m by 1.4 m, and of the turn."""
+"""The other end of the workspace of 1.9 m by 1.4 m, and of the turn; both are as long to the other side of 0."""
 LATENCY = 0.1
 """s from a measurement to the motion decided upon it, beside four steps, with which braking that comes a step late does
 not swing over the edge."""
@@ -45,10 +47,26 @@ class MotionLimits:
         return inside and self.low.yaw <= position.yaw <= self.high.yaw
 
 
-def box(range_x: float, range_y: float, range_yaw: float) -> tuple[Position, Position]:
-    """The positions within so many m from home and rad to either side, as far as the rig goes."""
-    high = Position(min(FARTHEST.x, HOME.x + range_x), min(FARTHEST.y, HOME.y + range_y), min(FARTHEST.yaw, range_yaw))
-    return Position(HOME.x, HOME.y, max(HOME.yaw, -range_yaw)), high
+def box(
+    range_x: float,
+    range_y: float,
+    range_yaw: float,
+    conversion: Conversion | None = None,
+    kept: Mapping[str, float] | None = None,
+) -> tuple[Position, Position]:
+    """The true positions within so many m from home and rad to either side, as far as rig and firmware go.
+
+    ``kept`` are the limits in the rig's memory. A yaw that turns without end has no bounds.
+    """
+    conversion, kept = conversion or Conversion(), kept or {name: widest for name, (_, widest) in LIMITS.items()}
+    home = conversion.to_true(replace(HOME, yaw=max(HOME.yaw, -kept["yaw"])))
+    end = conversion.to_true(Position(HOME.x + kept["x"], HOME.y + kept["y"], min(FARTHEST.yaw, kept["yaw"])))
+    high_x, high_y = min(FARTHEST.x, end.x, home.x + range_x), min(FARTHEST.y, end.y, home.y + range_y)
+    low_x, low_y = min(high_x, max(-FARTHEST.x, home.x)), min(high_y, max(-FARTHEST.y, home.y))
+    low_yaw, high_yaw = max(-FARTHEST.yaw, home.yaw, -range_yaw), min(FARTHEST.yaw, end.yaw, range_yaw)
+    if conversion.circle:
+        low_yaw, high_yaw = -math.inf, math.inf
+    return Position(low_x, low_y, low_yaw), Position(high_x, high_y, high_yaw)
 
 
 def turned(velocity: Velocity, yaw: float) -> Velocity:

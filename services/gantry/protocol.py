@@ -1,7 +1,7 @@
 """The rig's serial protocol (Table 4.1): ``$COMMAND:ARG1,ARG2,...`` out, ``$ARG1,ARG2,...`` back, a line each.
 
-Numbers are in SI units and radians. Answers do not say to what: three numbers are POSITION's, one is STATUS's, and
-``$ERROR:code`` says why a line was not obeyed.
+Numbers are in SI units and radians. Answers do not say to what: three numbers are POSITION's, one is STATUS's,
+``$CIRCLE:turn`` is KIND's, ``$LIMITS:...`` is LIMITS', and ``$ERROR:code`` says why a line was not obeyed.
 """
 
 import math
@@ -9,9 +9,22 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from services.gantry.rig_table import BAUD, Error, Status
+from services.gantry.rig_table import BAUD, LIMITS, Error, Source, Status
 
-__all__ = ["BAUD", "LATCHED", "SENTENCES", "Error", "LineReader", "Position", "Refusal", "Status", "Word", "command"]
+__all__ = [
+    "BAUD",
+    "LATCHED",
+    "SENTENCES",
+    "Circle",
+    "Error",
+    "Limits",
+    "LineReader",
+    "Position",
+    "Refusal",
+    "Status",
+    "Word",
+    "command",
+]
 
 LONGEST = 96
 """Bytes of the longest line that can be an answer."""
@@ -20,6 +33,8 @@ FARTHEST = 10.0
 
 _NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{1,9})?(?:[eE][-+]?[0-9]{1,2})?"
 _ANSWER = re.compile(rf"\$(?P<numbers>{_NUMBER}(?:,{_NUMBER}){{0,3}})\r?")
+_CIRCLE = re.compile(r"\$CIRCLE:(?P<turn>[0-9]{1,7})\r?")
+_LIMITS = re.compile(r"\$LIMITS:(?P<limits>[0-9]\.[0-9]{6}(?:,[0-9]\.[0-9]{6})*),(?P<source>[0-9])\r?")
 _REFUSAL = re.compile(r"\$ERROR:(?P<code>[0-9]{1,3})\r?")
 
 
@@ -32,6 +47,12 @@ class Word(StrEnum):
     CALIBRATE = "CALIBRATE"
     POSITION = "POSITION"
     STATUS = "STATUS"
+    LIMITS = "LIMITS"
+    SETLIMITS = "SETLIMITS"
+    FORGET = "FORGET"
+    GOTOLEFT = "GOTOLEFT"
+    GOTORIGHT = "GOTORIGHT"
+    KIND = "KIND"
 
 
 SENTENCES = {
@@ -57,6 +78,21 @@ class Position:
 
 
 @dataclass(frozen=True)
+class Circle:
+    """The rig's yaw turns without end, by so many microsteps a turn."""
+
+    turn: int
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits that hold or are being written, in the order of LIMITS, and where they are from."""
+
+    values: tuple[float, ...]
+    source: Source
+
+
+@dataclass(frozen=True)
 class Refusal:
     """Why a line was not obeyed, as firmware/protocol.yml numbers it."""
 
@@ -72,14 +108,17 @@ class Refusal:
         return f"$ERROR:{self.code} ({names[0] if names else 'unknown to this version'})"
 
 
-Answer = Position | Status | Refusal
+Answer = Position | Status | Refusal | Circle | Limits
 
 
 def command(word: Word, *arguments: float) -> bytes:
-    """A command as its line; numbers have four decimals. Raises ValueError for one that is not finite."""
+    """A command as its line; numbers have six decimals, as many as the firmware reads.
+
+    Raises ValueError for one that is not finite.
+    """
     if not all(map(math.isfinite, arguments)):
         raise ValueError(f"{word} takes finite numbers, not {', '.join(map(str, arguments))}")
-    numbers = ",".join(f"{round(a, 4) + 0.0:.4f}" for a in arguments)
+    numbers = ",".join(f"{round(a, 6) + 0.0:.6f}" for a in arguments)
     return (f"${word}:{numbers}\n" if arguments else f"${word}\n").encode("ascii")
 
 
@@ -88,6 +127,12 @@ def answer(line: str) -> Answer | None:
     refusal = _REFUSAL.fullmatch(line)
     if refusal is not None:
         return Refusal(int(refusal["code"]))
+    circle = _CIRCLE.fullmatch(line)
+    if circle is not None:
+        return Circle(int(circle["turn"]))
+    limits = _LIMITS.fullmatch(line)
+    if limits is not None:
+        return _limits(limits["limits"].split(","), int(limits["source"]))
     match = _ANSWER.fullmatch(line)
     if match is None:
         return None
@@ -97,6 +142,12 @@ def answer(line: str) -> Answer | None:
     if len(numbers) == 1 and match["numbers"] in {str(int(status)) for status in Status}:
         return Status(int(numbers[0]))
     return None
+
+
+def _limits(texts: list[str], source: int) -> Limits | None:
+    if len(texts) != len(LIMITS) or source not in set(Source):
+        return None
+    return Limits(tuple(map(float, texts)), Source(source))
 
 
 class LineReader:

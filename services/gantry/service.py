@@ -7,14 +7,15 @@ from typing import Any
 
 from google.protobuf.message import Message
 
-from services.base import Context, Flags, Output, Service, period_of
+from services.base import Context, Output, Service, period_of
 from services.base.signals import interruptible
-from services.gantry import start
+from services.gantry import memory, start
 from services.gantry.emulator import EmulatedRig
 from services.gantry.link import REQUEST_STATE, Link, RigError
-from services.gantry.motion import MotionLimits, Shaper, Velocity, box
+from services.gantry.motion import Shaper, Velocity
 from services.gantry.port import PortError, SerialPort, checked
 from services.gantry.protocol import SENTENCES, Position, Refusal, Status, Word, command
+from services.gantry.rig_limits import conversion_of, is_circle, kept_limits, motion_limits
 from services.gantry.telemetry import LinkTelemetry
 
 EMULATED = "emulated"
@@ -49,7 +50,7 @@ class Gantry(Service):
         self._emulated = emulated
         self.period = min(self._turn, TRUTH_PERIOD) if emulated else self._turn
         self._due = 0
-        self.shaper = Shaper(limits_of(flags))
+        self.shaper = Shaper(motion_limits(flags))
         self.link = link
         self.ended = False
         self._patience = min(0.4 * self._turn / MICROSECONDS, 0.05)
@@ -75,14 +76,16 @@ class Gantry(Service):
         if now >= self._due:
             self._due = max(self._due + self._turn, now + self._turn // 2)
             yield from self._exchange()
-        true = self._emulated.position() if self._emulated else None
+        true = None
+        if self._emulated:
+            true, self.paused = self._emulated.position(), self._emulated.paused
         if true is not None and self._truth_id is not None:
             yield Output(self._where(true), self._truth_id)
 
     def _exchange(self) -> Iterator[Output]:
         self._supervise()
         begin = self._wall()
-        at, status, refusals = self.link.exchange(self._command() + REQUEST_STATE, self._patience)
+        at, status, refusals, *_ = self.link.exchange(self._command() + REQUEST_STATE, self._patience)
         self.telemetry.note(begin, self._wall() if at is not None else None)
         self._at, self._blind = (self._at, self._blind + self._turn) if at is None else (at, 0)
         if status is not None:
@@ -113,7 +116,7 @@ class Gantry(Service):
         velocity = self.shaper.step(body, self._at, self._turn / MICROSECONDS)
         if self.shaper.cut == 1 and not cut:
             self._log.warning("the vehicle drives to the edge of the rig, where the rig stops: %s", place(self._at))
-        return command(Word.RUN, velocity.x, velocity.y, velocity.yaw)
+        return command(Word.RUN, *self.link.conversion.velocity(velocity.x, velocity.y, velocity.yaw))
 
     def _age(self, since: float | None) -> float:
         return math.inf if since is None else self._wall() - since
@@ -169,33 +172,23 @@ def describe(status: Status) -> str:
     return f"the rig {SENTENCES[status]}" if status in SENTENCES else f"the rig is {status.name.lower()}"
 
 
-def limits_of(flags: Flags) -> MotionLimits:
-    """The rig's limits, or tighter ones."""
-    low, high = box(flags["range-x"], flags["range-y"], math.radians(flags["range-yaw"]))
-    return MotionLimits(
-        speed=flags["max-speed"],
-        acceleration=flags["max-acceleration"],
-        yaw_rate=flags["max-yaw-rate"],
-        yaw_acceleration=flags["max-yaw-acceleration"],
-        low=low,
-        high=high,
-    )
-
-
 def build(context: Context) -> Service:
     """The service from its flags: it is ready when the rig is at its start, and stops the rig at every exit."""
     flags = context.flags
-    emulated = context.resources.enter_context(EmulatedRig()) if flags["serial"] == EMULATED else None
+    emulated = context.resources.enter_context(EmulatedRig(kind=flags["kind"])) if flags["serial"] == EMULATED else None
     target = checked(emulated.port if emulated else flags["serial"])
     goal = Position(flags["x"], flags["y"], math.radians(flags["yaw"]))
-    if not limits_of(flags).holds(goal):
+    if not motion_limits(flags).holds(goal):
         raise PortError(f"the start is out of the rig's ranges: {place(goal)}")
-    link = Link(target, lambda: SerialPort(target))
+    link = Link(target, lambda: SerialPort(target), conversion=conversion_of(flags))
     context.resources.callback(link.close)
     with interruptible():
         status = start.find(link)
+        start.check_kind(link, is_circle(flags))
         start.settle(link, status)
-        if flags["calibrate"] or emulated:
+        calibrates = bool(flags["calibrate"] or emulated)
+        memory.agree(link, kept_limits(flags), write=calibrates)
+        if calibrates:
             start.calibrate(link, flags["patience"])
         elif status == Status.NOT_CALIBRATED:
             raise PortError(f"{start.trouble(link, status)}; --calibrate makes it find its home")

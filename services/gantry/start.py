@@ -5,11 +5,13 @@ import time
 from collections.abc import Callable
 
 from services.gantry.link import REQUEST_STATE, Link, RigError
-from services.gantry.protocol import LATCHED, SENTENCES, Position, Status, Word, command
+from services.gantry.protocol import LATCHED, SENTENCES, Error, Position, Status, Word, command
+from services.gantry.rig_table import TURN
 
 NEAR, NEAR_YAW = 0.005, math.radians(1.5)
 """m and rad within which the rig has reached a place: 1.5 degrees are less than a full step of the turn."""
 POLL = 0.05
+TRIES = 3
 ANSWER = 0.25
 """s that the rig has to obey or refuse a command."""
 _BEGIN = 1.0
@@ -23,6 +25,30 @@ def find(link: Link) -> Status:
         if status is not None:
             return status
         time.sleep(POLL)
+
+
+def check_kind(link: Link, circle: bool) -> None:
+    """Raises RigError unless the rig's firmware is of its kind, as that of a circle would wind up another rig's cable.
+
+    The firmware of the other kind does not know KIND. It has to say so twice, as a damaged KIND is unknown, too.
+    """
+    unknown = 0
+    for _ in range(TRIES):
+        found = link.exchange(command(Word.KIND) + command(Word.STATUS), ANSWER)
+        unknown += any(refusal.code == Error.UNKNOWN for refusal in found.refusals)
+        if found.circle is not None or unknown == 2:
+            break
+    rig = f"the firmware of the rig at {link.name}"
+    if found.circle is None and unknown < 2:
+        raise RigError(f"{rig} does not say of which kind it is")
+    if found.circle is None and circle:
+        raise RigError(f"{rig} is not that of the kind circle: it does not know KIND")
+    if found.circle is not None and not circle:
+        raise RigError(
+            f"{rig} is that of the kind circle, which would wind up a cable: flash gantry.elf, or name the kind"
+        )
+    if found.circle is not None and (turns := found.circle.turn) != TURN:
+        raise RigError(f"{rig} has a turn of {turns} microsteps, expected {TURN}: it is of another version")
 
 
 def settle(link: Link, status: Status) -> None:
@@ -64,16 +90,22 @@ def calibrate(link: Link, patience: float, poll: float = POLL) -> float:
     return time.monotonic() - begin
 
 
-def go(link: Link, goal: Position, patience: float) -> None:
-    """Drive the rig to a place; raises RigError when it is not there after ``patience`` s."""
-    give(link, Word.GOTO, goal.x, goal.y, goal.yaw)
+def go(link: Link, goal: Position, patience: float, word: Word = Word.GOTO) -> None:
+    """Drive the rig to a true place; raises RigError when it is not there after ``patience`` s.
+
+    ``word`` is GOTOLEFT or GOTORIGHT for the way round that a circle takes.
+    """
+    told = link.conversion.to_firmware(goal)
+    give(link, word, told.x, told.y, told.yaw)
     place = f"x = {goal.x:g} m, y = {goal.y:g} m, yaw = {math.degrees(goal.yaw):g} degrees"
     _wait(link, patience, lambda at, status: status == Status.IDLE and near(at, goal), f"has not reached {place}")
 
 
 def near(at: Position | None, goal: Position) -> bool:
-    """Whether a measured position is the goal, as exactly as the rig moves."""
-    return at is not None and math.dist((at.x, at.y), (goal.x, goal.y)) < NEAR and abs(at.yaw - goal.yaw) < NEAR_YAW
+    """Whether a measured position is the goal, as exactly as the rig moves; a heading may have another turn's name."""
+    if at is None or math.dist((at.x, at.y), (goal.x, goal.y)) >= NEAR:
+        return False
+    return abs(math.remainder(at.yaw - goal.yaw, math.tau)) < NEAR_YAW
 
 
 def _wait(
@@ -86,7 +118,7 @@ def _wait(
 ) -> None:
     end = time.monotonic() + patience
     while time.monotonic() < end:
-        at, status, _ = link.exchange(request, ANSWER)
+        at, status, *_ = link.exchange(request, ANSWER)
         if done(at, status):
             return
         if status in SENTENCES:

@@ -13,7 +13,7 @@ import time
 import tty
 from pathlib import Path
 
-from services.gantry.rig_table import SPEED, Error
+from services.gantry.rig_table import CIRCLE_YAW, LIMITS, SPEED, Error
 
 COMMAND = re.compile(r"\$([A-Z]+):?([-+0-9.,]*)")
 WATCHDOG = 0.5
@@ -35,6 +35,16 @@ class FakeRig:
         """What it answers to STATUS; a fault is latched until STOP or CALIBRATE acknowledge it."""
         self.restarted: int | None = None
         """The error's code with which it answers RUN until STOP, as after a reset."""
+        self.turn = 0
+        """Microsteps of its turn, when that is without end."""
+        self.memory: list[float] | None = [widest for _, widest in LIMITS.values()]
+        """The limits that it keeps; None for a firmware that keeps none."""
+        self.source = 0
+        """Where they are from."""
+        self.forgetful = False
+        """Whether its memory takes no limits."""
+        self.lost_index = False
+        """Whether it finds no index when it turns around."""
         self.calibrated = True
         self.silent = False
         self.homes_slowly = False
@@ -120,8 +130,17 @@ class FakeRig:
         elif word == "STOP":
             self.velocity, self._goal, self.restarted = [0.0, 0.0, 0.0], None, None
             self._acknowledge()
-        elif word == "GOTO":
+        elif word == "LIMITS":
+            self._answer_limits()
+        elif word == "SETLIMITS" and not self.forgetful:
+            self.memory, self.source = list(arguments), 1
+        elif word == "FORGET":
+            self.calibrated = False
+        elif word == "KIND":
+            self._answer(f"CIRCLE:{self.turn}")
+        elif word in ("GOTO", "GOTOLEFT", "GOTORIGHT"):
             self._acknowledge()
+            self.status = 4 if self.lost_index and word != "GOTO" else self.status
             self._goal = list(arguments)
         elif word == "CALIBRATE":
             self._acknowledge()
@@ -132,6 +151,12 @@ class FakeRig:
             self._answer(str(self._said()))
 
     def _refusal(self, word: str, arguments: tuple[float, ...]) -> int | None:
+        if word in ("KIND", "GOTOLEFT", "GOTORIGHT") and not self.turn:
+            return Error.UNKNOWN
+        if word in ("LIMITS", "SETLIMITS", "FORGET") and self.memory is None:
+            return Error.UNKNOWN
+        if word == "SETLIMITS" and self.calibrated:
+            return Error.BUSY
         homing = time.monotonic() < self._home_at
         if word == "POSITION" and (homing or not self.calibrated):
             return Error.UNCALIBRATED
@@ -145,6 +170,12 @@ class FakeRig:
             return self.restarted
         too_fast = word == "RUN" and any(abs(a) > s for a, s in zip(arguments, SPEED.values(), strict=True))
         return None if self.calibrated and not too_fast else Error.BOUNDS if too_fast else Error.UNCALIBRATED
+
+    def _answer_limits(self) -> None:
+        assert self.memory is not None
+        limits = dict(zip(LIMITS, self.memory, strict=True))
+        limits |= {"yaw": CIRCLE_YAW} if self.turn else {}
+        self._answer("LIMITS:" + ",".join(f"{limit:.6f}" for limit in limits.values()) + f",{self.source}")
 
     def _acknowledge(self) -> None:
         self.status = 0 if self.status in TROUBLE else self.status

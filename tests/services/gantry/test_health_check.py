@@ -4,8 +4,10 @@ from pathlib import Path
 import pytest
 
 from services.gantry import health_check
+from services.gantry.conversion import Conversion
 from services.gantry.health_check import home, read_state, run_checks
 from services.gantry.link import Link
+from services.gantry.memory import wanted
 from services.gantry.motion import MotionLimits
 from services.gantry.port import SerialPort
 from services.gantry.protocol import Status
@@ -25,7 +27,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[FakeRig, Lin
 
 def test_the_home_is_inside_the_limits_by_less_than_a_millimetre() -> None:
     limits = MotionLimits()
-    at = home(limits)
+    at = home(limits, Conversion())
     assert limits.holds(at) and at.yaw - limits.low.yaw == pytest.approx(1e-4)
     assert math.dist((at.x, at.y), (limits.low.x, limits.low.y)) == 0
 
@@ -41,7 +43,7 @@ def test_a_rig_that_is_not_calibrated_has_a_status_and_no_position(line: "tuple[
 
 def test_a_home_that_is_not_where_it_was_fails_with_its_axis(line: "tuple[FakeRig, Link]") -> None:
     """Homing takes the same time from everywhere, as if the switch moved with the rig."""
-    result = run_checks(line[1], MotionLimits(), 5.0)
+    result = run_checks(line[1], MotionLimits(), wanted(None, Conversion()), 5.0)
     assert not result["ok"]
     assert result["reason"].startswith("homing x is ") and result["reason"].endswith("mm, expected at most 5")
     named = {check["name"]: check["ok"] for check in result["checks"]}
@@ -51,6 +53,6 @@ def test_a_home_that_is_not_where_it_was_fails_with_its_axis(line: "tuple[FakeRi
 def test_an_old_fault_fails_and_is_not_erased(line: "tuple[FakeRig, Link]") -> None:
     rig, link = line
     rig.status = int(Status.STALL)
-    result = run_checks(link, MotionLimits(), 5.0)
+    result = run_checks(link, MotionLimits(), wanted(None, Conversion()), 5.0)
     assert (result["ok"], result["checks"]) == (False, [])
     assert "a motor stalled" in result["reason"] and rig.status == Status.STALL

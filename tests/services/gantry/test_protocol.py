@@ -30,8 +30,8 @@ def same(a: Answer, b: Answer) -> bool:
     ("word", "arguments", "text"),
     [
         (Word.STOP, (), b"$STOP\n"),
-        (Word.RUN, (0.5, -0.25, 1), b"$RUN:0.5000,-0.2500,1.0000\n"),
-        (Word.GOTO, (-0.00001, 1e-9, 1 / 3), b"$GOTO:0.0000,0.0000,0.3333\n"),
+        (Word.RUN, (0.5, -0.25, 1), b"$RUN:0.500000,-0.250000,1.000000\n"),
+        (Word.GOTO, (-0.0000001, 1e-9, 1 / 3), b"$GOTO:0.000000,0.000000,0.333333\n"),
     ],
 )
 def test_commands(word: Word, arguments: tuple[float, ...], text: bytes) -> None:
@@ -42,8 +42,8 @@ def test_commands(word: Word, arguments: tuple[float, ...], text: bytes) -> None
 def test_commands_say_what_they_are_given(word: Word, arguments: list[float]) -> None:
     match = COMMAND.fullmatch(command(word, *arguments).decode().removesuffix("\n"))
     assert match is not None and match[1] == word
-    assert [float(a) for a in match[2].split(",") if a] == pytest.approx(arguments, abs=5.1e-5)
-    assert "-0.0000" not in match[2].split(",")
+    assert [float(a) for a in match[2].split(",") if a] == pytest.approx(arguments, abs=5.1e-7)
+    assert "-0.000000" not in match[2].split(",")
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])

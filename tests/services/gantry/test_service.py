@@ -20,7 +20,7 @@ from services.base.manifest import load_manifest
 from services.gantry import link, start
 from services.gantry.link import Link, RigError
 from services.gantry.port import SerialPort
-from services.gantry.rig_table import Error
+from services.gantry.rig_table import TURN, Error
 from services.gantry.service import Gantry
 from tests.services.built import built, hand, refusal
 from tests.services.gantry.fake_rig import FakeRig
@@ -269,6 +269,14 @@ def test_it_calibrates_only_on_request(rig: FakeRig) -> None:
     with ready(rig, "--calibrate"):
         assert rig.commands("CALIBRATE") == [()]
         assert rig.at == pytest.approx([0, 0, 0], abs=1e-3)
+
+
+@pytest.mark.parametrize(("turn", "flags"), [(TURN, ()), (0, ("--kind=circle",))])
+def test_it_moves_no_rig_with_the_firmware_of_the_other_kind(rig: FakeRig, turn: int, flags: tuple[str, ...]) -> None:
+    rig.turn = turn
+    error = refused(rig, f"--serial={rig.path}", "--calibrate", *flags)
+    assert "kind circle" in error
+    assert not {"CALIBRATE", "GOTO", "RUN"} & {word for word, _ in rig.received}
 
 
 @pytest.mark.realtime

@@ -1,0 +1,160 @@
+"""The limits in the rig's memory: those of its file, read and where needed written before anything moves."""
+
+import logging
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from services.gantry import start
+from services.gantry.conversion import Conversion
+from services.gantry.link import Link, RigError
+from services.gantry.port import PortError
+from services.gantry.protocol import Error, Limits, Status, Word, command
+from services.gantry.rig_table import CIRCLE_YAW, LIMITS, Source
+
+UNITS = {
+    "x": "m",
+    "y": "m",
+    "yaw": "rad",
+    "speed": "m/s",
+    "yaw-rate": "rad/s",
+    "acceleration": "m/s2",
+    "yaw-acceleration": "rad/s2",
+}
+_WRITING = 3.0
+"""s that the rig may take to stand still, and again to write; it needs 0.25 s for that."""
+_NEAR = 2e-6
+_DECIMALS, _EXACT = 4, 1e-6
+"""A limit is rounded down to so many decimals; what is only a floating-point number's error below one is it."""
+
+_log = logging.getLogger(__name__)
+
+
+def wanted(text: str | None, conversion: Conversion) -> dict[str, float]:
+    """The memory's limits by name for true ones such as ``x=1.5,speed=0.4``; others are the widest.
+
+    They are its firmware's, by which no place, speed or acceleration is beyond the true limit, but where that is
+    narrower than the memory can have: then it has the narrowest, and the programs that move the rig keep the true one.
+    Raises PortError for a text that is no such list.
+    """
+    circle = conversion.circle
+    found = {name: widest for name, (_, widest) in LIMITS.items()} | ({"yaw": CIRCLE_YAW} if circle else {})
+    for word in filter(None, (text or "").split(",")):
+        name, _, number = word.partition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if name not in found or not value > 0 or (circle and name == "yaw"):
+            raise PortError(f"'{word}' is not a limit, expected for example speed=0.4")
+        narrowest, widest = LIMITS[name]
+        value, scale = conversion.limit_to_firmware(name, value), 10**_DECIMALS
+        found[name] = widest if value >= widest else max(narrowest, math.floor(value * scale + _EXACT) / scale)
+    return found
+
+
+def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = False) -> None:
+    """See that the rig's memory has these limits of its firmware; with ``write`` they are written where it has others.
+
+    Limits that were kept become wider with ``widen`` alone, as an operator asks for it: what is safe on a rig is not up
+    to each repository with a test for it. Raises PortError then, and RigError where the memory has other limits at
+    last. A firmware without such a memory has the built-in limits; tighter ones are kept by the programs that move it
+    alone, which is logged.
+    """
+    found = read(link)
+    if found is None:
+        tighter = {name: limit for name, limit in limits.items() if limit < LIMITS[name][1] - _NEAR}
+        if tighter:
+            _log.warning(
+                "the rig at %s has no memory for limits; its firmware does not keep %s",
+                link.name,
+                _text(tighter, link.conversion),
+            )
+        return
+    if _is(found, limits):
+        return
+    if not write:
+        what = _deviation(found, limits, link.conversion)
+        raise RigError(f"the memory of the rig at {link.name} {what}; calibrate it, which writes them")
+    if found.source == Source.KEPT and not widen and _exceed(limits, found):
+        what = _deviation(found, limits, link.conversion)
+        raise PortError(f"the memory of the rig at {link.name} {what}; only 'dodo rig calibrate' makes them wider")
+    _forget(link)
+    numbers = ",".join(f"{value:.6f}".rstrip("0").rstrip(".") for value in limits.values())
+    answers = link.exchange(f"${Word.SETLIMITS}:{numbers}\n".encode("ascii") + command(Word.STATUS), start.ANSWER)
+    if answers.refusals:
+        raise RigError(f"the rig at {link.name} refuses its limits: {answers.refusals[0]}")
+    end = time.monotonic() + _WRITING
+    while (found := read(link) or found).source == Source.WRITING and time.monotonic() < end:
+        time.sleep(start.POLL)
+    if not _is(found, limits):
+        what = _deviation(found, limits, link.conversion)
+        raise RigError(f"the memory of the rig at {link.name} {what}, although it was written")
+    _log.info("the rig at %s keeps its limits: %s", link.name, _text(limits, link.conversion))
+
+
+def read(link: Link) -> Limits | None:
+    """The limits that hold; None for a firmware that does not know them, and says so twice. Raises RigError."""
+    unknown = 0
+    for _ in range(start.TRIES):
+        found = link.exchange(command(Word.LIMITS) + command(Word.STATUS), start.ANSWER)
+        if found.limits is not None:
+            return found.limits
+        unknown += any(refusal.code == Error.UNKNOWN for refusal in found.refusals)
+        if unknown == 2:
+            return None
+    raise RigError(f"the rig at {link.name} does not say its limits")
+
+
+def shown(found: Limits | None, conversion: Conversion) -> dict[str, Any]:
+    """True limits for people and programs: by name, and where they are ``from``; empty without a memory."""
+    if found is None:
+        return {}
+    return {**_true(dict(zip(LIMITS, found.values, strict=True)), conversion), "from": found.source.name.lower()}
+
+
+def _forget(link: Link) -> None:
+    """Stop the rig, and make it forget its home as soon as it stands. Raises RigError."""
+    start.give(link, Word.STOP)
+    end = time.monotonic() + _WRITING
+    while True:
+        answers = link.exchange(command(Word.FORGET) + command(Word.STATUS), start.ANSWER)
+        if not answers.refusals and answers.status is not None:
+            break
+        if time.monotonic() > end:
+            reason = answers.refusals[0] if answers.refusals else "it does not answer"
+            raise RigError(f"the rig at {link.name} cannot be given its limits: {reason}")
+        time.sleep(start.POLL)
+    if answers.status != Status.NOT_CALIBRATED:
+        raise RigError(f"the rig at {link.name} cannot be given its limits: it still knows its home")
+
+
+def _exceed(limits: Mapping[str, float], found: Limits) -> bool:
+    return any(limit > kept + _NEAR for limit, kept in zip(limits.values(), found.values, strict=True))
+
+
+def _is(found: Limits, limits: Mapping[str, float]) -> bool:
+    near = all(abs(a - b) < _NEAR for a, b in zip(found.values, limits.values(), strict=True))
+    return near and found.source in (Source.BUILT, Source.KEPT)
+
+
+def _deviation(found: Limits, limits: Mapping[str, float], conversion: Conversion) -> str:
+    if found.source == Source.DAMAGED:
+        return "is damaged, and the narrowest limits hold instead of those of its file"
+    others = dict(zip(LIMITS, found.values, strict=True))
+    has, expected = (_text(_differences(*two), conversion) for two in ((others, limits), (limits, others)))
+    return f"has other limits than its file: {has}, expected {expected}"
+
+
+def _differences(limits: Mapping[str, float], others: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in limits.items() if abs(value - others[name]) >= _NEAR}
+
+
+def _true(limits: Mapping[str, float], conversion: Conversion) -> dict[str, float]:
+    return {name: round(conversion.limit_to_true(name, value), 6) for name, value in limits.items()}
+
+
+def _text(limits: Mapping[str, float], conversion: Conversion) -> str:
+    """Limits of the firmware as true ones."""
+    return ", ".join(f"{name} {value:g} {UNITS[name]}" for name, value in _true(limits, conversion).items())

@@ -1,0 +1,122 @@
+"""A rig whose yaw turns without end: its firmware, its headings, its limits and its health check."""
+
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from services.gantry import health_check, manual, start
+from services.gantry.conversion import Conversion
+from services.gantry.health_check import INDEX, home, run_checks
+from services.gantry.link import Link, LinkAnswers, RigError
+from services.gantry.memory import wanted
+from services.gantry.motion import MotionLimits, Shaper, Velocity, box
+from services.gantry.port import SerialPort
+from services.gantry.protocol import Circle, Position, Refusal, answer
+from services.gantry.rig_table import TURN
+from tests.services.gantry.fake_rig import FakeRig
+
+LOW, HIGH = box(1.9, 1.4, math.radians(170), Conversion(circle=True))
+LIMITS = MotionLimits(low=LOW, high=HIGH)
+
+
+@pytest.fixture
+def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[FakeRig, Link]]:
+    monkeypatch.setattr(health_check, "ROUNDS", 3)
+    monkeypatch.setattr(health_check, "TRIES", 1)
+    monkeypatch.setattr(health_check, "REPEATS", dict.fromkeys(("x", "y", "yaw"), 1.0))
+    with FakeRig(tmp_path / "rig") as rig:
+        rig.turn = TURN
+        link = Link(str(rig.path), lambda: SerialPort(str(rig.path)), conversion=Conversion(circle=True))
+        yield rig, link
+        link.close()
+
+
+def test_the_firmware_of_the_kind_is_known(line: tuple[FakeRig, Link]) -> None:
+    start.check_kind(line[1], circle=True)
+    line[0].turn = 0
+    start.check_kind(line[1], circle=False)
+
+
+@pytest.mark.parametrize(
+    ("turn", "circle", "sentence"),
+    [
+        (0, True, "is not that of the kind circle: it does not know KIND"),
+        (25_344, True, "has a turn of 25344 microsteps, expected"),
+        (TURN, False, "is that of the kind circle, which would wind up a cable"),
+    ],
+)
+def test_another_firmware_is_refused_before_anything_moves(
+    line: tuple[FakeRig, Link], turn: int, circle: bool, sentence: str
+) -> None:
+    rig, link = line
+    rig.turn = turn
+    with pytest.raises(RigError, match=sentence):
+        start.check_kind(link, circle)
+    assert {word for word, _ in rig.received} == {"KIND", "STATUS"}
+
+
+@pytest.mark.parametrize("action", [("goto", "0", "0", "0"), ("calibrate",), ("check",), ("home",)])
+@pytest.mark.parametrize(("turn", "kind"), [(TURN, ()), (0, ("--kind=circle",))])
+def test_by_hand_nothing_moves_a_rig_with_the_firmware_of_the_other_kind(
+    line: tuple[FakeRig, Link], turn: int, kind: tuple[str, ...], action: tuple[str, ...]
+) -> None:
+    rig, _ = line
+    rig.turn = turn
+    assert manual.main([f"--serial={rig.path}", *kind, *action], sys.stdout) == 1
+    assert not {"GOTO", "CALIBRATE", "RUN"} & {word for word, _ in rig.received}
+
+
+def test_a_kind_that_is_garbled_once_does_not_let_a_circle_pass(
+    line: tuple[FakeRig, Link], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = [LinkAnswers(refusals=(Refusal(1),)), LinkAnswers(circle=Circle(TURN))]
+    monkeypatch.setattr(line[1], "exchange", lambda *_: answers.pop(0))
+    with pytest.raises(RigError, match="would wind up a cable"):
+        start.check_kind(line[1], circle=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"), [("$CIRCLE:25600", Circle(25_600)), ("$CIRCLE:", None), ("$CIRCLE:1.5", None)]
+)
+def test_the_answer_to_kind(text: str, found: Circle | None) -> None:
+    assert answer(text) == found
+
+
+def test_headings_have_no_edge_and_places_do() -> None:
+    shaper = Shaper(LIMITS)
+    for _ in range(30):
+        velocity = shaper.step(Velocity(yaw=1), Position(0, 0, 3.14), 0.05)
+    assert (velocity.yaw, shaper.cut) == (1, 0)
+    assert LIMITS.holds(Position(0, 0, math.pi)) and not LIMITS.holds(Position(1, 0, 0))
+    assert home(LIMITS, Conversion(circle=True)) == Position(LOW.x, LOW.y, INDEX)
+
+
+def test_a_heading_may_have_the_name_of_another_turn() -> None:
+    assert start.near(Position(0, 0, -3.141), Position(0, 0, 3.141))
+    assert not start.near(Position(0, 0, -3.1), Position(0, 0, 3.1))
+
+
+def test_the_health_check_turns_around_and_passes_the_index_to_either_side(line: tuple[FakeRig, Link]) -> None:
+    rig, link = line
+    assert run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)["ok"]
+    words = [word for word, _ in rig.received if word in ("GOTOLEFT", "GOTORIGHT")]
+    assert words == ["GOTOLEFT", "GOTOLEFT", "GOTORIGHT"]
+
+
+def test_a_rig_that_loses_its_index_on_the_way_round_is_not_fit(line: tuple[FakeRig, Link]) -> None:
+    rig, link = line
+    rig.lost_index = True
+    result = run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)
+    assert not result["ok"] and "lost steps" in result["reason"]
+
+
+def test_by_hand_any_heading_is_reached(line: tuple[FakeRig, Link], capsys: pytest.CaptureFixture[str]) -> None:
+    rig, _ = line
+    assert manual.main([f"--serial={rig.path}", "--kind=circle", "goto", "0", "0", "350"], sys.stdout) == 0
+    assert rig.commands("GOTO")[-1] == pytest.approx((0, 0, math.radians(-10)), abs=1e-4)
+    assert manual.main([f"--serial={rig.path}", "--kind=circle", "goto", "2", "0", "0"], sys.stdout) == 2
+    assert "any yaw" in capsys.readouterr().out
+    assert manual.main([f"--serial={rig.path}", "--kind=square", "status"], sys.stdout) != 0
