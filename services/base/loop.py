@@ -31,9 +31,10 @@ class Loop:
 
     ``name`` is the source in its EndOfInput. Lines on stdout report, once a second at most, how many messages were
     lost so far (``{"dodo": "lost", "messages": N}``) and in real time how many updates ended late since the test began
-    (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``), that a source is at its end (``{"dodo":
-    "end-of-input"}``), and messages that came under other sender stamps only (``{"dodo": "note", "text": "..."}``),
-    unless a verdict does. Raises what the model raises, and SessionError.
+    (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``) and for how long what is emulated stood still
+    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and messages that came
+    under other sender stamps only (``{"dodo": "note", "text": "..."}``), unless a verdict does. Raises what the model
+    raises, and SessionError.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Loop:
     _stamps: HeardStamps = field(init=False)
     _has_begun: bool = False
     _reported: int = 0
+    _paused: float = 0.0
     _report_after: int = 0
     _lateness: Lateness = field(init=False)
     _truth: WithheldTruth = field(init=False)
@@ -164,6 +166,9 @@ class Loop:
         if (late := self._lateness.news()) is not None:
             self._report_after = now + REPORT_PERIOD
             print(json.dumps({"dodo": "late", **late}), flush=True)
+        if self.service.paused > self._paused:
+            self._paused, self._report_after = self.service.paused, now + REPORT_PERIOD
+            print(json.dumps({"dodo": "paused", "s": round(self._paused, 3)}), flush=True)
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         envelope = output if isinstance(output, Envelope) else self._envelope(output, now)
@@ -175,6 +180,7 @@ class Loop:
             self._truth.keep(envelope, now)
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:
-        message, stamp = output if isinstance(output, Output) else (output, self.sender_stamp)
-        messages = self.session.messages
-        return Envelope(messages.id(message), messages.encode(message), time.time_ns() // 1000, 0, now, stamp)
+        message, stamp, sampled = output if isinstance(output, Output) else Output(output, self.sender_stamp)
+        messages, sent = self.session.messages, time.time_ns() // 1000
+        sample_time = now if sampled is None else sampled
+        return Envelope(messages.id(message), messages.encode(message), sent, 0, sample_time, stamp)

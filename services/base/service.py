@@ -24,10 +24,11 @@ Handler = Callable[[Any, int], None]
 
 
 class Output(NamedTuple):
-    """A message to send with a sender stamp of its own."""
+    """A message to send with a sender stamp of its own, and a sample time (us) where it is not that of the update."""
 
     message: Message
     sender_stamp: int
+    sample_time: int | None = None
 
 
 class Service:
@@ -48,6 +49,8 @@ class Service:
     """Microseconds after which an update that ends counts as late; None for half a period, and 10 ms at least."""
     arrived: int | None = None
     """When the message that is handled, or was last, arrived, in microseconds of test time."""
+    paused: float = 0.0
+    """Seconds for which what the service emulates has stood still so far, as the machine was too busy for it."""
     drive: Callable[[Callable[[], bool]], None] | None = None
     """Runs instead of the loop, for the clock service. Takes a function that says whether to stop."""
 

@@ -9,10 +9,12 @@ from services.base.stamps import others
 from services.clock.answers import MOST_SURPLUS, Answers
 from services.clock.exchange import StepCommand, StepResult
 from services.clock.participants import SLICE_S, ApplicationFloods, ApplicationSilent, IsStopped, Patience, ServiceLink
-from services.clock.processor_time import NOTHING, ApplicationProcesses, own_wait_s
+from services.clock.processor_time import NOTHING, ApplicationProcesses, contention_s, own_wait_s
 from services.clock.response import ResponseTimes
 
 _AGAIN_S = 0.5
+MOST_CONTENTION_S = 20.0
+"""Most seconds for which an application has longer as the machine is busy, where its processes cannot be seen."""
 
 
 class SteppedApplication:
@@ -37,6 +39,7 @@ class SteppedApplication:
         """To be set when they are known."""
         self._patience, self._link, self._stopped = patience, link, stopped
         self._began, self._before, self._own_before = 0.0, NOTHING, 0.0
+        self._contention_before = 0.0
         self._shown, self._own_wait = 0.0, 0.0
         """When all pictures were there, and how long the clock itself had waited for a processor until then."""
         self._cid = cid
@@ -59,6 +62,7 @@ class SteppedApplication:
         """Announce new pictures as soon as readers wait for them; raises ApplicationSilent and ApplicationFloods."""
         self.frames += 1
         self._began, self._before, self._own_before = time.monotonic(), self.processes.snapshot(), own_wait_s()
+        self._contention_before = 0.0 if self.processes else contention_s()
         again = self._began + _AGAIN_S
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
@@ -112,14 +116,20 @@ class SteppedApplication:
 
     @property
     def _left(self) -> float:
-        """Seconds of patience; what the application, or the clock, waited for a processor does not count."""
+        """Seconds of patience; what the application, or the clock, waited for a processor does not count.
+
+        Of an application in containers it is not known: there, up to MOST_CONTENTION_S do not count in which anything
+        on the machine waited.
+        """
         left = self._began + self._limit - time.monotonic()
         return left if left > 0 else left + self._starved
 
     @property
     def _starved(self) -> float:
         own = own_wait_s() - self._own_before
-        return max(self.processes.snapshot().longest_wait(self._before), own) if self.processes else own
+        if self.processes:
+            return max(self.processes.snapshot().longest_wait(self._before), own)
+        return max(min(contention_s() - self._contention_before, MOST_CONTENTION_S), own)
 
     def _repeat_first(self, again: float) -> float:
         """An application that starts late gets what was sent before its first picture, as in real time."""

@@ -23,11 +23,19 @@ from services.clock.participants import (
 
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""
+FIRST_TIMES = 4
+"""How many times as long it has for its first one without a runner, as the clock begins while others still start.
+
+Compose then starts one layer after the other, of which each may take as long.
+"""
 
 
 @dataclass
 class Stepper:
-    """Steps a test; ``period`` and ``timeout`` in us of test time."""
+    """Steps a test; ``period`` and ``timeout`` in us of test time.
+
+    ``waits_for_start`` is whether services may still have to start when it begins.
+    """
 
     roles: Roles
     period: Fraction | int
@@ -36,6 +44,7 @@ class Stepper:
     link: ServiceLink
     stopped: IsStopped
     now: int = EPOCH
+    waits_for_start: bool = False
     reached: int = EPOCH
     """The last step that the evaluators have finished."""
     _judging: list[str] = field(default_factory=list)
@@ -136,11 +145,12 @@ class Stepper:
         results: list[StepResult] = []
         began = time.monotonic()
         for name in names:
+            patience = SERVICE_PATIENCE * (FIRST_TIMES if self.waits_for_start and name not in self._next else 1)
             while (result := self.link.result(name)) is None:
                 if self.stopped():
                     return results
-                if time.monotonic() - began > SERVICE_PATIENCE:
-                    raise ServiceSilent(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
+                if time.monotonic() - began > patience:
+                    raise ServiceSilent(f"service '{name}' did not answer the clock within {patience:g} s")
                 self.link.pump(SLICE_S, bus=False)
             self._take(result)
             results.append(result)

@@ -82,6 +82,18 @@ def own_wait_s(schedstat: Path = Path("/proc/thread-self/schedstat")) -> float:
     return 0.0
 
 
+def contention_s(pressure: Path = Path("/proc/pressure/cpu")) -> float:
+    """For how long any process of this machine has been ready to run without a processor; 0 where it is not counted.
+
+    The kernel's pressure stall information (its Documentation/accounting/psi.rst), also inside a container: the total
+    of the line "some", in us.
+    """
+    with contextlib.suppress(OSError, ValueError):
+        some, _, total = pressure.read_text().partition("\n")[0].rpartition("total=")
+        return int(total) / 1e6 if some.startswith("some ") else 0.0
+    return 0.0
+
+
 def descendants(roots: frozenset[int], proc: Path) -> list[int]:
     """The roots and all processes that descend from them."""
     parents = {int(entry.name): _parent(entry / "stat") for entry in proc.iterdir() if entry.name.isdigit()}

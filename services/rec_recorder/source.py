@@ -104,7 +104,7 @@ class Source:
                 return (bytes(self._memory.buffer), time) if is_picture and self._is_due(time) else None
         except SharedMemoryError as error:
             _log.debug("no picture of '%s': %s", self.spec.name, error)
-            if not self._is_there():
+            if self._memory is None or not self._memory.is_there:
                 self.close()
                 self._retry = now + RETRY
             return None
@@ -120,16 +120,6 @@ class Source:
         if self._memory is not None:
             self._memory.close()
             self._memory = None
-
-    def _is_there(self) -> bool:
-        """Whether the memory was only locked for long, and not removed."""
-        if self._memory is None:
-            return False
-        try:
-            self._memory.readers_waiting()
-        except SharedMemoryError:
-            return False
-        return True
 
     def _found(self, now: int) -> bool:
         if now < self._retry:

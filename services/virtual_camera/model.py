@@ -1,52 +1,23 @@
 """The virtual camera: follows a vehicle's frames and draws a picture whenever one is due."""
 
 import logging
-import math
 from collections.abc import Callable
-from typing import Protocol
 
 import cv2
 import numpy as np
 
-from services.virtual_camera.camera import CameraPose, quaternion_rotation
-from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.draw.render import Renderer
+from services.scene.camera import CameraPose
+from services.scene.draw.raster import Image
+from services.scene.draw.render import Renderer
+from services.scene.motion import LONGEST_GAP, between, still
+from services.scene.vehicle import CameraFrame, body_pose
 from services.virtual_camera.image.optics import Optics
-from services.virtual_camera.motion import LONGEST_GAP, between, still
-
-FARTHEST = 1e6
-"""Frames farther than this from the origin, in m, are refused."""
 
 Publish = Callable[[Image, Image, int], None]
 """Takes a picture as ARGB (height, width, 4) and as I420 (height * 3 / 2, width), and its sample time in us.
 
 Both arrays are drawn over by the next picture.
 """
-
-
-class CameraFrame(Protocol):
-    """The fields of ``opendlv.sim.Frame``: position in m and attitude of a body in the world."""
-
-    x: float
-    y: float
-    z: float
-    qx: float
-    qy: float
-    qz: float
-    qw: float
-
-
-def body_pose(frame: CameraFrame) -> CameraPose:
-    """The pose in a frame; ValueError when it has none."""
-    position = np.array([frame.x, frame.y, frame.z], dtype=np.float64)
-    if not (np.abs(position) <= FARTHEST).all():
-        raise ValueError(f"position ({frame.x}, {frame.y}, {frame.z}) is not within {FARTHEST:.0f} m")
-    return CameraPose(position, quaternion_rotation(frame.qx, frame.qy, frame.qz, frame.qw))
-
-
-def mount(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> CameraPose:
-    """The camera on the body: offset in m, angles in degrees; a positive pitch looks up, as in OpenDLV."""
-    return CameraPose.at(x, y, z, math.radians(roll), -math.radians(pitch), math.radians(yaw))
 
 
 def to_i420(argb: Image, out: Image | None = None) -> Image:

@@ -1,58 +1,29 @@
 """The virtual camera on the bus and in shared memory."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
 import numpy as np
-from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Flags, Output, Service, period_of
-from services.virtual_camera.camera import CameraPose, Pinhole
-from services.virtual_camera.draw.light import Light
-from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import Scene, SceneOptions, load_scene
-from services.virtual_camera.image.lens import Distortion
+from services.scene.camera import CameraPose, Pinhole
+from services.scene.draw.light import Light
+from services.scene.draw.raster import Image
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import Scene, SceneOptions, load_scene
+from services.scene.lens import Alignment, Distortion
+from services.scene.truth_sender import TruthSender, truth_sender
+from services.scene.vehicle import mount
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.overlays import load_overlays
 from services.virtual_camera.image.sensor import Sensor
-from services.virtual_camera.model import Publish, VirtualCamera, mount
-from services.virtual_camera.truth import SceneTruth, TrueBox, TruthLimits, classes_of
+from services.virtual_camera.model import Publish, VirtualCamera
 
 Memories = list[tuple[SharedMemory, str]]
 """Shared memory and what it holds: argb, i420 or bgr."""
-
-
-class TruthSender:
-    """Sends true boxes as OpenDLV's detections, under its own sender stamp."""
-
-    def __init__(
-        self, truth: SceneTruth, classes: Iterable[str], camera: Pinhole, messages: MessageSet, stamp: int
-    ) -> None:
-        self._truth, self._camera, self._stamp = truth, camera, stamp
-        self._types = {name: number for number, name in enumerate(dict.fromkeys(classes), start=1)}
-        names = ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
-        self._kinds = [messages.type(f"opendlv.logic.perception.{name}") for name in names]
-
-    def outputs(self, pose: CameraPose) -> Iterator[Output]:
-        """Three messages a box, the same detectionId for the same model in every picture."""
-        for box in self._truth.boxes(pose):
-            for message in self._messages(box):
-                yield Output(message, self._stamp)
-
-    def _messages(self, box: TrueBox) -> tuple[Message, ...]:
-        kind, name, place = self._kinds
-        wide, high = self._camera.width, self._camera.height
-        fractions = {"x": box.left / wide, "y": box.top / high, "width": box.width / wide, "height": box.height / high}
-        return (
-            kind(detectionId=box.number, type=self._types[box.name]),
-            name(detectionId=box.number, property=box.name),
-            place(detectionId=box.number, **fractions),
-        )
 
 
 class VirtualCameraService(Service):
@@ -98,13 +69,6 @@ def mounted_camera(flags: Flags, renderer: Renderer, optics: Optics, publish: Pu
     return VirtualCamera(renderer, mounted, publish, optics, _start(flags))
 
 
-def open_truth(flags: Flags, renderer: Renderer, optics: Optics) -> tuple[SceneTruth, dict[str, str]]:
-    """What knows the true boxes, and the classes by model; raises ValueError for a model that the map lacks."""
-    classes = classes_of(flags["truth-classes"], renderer.bodies.names)
-    limits = TruthLimits(flags["truth-min-visible"], flags["truth-min-height"])
-    return SceneTruth(renderer, classes, limits, optics.lens), classes
-
-
 def _scene(flags: Flags) -> Scene:
     light = Light.of_flags(flags["light.azimuth"], flags["light.elevation"], flags["light.ambient"])
     numbers = {name: flags[name] for name in ("clutter", "displaced", "seed")}
@@ -117,7 +81,8 @@ def _optics(flags: Flags, scene: Scene) -> Optics:
     distortion = Distortion(*(flags[f"distortion.{name}"] for name in ("k1", "k2", "p1", "p2")))
     sensor = Sensor(flags["exposure"], flags["gain"], flags["noise"], flags["seed"])
     overlays = list(load_overlays(scene.overlays, camera.width, camera.height))
-    return Optics(camera, distortion, sensor, overlays, flags["shutter"])
+    alignment = Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
+    return Optics(camera, distortion, sensor, overlays, flags["shutter"], alignment)
 
 
 def _start(flags: Flags) -> CameraPose | None:
@@ -126,14 +91,6 @@ def _start(flags: Flags) -> CameraPose | None:
         return None
     x, y, yaw = (value or 0.0 for value in written)
     return CameraPose.at(x, y, 0.0, yaw=math.radians(yaw))
-
-
-def _truth_sender(context: Context, renderer: Renderer, optics: Optics) -> TruthSender | None:
-    stamp = context.flags["truth-sender"]
-    if stamp is None:
-        return None
-    truth, classes = open_truth(context.flags, renderer, optics)
-    return TruthSender(truth, classes.values(), optics.camera, context.messages, stamp)
 
 
 def _memories(context: Context, pixels: int) -> Memories:
@@ -148,4 +105,4 @@ def build(context: Context) -> Service:
     renderer, optics = open_scene(flags)
     publish = publisher(_memories(context, flags["width"] * flags["height"]))
     camera = mounted_camera(flags, renderer, optics, publish)
-    return VirtualCameraService(camera, flags["freq"], flags["frame-id"], _truth_sender(context, renderer, optics))
+    return VirtualCameraService(camera, flags["freq"], flags["frame-id"], truth_sender(context, renderer, optics.lens))

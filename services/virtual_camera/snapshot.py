@@ -17,9 +17,10 @@ import cv2
 from services.base import Flags
 from services.base.flags import parse
 from services.base.manifest import load_manifest
-from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.service import mounted_camera, open_scene, open_truth
-from services.virtual_camera.truth import TrueBox
+from services.scene.draw.raster import Image
+from services.scene.truth import TrueBox
+from services.scene.truth_sender import open_truth
+from services.virtual_camera.service import mounted_camera, open_scene
 
 OUTPUT = "--output="
 ORIGIN = tuple(f"--start-{name}=0" for name in ("x", "y", "yaw"))
@@ -55,7 +56,7 @@ def write_picture(argv: Sequence[str]) -> dict[str, Any]:
 def _draw(flags: Flags) -> tuple[Image, list[dict[str, Any]]]:
     """The picture (height, width, 4) and the true boxes in it."""
     renderer, optics = open_scene(flags)
-    truth, _ = open_truth(flags, renderer, optics)
+    truth, _ = open_truth(flags, renderer, optics.lens)
     pictures: list[Image] = []
     camera = mounted_camera(flags, renderer, optics, lambda argb, _i420, _now: pictures.append(argb))
     pose = camera.update(NOW)

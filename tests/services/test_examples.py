@@ -54,7 +54,7 @@ def ends_cleanly(process: "subprocess.Popen[str]") -> None:
 
 
 def test_all_services_are_tried() -> None:
-    assert len(FOLDERS) == 11
+    assert len(FOLDERS) == 12
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)

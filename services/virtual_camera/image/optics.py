@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from services.virtual_camera.camera import CameraPose, Pinhole
-from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.image.lens import Distortion, Lens
+from services.scene.camera import CameraPose, Pinhole
+from services.scene.draw.raster import Image
+from services.scene.draw.render import Renderer
+from services.scene.lens import Alignment, Distortion, lens_of
+from services.scene.motion import CameraMotion
 from services.virtual_camera.image.overlays import Overlay
 from services.virtual_camera.image.sensor import Development, Sensor
-from services.virtual_camera.motion import CameraMotion
 
 
 class Optics:
@@ -25,10 +25,11 @@ class Optics:
         sensor: Sensor | None = None,
         overlays: Sequence[Overlay] = (),
         shutter: float = 0.0,
+        alignment: Alignment | None = None,
     ) -> None:
-        """``shutter`` is open for so many seconds; ValueError for a distortion that cannot be drawn."""
+        """``shutter`` is open for so many seconds; ValueError for a lens that cannot be drawn."""
         self.camera = camera
-        self.lens = Lens(camera, distortion) if distortion else None
+        self.lens = lens_of(camera, distortion or Distortion(), alignment or Alignment())
         self.wide = self.lens.wide if self.lens else camera
         """What a renderer has to draw."""
         self._overlays, self._shutter = overlays, shutter

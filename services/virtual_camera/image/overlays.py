@@ -8,8 +8,8 @@ import numpy as np
 
 from dodo_dsl.opendlv.inputs.json_node import MapError
 from dodo_dsl.opendlv.inputs.map_file import OverlayEntry
-from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.map.textures import picture_bytes
+from services.scene.draw.raster import Image
+from services.scene.map.textures import picture_bytes
 
 
 def load_with_alpha(path: Path) -> Image:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from services.virtual_camera.draw.raster import Image
+from services.scene.draw.raster import Image
 
 GAMMA = 2.2
 _POOL = 1 << 19

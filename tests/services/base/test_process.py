@@ -55,6 +55,19 @@ def test_steps_are_even_and_stamped_with_test_time(start: Start, cid: int) -> No
     assert all(envelope.sample_time <= envelope.sent for envelope in pedals)
 
 
+def test_what_it_emulates_stood_still(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        service = start("--role=echo", "--freq=20")
+        assert service.line() == READY
+        for distance in (-0.0625, 1.0, -0.0625):
+            session.send(DISTANCE(distance=distance), sender_stamp=2)
+        assert service.line() == {"dodo": "paused", "s": 0.062}
+        session.send(DISTANCE(distance=-0.5), sender_stamp=2)
+        assert service.line() == {"dodo": "paused", "s": 0.5}
+        service.stop()
+        assert service.end() == (0, "", "")
+
+
 def test_messages_come_with_their_sample_time_and_from_the_right_sender(start: Start, cid: int) -> None:
     with Session(cid) as session:
         assert start("--role=echo", "--freq=20").line() == READY

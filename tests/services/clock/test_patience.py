@@ -53,7 +53,7 @@ class Late:
 
     def pump(self, timeout: float, bus: bool = True) -> None:
         assert timeout > 0
-        self._time.now += min(timeout, 0.01)
+        self._time.now += max(min(timeout, 0.01), 1e-6)
 
     def __getattr__(self, _name: str) -> Callable[..., None]:
         return lambda *_: None
@@ -64,6 +64,7 @@ def time(monkeypatch: pytest.MonkeyPatch) -> Time:
     time = Time()
     monkeypatch.setattr("services.clock.application.time", time)
     monkeypatch.setattr("services.clock.application.own_wait_s", lambda: 0.0)
+    monkeypatch.setattr("services.clock.application.contention_s", lambda: 0.0)
     return time
 
 
@@ -83,6 +84,19 @@ def test_what_it_waits_for_a_processor_does_not_count(time: Time) -> None:
 def test_nor_does_what_the_clock_waits(time: Time, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("services.clock.application.own_wait_s", lambda: 0.95 * time.now)
     answer(time, ApplicationProcesses(()))
+
+
+def test_nor_does_what_anything_waits_where_its_processes_cannot_be_seen(
+    time: Time, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in containers; but not for ever, as a machine may be busy for as long as the application is silent."""
+    with pytest.raises(ApplicationSilent):
+        answer(time, ApplicationProcesses(()))
+    monkeypatch.setattr("services.clock.application.contention_s", lambda: 0.95 * time.now)
+    answer(time, ApplicationProcesses(()))
+    monkeypatch.setattr("services.clock.application.MOST_CONTENTION_S", 0.3)
+    with pytest.raises(ApplicationSilent):
+        answer(time, ApplicationProcesses(()))
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from services.clock.processor_time import (
     ProcessorTimes,
     Spent,
     ThreadSpent,
+    contention_s,
     descendants,
     own_wait_s,
 )
@@ -92,6 +93,16 @@ def test_what_ended_in_between_takes_nothing_back() -> None:
     before = ProcessorTimes({7: 1.0, 8: 1.0}, {7: {"7": ThreadSpent(1.0, 0.5)}})
     after = ProcessorTimes({7: 1.25}, {7: {}})
     assert after.since(before) == Spent(0.25, 0.0)
+
+
+def test_contention_is_the_total_of_some_in_seconds(tmp_path: Path) -> None:
+    rows = (
+        "some avg10=88.09 avg60=66.82 avg300=72.62 total=41558549961\nfull avg10=0.00 avg60=0.00 avg300=0.00 total=7\n"
+    )
+    (tmp_path / "cpu").write_text(rows)
+    assert contention_s(tmp_path / "cpu") == 41558.549961
+    (tmp_path / "cpu").write_text("none\n")
+    assert contention_s(tmp_path / "cpu") == contention_s(tmp_path / "none") == 0.0
 
 
 def test_the_own_wait_is_the_second_number_of_the_kernels_in_seconds(tmp_path: Path) -> None:

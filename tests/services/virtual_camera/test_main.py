@@ -16,9 +16,9 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.virtual_camera.camera import CameraPose
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import load_scene
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
 from services.virtual_camera.model import to_i420
 from tests.services.built import refusal
 

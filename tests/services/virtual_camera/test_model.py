@@ -6,10 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from services.virtual_camera.camera import CameraPose
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import load_scene
-from services.virtual_camera.model import VirtualCamera, mount, to_i420
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
+from services.scene.vehicle import mount
+from services.virtual_camera.model import VirtualCamera, to_i420
 
 
 def frame(x=0.0, y=0.0, z=0.0, yaw=0.0, **changes):

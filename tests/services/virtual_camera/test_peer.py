@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import CameraPose
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import load_scene
-from services.virtual_camera.truth import SceneTruth, TruthLimits, classes_of
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
+from services.scene.truth import SceneTruth, TruthLimits, classes_of
 
 MAPS = package_data.registry() / "maps"
 FOVY = math.radians(48.8)

@@ -17,9 +17,9 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base import Context, Output
 from services.base.flags import parse
 from services.base.manifest import load_manifest
-from services.virtual_camera.camera import CameraPose
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import load_scene
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
 from services.virtual_camera.service import build
 from tests.services.process import receive, running
 
@@ -57,6 +57,9 @@ PICTURED = {
     "distortion.k1": ([], "-0.2"),
     "distortion.k2": ([], "0.1"),
     "distortion.p1": ([], "0.02"),
+    "focal-x": ([], "150"),
+    "centre-x": ([], "84"),
+    "centre-y": ([], "55"),
     "distortion.p2": ([], "0.02"),
     "seed": (["--noise=0.02"], "3"),
 }
@@ -174,7 +177,7 @@ def test_seed_and_time_alone_decide_what_is_drawn_by_lot(camera):
 def told(outputs: list[Output]) -> dict[int, dict[str, Any]]:
     """What was said of each detection, by the message's name."""
     found: dict[int, dict[str, Any]] = {}
-    for message, _ in outputs:
+    for message, *_ in outputs:
         found.setdefault(message.detectionId, {})[message.DESCRIPTOR.name] = message
     return found
 
@@ -225,7 +228,7 @@ def test_a_model_keeps_its_number_from_picture_to_picture(camera):
     [
         ("--truth-classes=cone_green", "no model 'cone_green' in the map, which has cone_yellow, cone_blue, cone_red"),
         ("--lines=middle", "no obstacle 'middle' with lines; the map has finish, left, right"),
-        ("--distortion.k1=-1.5", "the lens distortion is too strong"),
+        ("--distortion.k1=-1.5", "its distortion folds the picture"),
     ],
 )
 def test_what_cannot_be_is_told(camera, flag, message):

@@ -10,7 +10,10 @@ from services.base import Check, Context, Output, Service, Verdict, period_of, r
 
 
 class Echo(Service):
-    """Says the last distance as a pedal position, and since when the test runs as an angle."""
+    """Says the last distance as a pedal position, and since when the test runs as an angle.
+
+    What it emulates stood still for as long as a distance was negative.
+    """
 
     def __init__(self, context: Context) -> None:
         self.period = period_of(context.flags["freq"])
@@ -23,6 +26,7 @@ class Echo(Service):
 
     def take(self, message: Any, sample_time: int) -> None:
         self.distance, self.sampled = message.distance, sample_time
+        self.paused = max(self.paused, -message.distance)
 
     def update(self, now: int) -> Iterable[Any]:
         yield self.messages.type("opendlv.proxy.PedalPositionRequest")(position=self.distance)

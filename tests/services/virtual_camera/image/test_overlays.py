@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl.opendlv.inputs.json_node import MapError
-from services.virtual_camera.draw.scene import load_scene
+from services.scene.draw.scene import load_scene
 from services.virtual_camera.image.overlays import Overlay, load_overlays
 
 

@@ -1,0 +1,114 @@
+"""The projected truth on the bus: boxes for each picture of a camera that somebody else takes."""
+
+import logging
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+
+from services.base import Context, Flags, Output, Service
+from services.projected_truth.followed import FollowedMemory
+from services.projected_truth.path import MICROSECONDS, MeasuredPath
+from services.scene.camera import CameraPose, Pinhole
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
+from services.scene.lens import Alignment, Distortion, Lens, lens_of
+from services.scene.truth_sender import TruthSender, truth_sender
+from services.scene.vehicle import CameraFrame, body_pose, mount
+
+PATIENCE = 250_000
+"""us after a picture in which a pose measured later has to come; then the vehicle counts as moving on evenly."""
+_MOST = 64
+
+_log = logging.getLogger(__name__)
+
+Followed = Callable[[int], int | None]
+"""Takes the time, in us; gives the sample time of a picture that is new."""
+
+
+class ProjectedTruth(Service):
+    """Boxes of each picture as soon as the pose at its time is known; ``projected`` and ``missed`` count pictures."""
+
+    period = 5_000
+
+    def __init__(
+        self, sender: TruthSender, mounted: CameraPose, followed: Followed, frame_id: int | None, latency: int = 0
+    ) -> None:
+        """``mounted`` is the camera on the vehicle, or in the world without ``frame_id``; ``latency`` in us."""
+        self.inputs = {} if frame_id is None else {("opendlv.sim.Frame", frame_id): self.take_frame}
+        self._sender, self._mounted, self._followed, self._latency = sender, mounted, followed, latency
+        self._path = None if frame_id is None else MeasuredPath()
+        self._waiting: deque[int] = deque(maxlen=_MOST)
+        self._has_begun = False
+        self.projected, self.missed, self.refused = 0, 0, 0
+
+    def begin(self, now: int) -> None:
+        self._has_begun = True
+
+    def take_frame(self, frame: CameraFrame, sample_time: int) -> None:
+        """Where the vehicle is, as measured; ``sample_time`` in us of test time."""
+        assert self._path is not None
+        try:
+            self._path.add(sample_time, body_pose(frame))
+        except ValueError as error:
+            if not self.refused:
+                _log.warning("refused the frame of %d us, and will refuse all such: %s", sample_time, error)
+            self.refused += 1
+
+    def update(self, now: int) -> Iterator[Output]:
+        picture = self._followed(now)
+        if picture is not None:
+            self._waiting.append(picture)
+        while self._waiting and self._is_known(self._waiting[0], now):
+            picture = self._waiting.popleft()
+            pose = self._pose(picture - self._latency)
+            if pose is None:
+                self.missed += self._has_begun
+                continue
+            self.projected += 1
+            yield from self._sender.outputs(pose, picture)
+
+    def _is_known(self, picture: int, now: int) -> bool:
+        return self._path is None or self._path.reaches(picture - self._latency) or now - picture > PATIENCE
+
+    def _pose(self, time: int) -> CameraPose | None:
+        """The camera's in the world."""
+        if self._path is None:
+            return self._mounted
+        body = self._path.at(time)
+        return body.carrying(self._mounted) if body else None
+
+    def tell(self) -> None:
+        """Logs what was done."""
+        _log.info("projected the truth into %d pictures", self.projected)
+        if self.missed:
+            _log.warning("%d pictures have no truth: no pose was measured near them", self.missed)
+
+
+def build(context: Context) -> Service:
+    """The service from its flags; raises MapError and ValueError."""
+    flags = context.flags
+    if context.clock.relays:
+        raise ValueError("a rig does not wait, so this is for real time; in lockstep virtual-camera has a truth-sender")
+    cv2.setNumThreads(1)
+    renderer, lens = _open(flags)
+    sender = truth_sender(context, renderer, lens)
+    assert sender is not None, "--truth-sender is required"
+    mounted = mount(*(flags[name] for name in ("x", "y", "z", "roll", "pitch", "yaw")))
+    memory = FollowedMemory(flags["follow"])
+    context.resources.callback(memory.close)
+    latency = round(flags["latency"] * MICROSECONDS)
+    service = ProjectedTruth(sender, mounted, memory.new, flags["frame-id"], latency)
+    context.resources.callback(service.tell)
+    return service
+
+
+def _open(flags: Flags) -> tuple[Renderer, Lens | None]:
+    camera = Pinhole(flags["width"], flags["height"], math.radians(flags["fovy"]))
+    distortion = Distortion(*(flags[f"distortion.{name}"] for name in ("k1", "k2", "p1", "p2")))
+    alignment = Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
+    lens = lens_of(camera, distortion, alignment)
+    wide = lens.wide if lens else camera
+    return Renderer(load_scene(Path(flags["map-path"])), wide.width, wide.height, wide.fovy), lens

@@ -1,0 +1,149 @@
+"""True boxes of pictures that another camera takes."""
+
+import math
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+
+from dodo_dsl import package_data
+from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.base import Context, Output
+from services.base.clock import RealTimeClock
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.projected_truth.service import PATIENCE, ProjectedTruth, build
+from services.virtual_camera import service as virtual_camera
+from tests.services.process import ROOT
+
+MESSAGES = MessageSet.standard()
+SERVICES = package_data.services()
+MAP = f"--map-path={ROOT / 'tests_registry' / 'maps' / 'rig-straight'}"
+SIZE = ("--width=320", "--height=240", "--z=0.095")
+BEGIN, PICTURE = 1_700_000_000_000_000, 100_000
+LENS = ("--distortion.k1=-0.1", "--fovy=55", "--pitch=-4")
+SENSOR = ("--focal-x=240", "--centre-x=170", "--centre-y=112.5")
+
+
+class Projection:
+    """The service beside a memory that a camera would write."""
+
+    def __init__(self, resources: ExitStack, *flags: str) -> None:
+        name = f"dodo-test-{os.getpid()}.followed"
+        self.memory = resources.enter_context(SharedMemory.create(name, 320 * 240 * 3 // 2))
+        words = ["--cid=111", MAP, *SIZE, f"--follow={name}", "--truth-sender=9", *flags]
+        parsed = parse(load_manifest(SERVICES / "projected_truth"), words)
+        self.service = build(Context("projected-truth", parsed, MESSAGES, resources))
+        self.picture(BEGIN - PICTURE)
+        assert self.update(BEGIN - PICTURE) == [], "what is there at first may not be a picture"
+        self.service.begin(BEGIN)
+
+    def picture(self, time: int) -> None:
+        with self.memory.lock():
+            self.memory.stamp(time)
+
+    def frame(self, time: int, x: float, y: float = 0.0, yaw: float = 0.0) -> None:
+        frame = MESSAGES.type("opendlv.sim.Frame")(x=x, y=y, qz=math.sin(yaw / 2), qw=math.cos(yaw / 2))
+        self.service.inputs["opendlv.sim.Frame", 4](frame, time)
+
+    def update(self, now: int) -> list[Output]:
+        return list(self.service.update(now))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def resources() -> Iterator[ExitStack]:
+    with ExitStack() as stack:
+        yield stack
+
+
+def drawn(resources: ExitStack, x: float, y: float, yaw: float, *flags: str) -> list[tuple[Any, int]]:
+    """What the virtual camera says of its own picture from a place."""
+    names = [f"--name.{kind}=dodo-test-{os.getpid()}.{kind}" for kind in ("argb", "i420")]
+    start = [f"--start-x={x}", f"--start-y={y}", f"--start-yaw={math.degrees(yaw)}"]
+    words = ["--cid=111", MAP, *SIZE, *names, *start, "--truth-sender=9", *flags]
+    parsed = parse(load_manifest(SERVICES / "virtual_camera"), words)
+    camera = virtual_camera.build(Context("virtual-camera", parsed, MESSAGES, resources))
+    return [(each.message, each.sender_stamp) for each in camera.update(BEGIN)]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("flags", [(), LENS, SENSOR, (*LENS, *SENSOR)])
+def test_it_says_what_a_virtual_camera_at_the_same_place_says(resources: ExitStack, flags: tuple[str, ...]) -> None:
+    """The pose at the picture's time lies between two measured ones; the boxes have the picture's sample time."""
+    projection = Projection(resources, "--frame-id=4", "--latency=0.01", *flags)
+    projection.picture(BEGIN + 30_000)
+    projection.frame(BEGIN, -0.8, 0.02, -0.1)
+    assert projection.update(BEGIN + 35_000) == [], "it waits for the pose behind the picture"
+    projection.frame(BEGIN + 40_000, -0.6, 0.06, -0.1)
+    found = projection.update(BEGIN + 45_000)
+    expected = drawn(resources, -0.7, 0.04, -0.1, *flags)
+    assert len(expected) >= 3 * 8 and {each.sample_time for each in found} == {BEGIN + 30_000}
+    assert [each.sender_stamp for each in found] == [stamp for _, stamp in expected]
+    for each, (message, _) in zip(found, expected, strict=True):
+        assert type(each.message) is type(message)
+        for field, value in message.ListFields():
+            assert getattr(each.message, field.name) == (pytest.approx(value, abs=1e-6)), field.name
+    assert projection.update(BEGIN + 50_000) == [], "each picture has its boxes once"
+
+
+def test_a_camera_that_stands_still_needs_no_frames(resources: ExitStack) -> None:
+    projection = Projection(resources, "--x=-0.7", "--y=0.04")
+    projection.picture(BEGIN)
+    assert len(projection.update(BEGIN + 5_000)) == len(drawn(resources, -0.7, 0.04, 0.0))
+
+
+def test_a_pose_that_does_not_come_is_waited_for_and_then_extrapolated(resources: ExitStack) -> None:
+    projection = Projection(resources, "--frame-id=4")
+    projection.frame(BEGIN, -0.8)
+    projection.picture(BEGIN + 10_000)
+    assert projection.update(BEGIN + 10_000 + PATIENCE) == []
+    assert projection.update(BEGIN + 10_001 + PATIENCE)
+
+
+def test_pictures_without_a_pose_are_counted(resources: ExitStack, caplog: pytest.LogCaptureFixture) -> None:
+    projection = Projection(resources, "--frame-id=4")
+    frame = MESSAGES.type("opendlv.sim.Frame")(x=float("nan"))
+    projection.service.inputs["opendlv.sim.Frame", 4](frame, BEGIN)
+    projection.picture(BEGIN)
+    assert projection.update(BEGIN + PATIENCE + 1) == []
+    assert isinstance(projection.service, ProjectedTruth)
+    assert (projection.service.projected, projection.service.missed, projection.service.refused) == (0, 1, 1)
+    resources.close()
+    assert "1 pictures have no truth: no pose was measured near them" in caplog.text
+    assert "refused the frame" in caplog.text
+
+
+def test_a_camera_that_comes_later_is_found_and_one_that_goes_is_no_error(resources: ExitStack) -> None:
+    projection = Projection(resources, "--x=-0.7")
+    name = projection.memory.name
+    projection.memory.close()
+    assert projection.update(BEGIN + 1_000) == []
+    with SharedMemory.create(name, 64) as memory:
+        assert projection.update(BEGIN + 200_000) == []
+        with memory.lock():
+            memory.stamp(BEGIN + 210_000)
+        assert projection.update(BEGIN + 215_000)
+
+
+def test_a_reader_that_holds_the_lock_for_long_loses_no_picture(resources: ExitStack) -> None:
+    """So an application cannot keep the truth about it away."""
+    projection = Projection(resources, "--x=-0.7")
+    projection.picture(BEGIN)
+    with projection.memory.lock():
+        assert projection.update(BEGIN + 1_000) == []
+    assert projection.update(BEGIN + 6_000)
+
+
+class SteppedClock(RealTimeClock):
+    """Of lockstep, as far as a service is built with it."""
+
+    relays = True
+
+
+def test_lockstep_is_refused() -> None:
+    flags = parse(load_manifest(SERVICES / "projected_truth"), ["--cid=111", MAP, "--truth-sender=9"])
+    context = Context("projected-truth", flags, MESSAGES, clock=SteppedClock())
+    with pytest.raises(ValueError, match="in lockstep virtual-camera has a truth-sender"):
+        build(context)

@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+
+from benchmarks.pictures.gl_peer import ssim
+from dodo_dsl import package_data
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import SceneOptions, load_scene
+
+AT = CameraPose.at(0.3, 2, 0.095, yaw=1.9)
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    """The shipped curve with cones, and things around it of which some stand in one another."""
+    return Renderer(
+        load_scene(package_data.registry() / "maps" / "left-curve", SceneOptions(clutter=60)), 640, 480, 0.85
+    )
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        CameraPose.at(0.302, 2.005, 0.095, yaw=1.9),
+        CameraPose.at(0.3, 2, 0.095, yaw=1.91),
+        CameraPose.at(0.3, 2, 0.097, pitch=0.005, yaw=1.895),
+    ],
+    ids=["driven on", "turned", "nodding"],
+)
+def test_from_close_by_it_looks_as_drawn_anew(renderer, other):
+    out = np.empty((480, 640, 4), np.uint8)
+    first, moved = (picture.copy() for picture in renderer.render_around(AT, [other], out))
+    assert np.array_equal(first, renderer.render(AT))
+    anew = renderer.render(other)
+    assert ssim(moved, anew) > 0.98 > ssim(first, anew)
+
+
+def test_from_the_same_place_it_is_the_same(renderer):
+    out = np.empty((480, 640, 4), np.uint8)
+    first, again = (picture.copy() for picture in renderer.render_around(AT, [AT], out))
+    assert np.array_equal(first, again)
+
+
+def test_a_body_beside_the_camera_stays_where_it_is(cube_at):
+    """Its middle has no place in the picture."""
+    beside = Renderer(load_scene(cube_at([0, 0, 0.5, 0])), 64, 48, 1.0)
+    out = np.empty((48, 64, 4), np.uint8)
+    poses = CameraPose.at(0.05, 0.6, 0.5), CameraPose.at(0.1, 0.6, 0.5)
+    first, moved = (picture.copy() for picture in beside.render_around(poses[0], [poses[1]], out))
+    red = (first[..., 2] > first[..., 0] + 50).sum()
+    assert red > 100
+    assert np.array_equal(first, moved)

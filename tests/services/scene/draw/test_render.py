@@ -1,0 +1,228 @@
+import hashlib
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from dodo_dsl import package_data
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
+
+FOVY = math.radians(48.8)
+FOCAL = 240 / math.tan(FOVY / 2)
+
+
+def draw(folder, *pose, size=(640, 480), **angles):
+    return Renderer(load_scene(folder), *size, FOVY).render(CameraPose.at(*pose, **angles))
+
+
+def red_box(image):
+    """First and last-but-one columns and rows of what is red."""
+    red = (image[..., 2] > 100) & (image[..., 0] < 50)
+    rows, columns = np.flatnonzero(red.any(axis=1)), np.flatnonzero(red.any(axis=0))
+    return (columns[0], columns[-1] + 1, rows[0], rows[-1] + 1) if len(rows) else None
+
+
+def pinhole(points, x, y, z, yaw):
+    """u = cx - f left / forward, v = cy - f up / forward, for a level camera; pixels from the picture's corner."""
+    dx, dy, dz = (np.array(points) - [x, y, z]).T
+    forward, left = math.cos(yaw) * dx + math.sin(yaw) * dy, math.cos(yaw) * dy - math.sin(yaw) * dx
+    return 320 - FOCAL * left / forward, 240 - FOCAL * dz / forward
+
+
+@pytest.mark.parametrize("distance", [0.4, 1.0, 2.5, 6.0])
+@pytest.mark.parametrize("aside", [0.0, 0.111, -0.15])
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
+def test_a_box_is_where_the_pinhole_equation_says(cube_at, distance, aside, yaw):
+    x = 3 + distance * math.cos(yaw) - aside * math.sin(yaw)
+    y = -1 + distance * math.sin(yaw) + aside * math.cos(yaw)
+    image = draw(cube_at([x, y, 0.0, 0.3], half=0.05, height=0.1), 3, -1, 0.07, yaw=yaw)
+    turn = math.pi - 0.3
+    corners = [
+        (x + a * math.cos(turn) - b * math.sin(turn), y + a * math.sin(turn) + b * math.cos(turn), c)
+        for a in (-0.05, 0.05)
+        for b in (-0.05, 0.05)
+        for c in (0.0, 0.1)
+    ]
+    u, v = pinhole(corners, 3, -1, 0.07, yaw)
+    assert red_box(image) == pytest.approx((u.min(), u.max(), v.min(), v.max()), abs=1.0)
+
+
+def test_boxes_are_right_to_a_fraction_of_a_pixel_on_average(cube_at):
+    """As the distance grows the sides cross all parts of pixels; the mean error then tells of a bias."""
+    errors = []
+    for distance in np.linspace(0.7, 2.5, 24):
+        image = draw(cube_at([distance + 0.05, 0, 0, 0], half=0.05, height=0.1), 0, 0, 0.05)
+        half = FOCAL * 0.05 / distance
+        left, right, top, bottom = red_box(image)
+        errors.append((left - (320 - half), right - (320 + half), top - (240 - half), bottom - (240 + half)))
+    assert np.abs(errors).max() < 1.0
+    assert np.abs(np.mean(errors, axis=0)).max() < 0.3
+
+
+def test_small_and_far_boxes_keep_their_size(cube_at):
+    """Silhouettes, too, cover on average as many pixels as the pinhole equation gives them."""
+    seen, told = 0.0, 0.0
+    for distance in np.linspace(6, 30, 40):
+        image = draw(cube_at([distance + 0.05, 0, 0, 0], half=0.05, height=0.1), 0, 0, 0.05)
+        seen += ((image[..., 2] > 100) & (image[..., 0] < 50)).sum()
+        told += (FOCAL * 0.1 / distance) ** 2
+    assert seen == pytest.approx(told, rel=0.15)
+
+
+def test_silhouettes_cover_what_all_the_faces_would():
+    """Far cones in a small picture, drawn as silhouettes, and in one of four times the size, face by face."""
+    scene = load_scene(package_data.registry() / "maps" / "straight")
+    small, large = (Renderer(scene, 480 * k, 360 * k, 0.5) for k in (1, 4))
+    covered = []
+    for x in np.linspace(-2.5, -2.1, 9):
+        pose = CameraPose.at(float(x), 1.4, 0.4, pitch=0.25)
+        covered.append([(r.render(pose)[..., 0] < 30).sum() for r in (small, large)])
+    few, many = np.sum(covered, axis=0)
+    assert few > 500
+    assert few == pytest.approx(many / 16, rel=0.08)
+
+
+def test_left_of_the_car_is_left_in_the_picture(cube_at):
+    left = red_box(draw(cube_at([2, 0.5, 0, 0], half=0.05, height=0.1), 0, 0, 0.1))
+    assert left[1] < 320
+    facing_y = red_box(draw(cube_at([0.5, 2, 0, 0], half=0.05, height=0.1), 0, 0, 0.1, yaw=math.pi / 2))
+    assert facing_y[0] > 320
+
+
+@pytest.mark.parametrize("behind", [[-2, 0, 0, 0], [-0.6, 0, 0, 0], [-0.6, 3, 0, 0], [0, 5, 0, 0]])
+def test_nothing_is_drawn_of_what_is_behind_or_beside(cube_at, behind):
+    assert red_box(draw(cube_at(behind), 0, 0, 0.5)) is None
+
+
+def test_a_wall_that_passes_the_camera_fills_its_side_only(cube_at):
+    """A long box beside the camera reaches from before it to behind it."""
+    image = draw(cube_at([0, 30.2, 0, 0], half=30, height=5), 0, 0, 1.0)
+    red = (image[..., 2] > 100) & (image[..., 0] < 50)
+    assert red[240, :300].all()
+    assert not red[:, 321:].any()
+    # its lower edge runs to the vanishing point: v - 240 = f h / x and 320 - u = f 0.2 / x
+    for column in (20, 100, 200, 280):
+        lowest = np.flatnonzero(red[:, column]).max() + 1
+        assert lowest == pytest.approx(min(480, 240 + (320 - column - 0.5) * 1.0 / 0.2), abs=2)
+
+
+def test_inside_a_box_its_sides_are_not_seen(cube_at):
+    assert red_box(draw(cube_at([0, 0, 0, 0], half=2, height=4), 0, 0, 1)) is None
+
+
+def test_the_nearer_hides_the_farther(write_map):
+    models = [
+        {"name": n, "file": "cube.obj", "color": c, "instances": [[x, 0, 0, 0]]}
+        for n, c, x in (("near", [1, 0, 0], 3), ("far", [0, 0, 1], 6))
+    ]
+    for order in (models, models[::-1]):
+        image = draw(write_map({"model": order}), 0, 0, 0.5)
+        assert tuple(image[240, 320, :3] > 100) == (False, False, True)
+
+
+def test_a_block_hides_what_stands_behind_it_though_its_centre_is_farther(write_map):
+    """Sorting by the distance of centres would draw the long wall first here."""
+    wall = {"name": "wall", "dimension": [0.2, 40, 2], "color": [0, 0, 1], "instances": [[4, 15, 1, 0]]}
+    model = {"name": "cube", "file": "cube.obj", "color": [1, 0, 0], "instances": [[6, 0, 0, 0]]}
+    assert red_box(draw(write_map({"model": [model], "block": [wall]}), 0, 0, 0.5)) is None
+    model["instances"] = [[3, 0, 0, 0]]
+    assert red_box(draw(write_map({"model": [model], "block": [wall]}), 0, 0, 0.5)) is not None
+
+
+def test_two_renders_are_equal_whatever_was_drawn_between(cube_at):
+    folder = cube_at([4, 0, 0, 0.2], [9, 3, 0, 0], [0.6, 0, 0, 1])
+    pose, other = CameraPose.at(0, 0.1, 0.3, 0.02, 0.1, 0.1), CameraPose.at(1, 5, 2, yaw=3)
+    one, two = (Renderer(load_scene(folder), 320, 240, FOVY) for _ in range(2))
+    first = one.render(pose)
+    one.render(other)
+    buffer = np.full_like(first, 99)
+    assert two.render(pose, buffer) is buffer
+    digests = {hashlib.sha256(image).hexdigest() for image in (first, one.render(pose), buffer)}
+    assert len(digests) == 1
+
+
+def test_a_picture_is_opaque_and_in_the_order_blue_green_red(cube_at):
+    image = draw(cube_at([3, 0, 0, 0]), 0, 0, 0.5)
+    assert (image.shape, image.dtype) == ((480, 640, 4), np.uint8)
+    assert (image[..., 3] == 255).all()
+    assert image[240, 320, 2] > 100 > image[240, 320, 0]
+
+
+def test_faces_towards_the_light_are_brighter(cube_at):
+    image = draw(cube_at([3, 0, 0, math.pi]), 0, 0, 2.0, pitch=0.5)
+    red = image[..., 2][(image[..., 2] > 100) & (image[..., 0] < 50)]
+    rows = np.flatnonzero(((image[..., 2] > 100) & (image[..., 0] < 50)).any(axis=1))
+    top, front = (image[rows[i], 320, 2] for i in (2, -3))
+    assert top > front
+    assert len(set(red.tolist())) == 2
+
+
+def test_a_map_without_blocks_stands_on_a_patterned_ground(write_map):
+    image = draw(write_map({}), 0, 0, 0.1)
+    assert len(np.unique(image[:240].reshape(-1, 4), axis=0)) == 1
+    assert image[300:, :, 0].std() > 3
+
+
+def test_a_model_may_take_the_mean_colour_of_a_texture(write_map):
+    picture = np.zeros((4, 4, 3), np.uint8)
+    picture[:2] = (0, 0, 250)
+    model = {"name": "m", "file": "cube.obj", "textureFile": "t.png", "instances": [[3, 0, 0, 0]]}
+    image = draw(write_map({"model": [model]}, pictures={"t.png": picture}), 0, 0, 0.5)
+    blue, green, red, _ = image[240, 320]
+    assert (blue, green) == (0, 0)
+    assert 60 < red <= 125
+
+
+CORNERS = "v -1 -1 0\nv 1 -1 0\nv 0 1 1.5\nf 1 2 3\n"
+coordinate = st.floats(-12, 12) | st.sampled_from([0.0, 1.0, 5.0, 1e6, -1e6, 1e-9])
+angle = st.floats(-7, 7) | st.sampled_from([0.0, math.pi / 2, -math.pi / 2, math.pi])
+
+
+def crowded_map(folder):
+    """All kinds of things: blocks that intersect, textured and not, boxes, an open triangle, something huge."""
+    (folder / "open.obj").write_text(CORNERS)
+    (folder / "big.obj").write_text("\n".join(["v -50 0 0", "v 50 0 0", "v 50 9 40", "v -50 9 40", "f 1 2 3 4"]))
+    cv2.imwrite(str(folder / "t.png"), np.random.RandomState(1).randint(0, 256, (37, 50, 3)).astype(np.uint8))
+    places = [[x, y, 0, x * y] for x in range(-4, 5, 2) for y in range(-4, 5, 2)]
+    blocks = [
+        {
+            "name": "f",
+            "dimension": [10, 10, 0.2],
+            "textureFile": "t.png",
+            "textureSize": [0.7, 1],
+            "instances": [[0, 0, -0.1, 0]],
+        },
+        {
+            "name": "w",
+            "dimension": [11, 0.5, 2],
+            "textureFile": "t.png",
+            "instances": [[5, 0, 0.8, 1.57], [0, 5, 0.8, 0]],
+        },
+        {"name": "b", "dimension": [1, 1, 1], "color": [0, 1, 0], "instances": [[1, 1, 0, 0.7], [1.5, 1, 0.2, 0]]},
+    ]
+    models = [
+        {"name": "o", "file": "open.obj", "color": [1, 1, 0], "instances": places},
+        {"name": "g", "file": "big.obj", "color": [0, 1, 1], "instances": [[3, 3, 0, 0]]},
+    ]
+    (folder / "map.json").write_text(json.dumps({"model": models, "block": blocks}))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def crowded(tmp_path_factory):
+    return Renderer(load_scene(crowded_map(tmp_path_factory.mktemp("crowded"))), 96, 64, 1.0)
+
+
+@pytest.mark.slow
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.tuples(coordinate, coordinate, coordinate), st.tuples(angle, angle, angle))
+def test_any_pose_gives_a_whole_picture(crowded, place, angles):
+    image = crowded.render(CameraPose.at(*place, *angles))
+    assert (image[..., 3] == 255).all()
+    assert np.array_equal(image, crowded.render(CameraPose.at(*place, *angles)))
