@@ -67,7 +67,8 @@ class Asked:
 class Explanation:
     """The fields of ``dodo explain --json``.
 
-    ``variables`` are those that the test sets for the application, whose services without x-dodo ``undeclared`` names.
+    ``pool`` is what the test says of the rigs that will do, ``rig`` that of this instance. ``variables`` are those that
+    the test sets for the application, whose services without x-dodo ``undeclared`` names.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Explanation:
     level: str
     kind: str
     rig: str
+    pool: str
     services: tuple[ServiceExplained, ...]
     variables: tuple[ArgumentExplained, ...]
     vary: tuple[RangeExplained, ...]
@@ -95,6 +97,7 @@ def explain(test: ResolvedTest) -> Explanation:
         spec.level or "?",
         spec.kind or "?",
         spec.rig or "",
+        spec.pool.text if spec.pool else "",
         tuple(_service(test, use) for use in spec.uses),
         tuple(_variable(name, entry) for name, entry in spec.variables.items()),
         tuple(RangeExplained(one.name, one.nominal.text, one.text, _place(one.nominal.span)) for one in spec.ranges),

@@ -15,7 +15,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses, clock_service, recorder_service
 from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
-from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Suite, is_device
+from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
 from dodo_dsl.source import Scalar
@@ -23,6 +23,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.deployment.rig import EMULATED, EMULATED_FILE, PORT, Rig
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.instances.pools import of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.settings import Settings
@@ -44,8 +45,12 @@ def build(
     application: ApplicationSource,
     out: Path,
     settings: Settings,
+    before_each: Callable[[], None] = lambda: None,
 ) -> tuple[Compiled, list[Diagnostic]]:
-    """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below."""
+    """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below.
+
+    ``before_each`` is called before each test.
+    """
     ordered = sorted(tests, key=lambda test: test.spec.slug)
     try:
         cids = _cids(ordered, deployment)
@@ -54,6 +59,7 @@ def build(
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
     tree = functools.cache(copies)  # tests share maps and recordings
+    limits, hidden = _limits(application, deployment), _hidden(application, deployment)
 
     @functools.cache
     def rewritten(
@@ -72,19 +78,22 @@ def build(
             evaluators,
             hil=hardware,
             privileged_allowed=privileged,
-            limits=_limits(application, deployment),
+            limits=limits,
             given=dict(given),
         )
-        return replace(planned, hidden=_hidden(application, deployment))
+        return replace(planned, hidden=hidden)
 
     builders = [
         _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten)
         for index, (test, cid) in enumerate(zip(ordered, cids, strict=True))
     ]
-    plans = tuple(builder.plan() for builder in builders)
+    plans = []
+    for builder in builders:
+        before_each()
+        plans.append(builder.plan())
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     problems = list(itertools.chain.from_iterable(b.problems for b in builders))
-    return Compiled(Suite(plans, deployment.gates), files), problems
+    return Compiled(Suite(tuple(plans), deployment.gates), files), problems
 
 
 def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:
@@ -193,6 +202,8 @@ class _Builder:
             application=self.rewritten(self.cid, isolated, evaluators, hardware, privileged, self._variables()),
             lockstep=lockstep(spec, self.application.declared, self.settings.wall_timeout_s),
             rig=rig.name if rig else "",
+            more_tags=rig.more_tags if rig else (),
+            pool=self._pooled() if spec.pool else None,
             messages=messages,
             senders=senders(self.test),
             truth=(truth := withheld_truth(self.test)),
@@ -200,6 +211,10 @@ class _Builder:
             goals=resolved_goals(self.test).goals,
             source_map=self.places,
         )
+
+    def _pooled(self) -> Pooled:
+        test = of_test(self.spec)
+        return Pooled(test.title, test.slug)
 
     def _variables(self) -> tuple[tuple[str, str], ...]:
         """Variables that the test sets for its application."""
@@ -224,9 +239,10 @@ class _Builder:
         self.places[key] = Place(shown, span.line, span.column)
 
     def _shown(self, path: Path) -> str:
-        """A spec's path as its repository has it; outside a deployment, as its registry does."""
-        root = self.deployment.root if self.deployment.file else self.spec.location.root
-        return path.relative_to(root if path.is_relative_to(root) else self.spec.location.root).as_posix()
+        """A file's path as its repository has it; outside a deployment, as its registry does; else the whole one."""
+        roots = [self.deployment.root] if self.deployment.file else []
+        inside = [root for root in (*roots, self.spec.location.root) if path.is_relative_to(root)]
+        return (path.relative_to(inside[0]) if inside else path).as_posix()
 
     def _image(self, image: str) -> str:
         bare = "/" not in image and ":" not in image

@@ -13,7 +13,14 @@ _SAME = (
     "map-path", "width", "height", "freq", "fovy", "x", "y", "z", "yaw", "pitch", "frame-id", "name.argb", "name.i420",
     "cid",
 )  # fmt: skip
-_OTHER = {"exposure": "shutter", "scene.light": "exposure", "scene.clutter": "clutter", "scene.noise": "noise"}
+_TRUTH = ("truth-sender", "truth-classes", "truth-min-visible", "truth-min-height")
+_OTHER = {
+    "exposure": "shutter",
+    "scene.light": "exposure",
+    "scene.clutter": "clutter",
+    "scene.noise": "noise",
+    **{f"scene.{name}": name for name in _TRUTH},
+}
 """Parameters that have another name in the virtual camera."""
 _STILL = (Flag("start-x", "0"), Flag("start-y", "0"), Flag("start-yaw", "0"))
 

@@ -104,10 +104,19 @@ class Lockstep:
 
 
 @dataclass(frozen=True)
+class Pooled:
+    """The test of a Plan for one rig of a pool, by the name and slug that it has whichever rig runs it."""
+
+    name: str
+    slug: str
+
+
+@dataclass(frozen=True)
 class Plan:
     """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation.
 
-    ``lockstep`` is None in real time, ``rig`` empty below level hil; ``messages`` are ODVD files of the deployment,
+    ``lockstep`` is None in real time, ``rig`` empty below level hil; ``more_tags`` are those of the rig's runner beside
+    ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,
     relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
     ``goals`` score a passed test and never change its outcome.
     ``truth`` are messages by which evaluators judge; in real time they come to the bus ``truth_delay_s`` late.
@@ -131,6 +140,8 @@ class Plan:
     application: Application
     lockstep: Lockstep | None = None
     rig: str = ""
+    more_tags: tuple[str, ...] = ()
+    pool: Pooled | None = None
     messages: tuple[str, ...] = ()
     senders: tuple[str, ...] = ()
     truth: tuple[str, ...] = ()

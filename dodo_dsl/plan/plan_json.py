@@ -18,6 +18,7 @@ from dodo_dsl.plan.model import (
     Place,
     Plan,
     PlannedService,
+    Pooled,
     is_device,
 )
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -61,7 +62,8 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         if settings.wall_timeout_s is not None and raw["lockstep"]:
             raw["lockstep"]["wall_timeout_s"] = settings.wall_timeout_s
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
-        raw |= {key: tuple(raw[key]) for key in ("messages", "senders", "truth")}
+        raw |= {key: tuple(raw[key]) for key in ("more_tags", "messages", "senders", "truth")}
+        raw["pool"] = Pooled(**raw["pool"]) if raw["pool"] else None
         raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
         plan = Plan(**raw)
@@ -75,11 +77,12 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
 
 def _problem(plan: Plan) -> str:
     """The first value that is wrong, or an empty string; JSON itself checks no types."""
-    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, plan.rig, plan.application.folder)
+    texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, *plan.more_tags, plan.rig)
     services: list[PlannedService | ApplicationService] = [*plan.services, *plan.application.services]
     rules = {
         "slug": isinstance(plan.slug, str) and bool(SLUG.fullmatch(plan.slug)),
-        "string": all(isinstance(text, str) and "\0" not in text for text in texts),
+        "pool": plan.pool is None or _is_pooled(plan.pool),
+        "string": all(isinstance(text, str) and "\0" not in text for text in (*texts, plan.application.folder)),
         "level": plan.level in LEVELS,
         "isolation": plan.isolation in ("network", "host"),
         "timeout_s": isinstance(plan.timeout_s, int | float) and 0 < plan.timeout_s <= 86_400,
@@ -115,6 +118,10 @@ def _is_access(access: Access) -> bool:
     texts = (*access.roots, *access.paths, *access.passed, *access.ports)
     flags = (access.outside, access.devices, access.privileged)
     return all(isinstance(text, str) for text in texts) and all(isinstance(flag, bool) for flag in flags)
+
+
+def _is_pooled(pool: Pooled) -> bool:
+    return isinstance(pool.name, str) and isinstance(pool.slug, str) and bool(SLUG.fullmatch(pool.slug))
 
 
 def _is_lockstep(lockstep: Lockstep) -> bool:

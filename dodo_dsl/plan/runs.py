@@ -22,4 +22,17 @@ def runs(plans: Sequence[Plan], repeat: int) -> list[Run]:
 def _repetition(plan: Plan, number: int) -> Plan:
     if number == 1:
         return plan
-    return replace(plan, name=f"{plan.name}[run={number}]", slug=f"{plan.slug}--run-{number}")
+    pool = (
+        replace(plan.pool, name=_name(plan.pool.name, number), slug=_slug(plan.pool.slug, number))
+        if plan.pool
+        else None
+    )
+    return replace(plan, name=_name(plan.name, number), slug=_slug(plan.slug, number), pool=pool)
+
+
+def _name(name: str, number: int) -> str:
+    return f"{name}[run={number}]"
+
+
+def _slug(slug: str, number: int) -> str:
+    return f"{slug}--run-{number}"

@@ -10,6 +10,7 @@ from dodo_dsl.plan.recorder_service import PICTURES_FILE
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
+from dodo_dsl.run.rigs.pool import opened
 from dodo_dsl.run.standing import Standing
 
 Phase = Callable[[str, str], None]
@@ -76,10 +77,12 @@ class Attempts:
                 (job.report / PICTURES_FILE).unlink(missing_ok=True)
 
         try:
-            async with self._backends.open(job, say, self._keep) as backend:
-                engine = Engine(job.plan, backend, say, begun, stands, forget_pictures)
+            async with opened(job, say, lambda one: self._backends.open(one, say, self._keep)) as (chosen, backend):
+                engine = Engine(chosen.plan, backend, say, begun, stands, forget_pictures)
                 outcome, kept = await engine.run(self._keep)
                 self.kept.extend(kept)
+                if job.plan.pool:
+                    outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
             if outcome is None:
                 return error_outcome(job.plan, self._backends.name, error_reason(error, job.report))

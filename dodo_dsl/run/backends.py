@@ -12,10 +12,10 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import own_modules
-from dodo_dsl.run.process.fork_server_client import ForkServer, serving
+from dodo_dsl.run.process.forks.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.attendance import attended, is_real, refuse_hardware
+from dodo_dsl.run.rigs.attendance import RigSession, attended, is_real, refuse_hardware
 
 Say = Callable[[str], None]
 WAY_OUT = "install bubblewrap and allow user namespaces, or trust the application and run with --isolation host"
@@ -25,13 +25,15 @@ WAY_OUT = "install bubblewrap and allow user namespaces, or trust the applicatio
 class Job:
     """A Plan, the folder that it was compiled into, and the folder for its logs and pictures.
 
-    ``test`` is the slug that all repetitions of a test share.
+    ``test`` is the slug that all repetitions of a test share. ``others`` are the same test for other rigs, of which any
+    will do.
     """
 
     plan: Plan
     folder: Path
     report: Path
     test: str = ""
+    others: tuple["Job", ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "test", self.test or self.plan.slug)
@@ -66,8 +68,11 @@ class Processes:
         descriptors: tuple[int, ...],
         roots: Sequence[Path] = (),
         loaded: Callable[[], ForkServer | None] = lambda: None,
+        session: RigSession | None = None,
     ) -> None:
         """``roots`` are the folders that tests come from, for the permission to use a rig.
+
+        A ``session`` spares rigs that stay fit their checks between tests.
 
         ``loaded`` gives a fork server that was started with the same ``descriptors`` while tests were compiled.
         """
@@ -76,6 +81,7 @@ class Processes:
         self._isolation = isolation
         self._descriptors = descriptors
         self._loaded = loaded
+        self._session = session
         self._alone = asyncio.Lock()
         self._problem = ""
         self._is_apart = True
@@ -110,7 +116,7 @@ class Processes:
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
-        plan = job.plan
+        plan = self._session.at_home(job.plan) if self._session else job.plan
         refuse_hardware(plan)
         isolation = "host" if is_real(plan) else self._isolation or plan.isolation
         if isolation == "network":
@@ -124,7 +130,7 @@ class Processes:
             host_isolation.host_slot(
                 plan, () if is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
             ) as leased,
-            attended(plan, leased.cid, leased.descriptors, say, leased.key, self._roots) as descriptors,
+            attended(plan, leased.cid, leased.descriptors, say, leased.key, self._roots, self._session) as descriptors,
         ):
             slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)

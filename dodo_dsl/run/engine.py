@@ -9,7 +9,18 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run.load.meter import LoadMeter, add_up
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Foreign, Late, Noted, Overrun, Time, VerdictEvent
+from dodo_dsl.run.protocol import (
+    Backend,
+    BackendError,
+    Event,
+    Foreign,
+    Late,
+    Noted,
+    Overrun,
+    Paused,
+    Time,
+    VerdictEvent,
+)
 from dodo_dsl.run.run_state import Ended, RunState
 from dodo_dsl.run.standing import Standing, standing
 
@@ -97,7 +108,7 @@ class Engine:
         while (event := await self._next(0.0)) is not None:
             if isinstance(event, Foreign):
                 self.state.add_finding("failed", event.reason)
-            if isinstance(event, Overrun | Late | Noted | Time):
+            if isinstance(event, Overrun | Late | Paused | Noted | Time):
                 self.state.take(event)
 
     async def _set_up(self) -> None:

@@ -13,9 +13,10 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.run import lease_queue
 from dodo_dsl.spec.deployment.machine import machine
 from dodo_dsl.state_folder import secured
 
@@ -29,6 +30,9 @@ _MODE = 0o660
 _RETRY_S = 0.2
 _NO_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
 """Raised by reading a record that is damaged or was written by another program."""
+
+
+Taken = TypeVar("Taken")
 
 
 class LeaseTimeout(Exception):
@@ -106,6 +110,18 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
     return Lease(name, descriptor, record)
 
 
+def is_free(name: str) -> bool:
+    """Whether nobody holds a lease."""
+    descriptor = _open(name)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    finally:
+        os.close(descriptor)
+    return True
+
+
 def _write_new(record: Path, text: str) -> None:
     """Writes a record that nobody can have put there, in the place of one that an earlier process of this id left."""
     record.unlink(missing_ok=True)
@@ -144,23 +160,54 @@ async def lease_any(
     patience_s: float = DEFAULT_PATIENCE_S,
     attempt: Callable[[str, dict[str, Any], bool], Lease | None] = try_lease,
 ) -> Lease:
-    """The first of the leases that is free; waits for one, calls ``waiting`` once with a sentence, raises LeaseTimeout.
+    """The first of the leases that is free, in turn: nobody gets one before those who came earlier.
 
-    ``attempt`` takes one. Times are of the event loop's clock, in s.
+    ``attempt`` takes one. ``waiting`` is called with a sentence whenever fewer are ahead. Raises LeaseTimeout when the
+    queue has not moved for ``patience_s``. Times are of the event loop's clock, in s.
     """
+    place, since = folder(), lease_queue.now()
+
+    def may_take(name: str) -> bool:
+        """Who is about to take all leases of a rig holds up nobody here, who may hold what that one still needs."""
+        return all(one.turn for one in lease_queue.ahead(place, (name,), since, shared=shared))
+
+    def take() -> Lease | None:
+        free = (name for name in names if may_take(name))
+        return next((lease for name in free if (lease := attempt(name, about, shared))), None)
+
+    if lease := take():
+        return lease
+    with lease_queue.ticket(place, names, since, shared=shared):
+        return await in_turn(take, names, waiting, shared, patience_s, since)
+
+
+async def in_turn(
+    take: Callable[[], Taken | None],
+    names: Sequence[str],
+    waiting: Callable[[str], None],
+    shared: bool,
+    patience_s: float,
+    since: int,
+) -> Taken:
+    """What ``take`` gives as soon as it gives something; the rest as for ``lease_any``. The caller has a ticket."""
     now = asyncio.get_running_loop().time
-    deadline = now() + patience_s
-    is_announced = False
-    while True:
-        for name in names:
-            if lease := attempt(name, about, shared):
-                return lease
+    deadline, known = now() + patience_s, -1
+    while (taken := take()) is None:
+        before = sum(not one.turn for one in lease_queue.ahead(folder(), names, since, shared=shared))
+        if before < known:
+            deadline = now() + patience_s
         if now() > deadline:
-            raise LeaseTimeout(f"no {_kind(names)} came free within {patience_s:g} s; {holder(names[0])} holds one")
-        if not is_announced:
-            waiting(f"waiting for {holder(names[0])}")
-            is_announced = True
+            said = f"no {_kind(names)} came free within {patience_s:g} s; {holder(names[0])} holds one"
+            raise LeaseTimeout(f"{said}, {_others(before)}" if before else said)
+        if before < known or known < 0:
+            waiting(f"waiting for {holder(names[0])}" + (f", {_others(before)}" if before else ""))
+            known = before
         await asyncio.sleep(_RETRY_S)
+    return taken
+
+
+def _others(number: int) -> str:
+    return f"and {number} {'waits' if number == 1 else 'wait'} before this one"
 
 
 def _kind(names: Sequence[str]) -> str:
@@ -193,7 +240,8 @@ def _about(record: Path) -> dict[str, Any]:
 
 
 def forget_dead() -> None:
-    """Removes the records of machine leases whose process has ended; their locks ended with it."""
+    """Removes the records of machine leases, and the tickets, whose process has ended; their locks ended with it."""
+    lease_queue.remove_dead(folder())
     for record in folder().glob("machine.*.json"):
         with contextlib.suppress(OSError, *_NO_RECORD):
             if not Path("/proc", str(int(json.loads(regular_file.text(record))["pid"]))).exists():

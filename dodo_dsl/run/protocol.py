@@ -67,6 +67,14 @@ class Late:
 
 
 @dataclass(frozen=True)
+class Paused:
+    """What a service emulates has stood still for ``seconds`` so far, as the machine was too busy for it."""
+
+    service: str
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Flooded:
     """More is sent than the recorder takes: ``what`` is the limit in a sentence, ``too_fast`` whether it is the rate's.
 
@@ -152,6 +160,7 @@ Event = (
     | Malformed
     | Overrun
     | Late
+    | Paused
     | Flooded
     | MemoryTaken
     | Noted

@@ -24,6 +24,7 @@ from dodo_dsl.run.protocol import (
     MemoryTaken,
     Noted,
     Overrun,
+    Paused,
     Ready,
     Responded,
     Stopped,
@@ -51,6 +52,7 @@ class RunState:
     ready: set[str] = field(default_factory=set)
     lost: dict[str, int] = field(default_factory=dict)
     late: dict[str, Late] = field(default_factory=dict)
+    paused: dict[str, float] = field(default_factory=dict)
     load: MachineLoad | None = None
     response: Response | None = None
     notes: list[str] = field(default_factory=list)
@@ -125,6 +127,8 @@ class RunState:
                 self.lost[service] = messages
             case Late(service):
                 self.late[service] = event
+            case Paused(service, seconds):
+                self.paused[service] = seconds
             case Noted(text) if len(self.notes) < MOST_NOTES:
                 self.notes.append(text)
             case Noted() if len(self.notes) == MOST_NOTES:
@@ -220,6 +224,7 @@ class RunState:
             late_pictures_share=max((share for name, share in shares.items() if name in pictured), default=0.0),
             late_updates_share=max((share for name, share in shares.items() if name not in pictured), default=0.0),
             lateness_s=max((each.worst_s for each in late.values()), default=0.0),
+            paused_s=max(self.paused.values(), default=0.0),
         )
 
     def _service_rows(self) -> list[dict[str, Any]]:

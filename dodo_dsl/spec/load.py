@@ -54,7 +54,7 @@ def varied(spec: Spec, values: vary.Values, choice: Choice) -> Spec:
     """The instance with these values of its ranges, the nominal ones for others, and another choice as its name."""
     assert spec.template is not None, "only for specs with ranges"
     found, _, _ = _at(replace(spec, choice=choice), spec.template, spec.ranges, values)
-    return found
+    return replace(found, rig=spec.rig) if spec.pool else found
 
 
 def _at(

@@ -12,6 +12,7 @@ from dodo_dsl.source import Entry, Mapping, Node, Scalar
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.instances.matrix import Choice
+from dodo_dsl.spec.pool import Pool, pool_of
 from dodo_dsl.spec.registry import Location
 
 LAYERS = ("environment", "action", "evaluation")
@@ -20,7 +21,7 @@ LEVELS = ("sil", "dil", "hil")
 KINDS = ("perception", "open-loop", "closed-loop")
 FRAMES = (ALWAYS, ON_FAILURE, NEVER) = ("always", "on-failure", "never")
 """When the pictures of a test's cameras are kept."""
-_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "application", "goals")
+_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "application", "goals", "rig")
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
 
@@ -40,6 +41,7 @@ class Use:
 class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
+    ``pool`` says which rigs will do where the spec names none, and the deployment says which ones these are.
     ``isolation`` is None where the spec leaves it to the rig. ``frames`` is one of FRAMES, ``frames_hz`` None for the
     cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
@@ -58,6 +60,7 @@ class Spec:
     timeout_s: float | None = None
     clock: str = "realtime"
     rig: str | None = None
+    pool: Pool | None = None
     isolation: str | None = None
     seed: int = 0
     frames: str = ON_FAILURE
@@ -157,6 +160,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         timeout_s=timeout,
         clock=text("clock", "realtime"),
         rig=text("rig"),
+        pool=pool_of(node.get("rig")),
         isolation=text("isolation"),
         seed=_seed(node.get("seed")),
         frames=frames,

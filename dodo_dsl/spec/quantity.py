@@ -27,6 +27,9 @@ _FACTORS: dict[str, dict[str, Decimal]] = {
     "share": {SHARE: Decimal(1), "%": Decimal("0.01")},
     "pixel count": {"px": Decimal(1)},
     "size": {"B": Decimal(1), "kB": Decimal(10**3), "MB": Decimal(10**6), "GB": Decimal(10**9)},
+    "step count": {"steps": Decimal(1)},
+    "step density": {"steps/m": Decimal(1), "steps/mm": Decimal(1000)},
+    "angular step density": {"steps/rad": Decimal(1), "steps/deg": 180 / _PI},
     "mass": {"kg": Decimal(1), "g": Decimal("0.001")},
 }
 _DIMENSION = {unit: dimension for dimension, units in _FACTORS.items() for unit in units}

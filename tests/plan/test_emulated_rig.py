@@ -19,7 +19,17 @@ def test_hardware_stays() -> None:
 
 def test_an_emulated_camera_is_drawn() -> None:
     found = hardware(
-        camera("emulated", **{"width": "640", "freq": "10", "exposure": "0.02", "scene.light": "0.5", "file": "x"}),
+        camera(
+            "emulated",
+            **{
+                "width": "640",
+                "freq": "10",
+                "exposure": "0.02",
+                "scene.light": "0.5",
+                "file": "x",
+                "scene.truth-sender": "9",
+            },
+        ),
         MANIFESTS,
         "dodo/virtual-camera:1",
     )
@@ -32,6 +42,7 @@ def test_an_emulated_camera_is_drawn() -> None:
         "cid": "140",
         "shutter": "0.02",
         "exposure": "0.5",
+        "truth-sender": "9",
         "start-x": "0",
         "start-y": "0",
         "start-yaw": "0",

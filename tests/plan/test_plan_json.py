@@ -30,6 +30,8 @@ WRONG: list[tuple[str, Any, str]] = [
     ("slug", "../x", "slug"),
     ("name", 3, "string"),
     ("spec", "a\0b", "string"),
+    ("more_tags", [3], "string"),
+    ("pool", {"name": "drive", "slug": "../drive"}, "pool"),
     ("level", "mil", "level"),
     ("isolation", "none", "isolation"),
     ("timeout_s", 0, "timeout_s"),

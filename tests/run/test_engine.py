@@ -21,6 +21,7 @@ from dodo_dsl.run.protocol import (
     Malformed,
     Noted,
     Overrun,
+    Paused,
     Ready,
     Stopped,
     Time,
@@ -126,6 +127,17 @@ def test_pictures_that_come_late() -> None:
     assert other.outcome == "error"
     rarely = on(calm, (4.0, Late("track", 40, 4, 0.3)), *ending, tested=seeing)
     assert (rarely.outcome, rarely.machine and rarely.machine.lateness_s) == ("failed", 0.3)
+
+
+def test_an_emulated_rig_that_stood_still() -> None:
+    """Also when that is read after the verdict: what failed is in error, what passed has passed."""
+    calm = load(0.2, app=(0.1, 0.01))
+    before = on(calm, (1.0, Paused("pose", 0.06)), (2.0, Paused("pose", 0.15)), (5.0, FAILED), (5.0, ENDED))
+    after = on(calm, (5.0, FAILED), (5.0, ENDED), (5.0, Paused("pose", 0.15)))
+    passed = on(calm, (5.0, PASSED), (5.0, ENDED), (5.0, Paused("pose", 0.15)))
+    assert (before.outcome, after.outcome, passed.outcome) == ("error", "error", "passed")
+    assert "could not keep real time and stood still for 0.15 s; it found: hit wall left" in before.reason
+    assert passed.machine is not None and passed.machine.paused_s == 0.15
 
 
 def test_what_is_not_measured() -> None:

@@ -1,6 +1,6 @@
 """``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
@@ -24,7 +24,12 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:
-    if name and name not in context.messages:
-        hint = did_you_mean(name, context.messages) or "add the files of your own messages under 'messages' in dodo.yml"
-        fix = only_fix(name, context.messages)
+    yield from unknown_message(name, context.messages, span)
+
+
+def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[Diagnostic]:
+    """The problem of a name that is none of the ``known`` messages."""
+    if name and name not in known:
+        hint = did_you_mean(name, known) or "add the files of your own messages under 'messages' in dodo.yml"
+        fix = only_fix(name, known)
         yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint, fix=fix)

@@ -3,6 +3,7 @@
 ``name-reserved``: a test is a job of its name, and GitLab reads some names as keywords.
 """
 
+import re
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
@@ -30,6 +31,8 @@ KEYWORDS = frozenset(
     }
 )
 
+_NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
     spec = context.spec
@@ -39,7 +42,7 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
         message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
         yield Diagnostic(spec.span("name"), "name-reserved", message, f"for example 'sil-{spec.name}'")
     stem = spec.location.stem
-    if spec.name != stem:
+    if spec.name != stem and _NAME.fullmatch(spec.name):  # the schema says what is wrong with any other
         message = f"the name '{spec.name}' differs from the file's name"
         yield Diagnostic(spec.span("name"), "name-differs", message, f"write 'name: {stem}' or rename the file")
     others = [other for other in context.by_name[spec.name] if other.path != spec.path]

@@ -1,7 +1,7 @@
 """dodo rig: operate a rig manually: its status, motion, calibration, quarantine and camera."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -9,16 +9,14 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import finite, patience
-from dodo_dsl.cli.rig import truth_command
+from dodo_dsl.cli.rig import board_command, gantry_flags, measure_command, truth_command
 from dodo_dsl.run.rigs import quarantine
 from dodo_dsl.run.rigs.access import MANUAL, query_exclusively
-from dodo_dsl.run.rigs.permission import LIMIT_FLAGS, refuse_forbidden
+from dodo_dsl.run.rigs.motion import STILL
+from dodo_dsl.run.rigs.permission import refuse_forbidden
 from dodo_dsl.run.rigs.problems import RigProblem
-from dodo_dsl.source import Scalar
 from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment
-from dodo_dsl.spec.deployment.rig import EMULATED, Rig
-from dodo_dsl.spec.manifest import Parameter
-from dodo_dsl.spec.values import ValueProblem, convert
+from dodo_dsl.spec.deployment.rig import EMULATED, EMULATED_RIGS, LIMIT_UNITS, Rig
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -28,10 +26,12 @@ EXAMPLES = """examples:
   dodo rig home kiwi-dynamic            move to its switches
   dodo rig clear kiwi-dynamic           end its quarantine after a repair
   dodo rig goto emulated 0 0 0          on any machine with the firmware emulator
+  dodo rig measure kiwi-dynamic         the constants of its axes, by a ruler and a protractor
   dodo rig truth kiwi-static -o truths/desk.json --box yellow 199 329 36 55
                                         a snapshot and its truth, for object-detection
 
-exit codes: 0 done, 1 a rig is in quarantine, 2 wrong usage or a position outside the limits, 3 the rig failed
+exit codes: 0 done, 1 a rig is in quarantine or readings do not fit, 2 wrong usage or a position outside the limits,
+3 the rig failed
 """
 ACTIONS = {
     "status": "show whether a rig is in quarantine, and its position",
@@ -47,29 +47,37 @@ def add(parser: argparse.ArgumentParser) -> None:
     for name, text in ACTIONS.items():
         action = actions.add_parser(name, help=text, description=text)
         count = "?" if name == "status" else None
-        action.add_argument("rig", nargs=count, metavar="RIG", help="name of a rig in dodo.yml, or emulated")
+        action.add_argument(
+            "rig", nargs=count, metavar="RIG", help="name of a rig in dodo.yml, emulated or emulated-circle"
+        )
         for axis, unit in {"x": "m", "y": "m", "yaw": "degrees"}.items() if name == "goto" else ():
             action.add_argument(axis, type=finite, metavar=axis.upper(), help=f"in {unit}, 0 is the middle")
         wait = "maximum wait for a busy rig, in s (default: 60)"
         action.add_argument("--wait", type=patience, default=60.0, metavar="S", help=wait)
         action.add_argument("--json", action="store_true", help="output as JSON")
-    text = "take a snapshot of the camera and write its truth for object-detection"
-    formatter = argparse.RawDescriptionHelpFormatter
-    epilog = truth_command.EXAMPLES
-    truth_command.add(
-        actions.add_parser("truth", help=text, description=text, epilog=epilog, formatter_class=formatter)
-    )
+    for name, module in {"board": board_command, "measure": measure_command, "truth": truth_command}.items():
+        formatter = argparse.RawDescriptionHelpFormatter
+        module.add(
+            actions.add_parser(
+                name, help=module.SUMMARY, description=module.SUMMARY, epilog=module.EXAMPLES, formatter_class=formatter
+            )
+        )
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     def say(text: str) -> None:
         stderr.write(f"{printable(text)}\n")
 
+    if options.action == "board":
+        stdout.write(board_command.make(options) + "\n")
+        return Exit.OK
     deployment = selection.checked_deployment()
     chosen = _chosen(options, deployment)
     if options.action == "truth":
         stdout.write(truth_command.make(options, deployment, chosen[0], say) + "\n")
         return Exit.OK
+    if options.action == "measure":
+        return measure_command.measure(options, deployment, chosen[0], stdout, stderr)
     results = [_one(options, rig, deployment.root, say) for rig in chosen]
     if options.json:
         stdout.write(json_text(results))
@@ -87,7 +95,9 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Rig]:
         return list(deployment.rigs.values())
     rig = deployment.rig(options.rig)
     if rig is None:
-        raise UsageError(f"there is no rig '{options.rig}', expected one of {', '.join([EMULATED, *deployment.rigs])}")
+        raise UsageError(
+            f"there is no rig '{options.rig}', expected one of {', '.join([*EMULATED_RIGS, *deployment.rigs])}"
+        )
     return [rig]
 
 
@@ -96,7 +106,7 @@ def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str],
     result: dict[str, Any] = {"rig": rig.name, "kind": rig.kind, "quarantine": ""}
     devices = [text for key in ("serial", "camera.source") if (text := rig.text(key))]
     if options.action != "status":
-        refuse_forbidden(devices, _limits(rig, options.action), [root])
+        refuse_forbidden(devices, STILL if options.action == "clear" else gantry_flags.motion(rig), [root])
     if options.action == "clear":
         quarantine.clear(rig.name, devices)
         return result
@@ -108,7 +118,7 @@ def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str],
         return result
     try:
         if options.action == "status":
-            refuse_forbidden(devices, dict.fromkeys(LIMIT_FLAGS, 0.0), [root])
+            refuse_forbidden(devices, STILL, [root])
         return {**result, **_moved(options, rig, say)}
     except RigProblem as problem:
         if options.action != "status":
@@ -118,39 +128,16 @@ def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str],
 
 def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
     place = (options.x, options.y, options.yaw) if options.action == "goto" else ()
-    words = [*_flags(rig), options.action, *(f"{number:g}" for number in place)]
+    words = [*gantry_flags.flags(rig), options.action, *(f"{number:g}" for number in place)]
     return query_exclusively(rig.cid, f"'dodo rig {options.action}'", (MANUAL, words), say, options.wait)
 
 
-def _flags(rig: Rig) -> list[str]:
-    """The rig's port and ranges as the gantry's flags; raises UsageError for an invalid range."""
-    flags = []
-    for key, flag, unit in (("serial", "serial", ""), *((f"limits.{a}", f"range-{a}", "m") for a in "xy"), YAW):
-        entry = rig.entry(key)
-        if entry is None or not isinstance(entry.value, Scalar):
-            continue
-        text = entry.value.text if flag == "serial" else _number(entry.value, flag, unit)
-        flags.append(f"--{flag}={text}")
-    return flags
-
-
-def _limits(rig: Rig, action: str) -> dict[str, float]:
-    """The limits of an action's motion, as the operator of a machine has them; its speed is the firmware's."""
-    if action == "clear":
-        return dict.fromkeys(LIMIT_FLAGS, 0.0)
-    words = dict(word.removeprefix("--").split("=", 1) for word in _flags(rig))
-    ranges = {name: float(words[flag]) for name, flag in LIMIT_FLAGS.items() if flag in words}
-    return {"speed": 0.0, "yaw-rate": 0.0, **ranges}
-
-
-YAW = ("limits.yaw", "range-yaw", "deg")
-
-
-def _number(value: Scalar, flag: str, unit: str) -> str:
-    try:
-        return convert(Parameter(name=flag, type="number", unit=unit, help=""), value, Path.cwd()).text
-    except ValueProblem as problem:
-        raise UsageError(f"{flag}: {problem}") from None
+def _limits_sentence(limits: Mapping[str, Any]) -> list[str]:
+    """What a rig says of its limits, where they are not the built-in ones."""
+    if limits.get("from", "built") == "built":
+        return []
+    what = "its memory is damaged, and these limits hold" if limits["from"] == "damaged" else "limits in its memory"
+    return [f"{what}: " + ", ".join(f"{name} {limits[name]:g} {unit}" for name, unit in LIMIT_UNITS.items())]
 
 
 def _sentence(result: dict[str, Any]) -> str:
@@ -163,6 +150,7 @@ def _sentence(result: dict[str, Any]) -> str:
         if result["x"] is not None:
             at = f", x = {result['x']:.3f} m, y = {result['y']:.3f} m, " + (f"yaw = {result['yaw']:.1f} degrees")
         parts.append(f"{result['says']}{at}")
+        parts += _limits_sentence(result.get("limits") or {})
     if result["quarantine"]:
         parts.append(f"in quarantine: {result['quarantine']}; 'dodo rig clear {result['rig']}' ends it")
     return f"{name} {'; '.join(parts) or 'not in quarantine'}"

@@ -15,13 +15,15 @@ from dodo_dsl.rec.truth import Mark, TruthError
 from dodo_dsl.rec.truth_files import TruthFiles, decoded, given
 from dodo_dsl.run.rigs import camera
 from dodo_dsl.run.rigs.access import query_exclusively
-from dodo_dsl.run.rigs.permission import LIMIT_FLAGS, refuse_forbidden
+from dodo_dsl.run.rigs.motion import STILL
+from dodo_dsl.run.rigs.permission import refuse_forbidden
 from dodo_dsl.run.rigs.rig_leases import devices_in
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
 
+SUMMARY = "take a snapshot of the camera and write its truth for object-detection"
 EXAMPLES = """examples:
   dodo rig truth emulated --test hil-camera --classes cone_yellow=yellow,cone_blue=blue -o truths/board.json
                                         the boxes of the virtual scene that the test's camera sees
@@ -110,7 +112,7 @@ def _looked(
         path = Path(folder) / "snapshot.png"
         words = [*snapshot.words, f"--output={path}"]
         words += [f"--truth-classes={options.classes}"] if snapshot.is_rendered and "=" in options.classes else []
-        refuse_forbidden(devices_in(words), dict.fromkeys(LIMIT_FLAGS, 0.0), [root])
+        refuse_forbidden(devices_in(words), STILL, [root])
         answer = query_exclusively(rig.cid, "'dodo rig truth'", (snapshot.program, words), say, options.wait)
         if answer.get("reason"):
             say(f"warning: {answer['reason']}")

@@ -21,7 +21,7 @@ def docker_engine() -> Iterator[Capability]:
     try:
         client = connect()
     except BackendError as error:
-        yield Capability("docker engine", "warning", str(error), "needed for --backend docker only")
+        yield Capability("docker engine", "warning", str(error), "needed for --backend docker and mixed")
         return
     with contextlib.closing(client):
         version = client.version()
@@ -32,7 +32,7 @@ def compose() -> Iterator[Capability]:
     """Whether there is Compose of a version that DoDo supports."""
     text = _output("docker", "compose", "version", "--short")
     numbers = tuple(int(n) for n in text.lstrip("v").split("-")[0].split(".")[:2] if n.isdecimal())
-    advice = "install Compose v2 (docker-compose-plugin); needed for --backend docker only"
+    advice = "install Compose v2 (docker-compose-plugin); needed for --backend docker and mixed"
     if not numbers:
         yield Capability("compose", "warning", "'docker compose' does not run", advice)
     elif numbers < _COMPOSE:

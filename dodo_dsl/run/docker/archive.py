@@ -27,6 +27,8 @@ def copy_out(container: Any, folder: str, target: Path, max_bytes: int = MAX_BYT
                 if member.isfile() and name not in ("", ".", "..") and (content := tar.extractfile(member)):
                     with atomic.replacing(target / name) as part, part.open("xb") as file:
                         shutil.copyfileobj(content, file)
+        for _ in chunks:  # of padding: a stream that is read to its end gives its connection back
+            pass
     except tarfile.TarError as error:
         raise OSError(errno.EIO, f"the archive from the engine is damaged ({error})") from error
 

@@ -136,9 +136,12 @@ class DockerBackend:
 
     @staticmethod
     def _follow(container: Any, writer: int) -> None:
-        """Copies a container's output into the pipe of its Output; runs in a thread of its own."""
-        with contextlib.suppress(Exception):
-            for chunk in container.logs(stream=True, follow=True):
+        """Copies a container's output into the pipe of its Output; runs in a thread of its own.
+
+        It ends with the container, or when nobody reads the pipe any more.
+        """
+        with contextlib.suppress(Exception), contextlib.closing(container.logs(stream=True, follow=True)) as chunks:
+            for chunk in chunks:
                 os.write(writer, chunk)
         with contextlib.suppress(OSError):
             os.close(writer)

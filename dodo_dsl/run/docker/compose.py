@@ -30,6 +30,8 @@ from dodo_dsl.run.rigs.ports import known_ports
 
 _BUILD_PROJECT = "dodo-build"
 _OVERLAP = "overlaps"
+_NO_COMPOSE = "docker --help"
+"""Where the docker command refers to, and compose itself never does."""
 _YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already run
 
 
@@ -56,6 +58,8 @@ class Compose:
         except EnvironmentProblem as error:
             raise BackendError(str(error)) from error
         code, out, problem = await self._run("config", "--format", "json")
+        if code and _NO_COMPOSE in problem:
+            raise BackendError("the docker command has no 'compose'; install Compose v2 (docker-compose-plugin)")
         if code:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         config = json.loads(out)

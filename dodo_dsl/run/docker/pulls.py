@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from collections.abc import Callable, Coroutine, Iterable
+from functools import cached_property
 from typing import Any
 
 from dodo_dsl.run.docker.client import engine_error
@@ -28,9 +29,11 @@ class Pulls:
 
         Raises BackendError.
         """
-        waits = [self._pull_once(image, self._own, say) for image in sorted(set(own))]
-        waits += [self._pull_once(image, self._application, say) for image in sorted(set(application))]
-        return [note for note in await asyncio.gather(*waits) if note]
+        ours, theirs = sorted(set(own)), sorted(set(application))
+        waits = [self._pull_once(image, self._own, say) for image in ours]
+        waits += [self._pull_once(image, self._application, say) for image in theirs]
+        notes = [note for note in await asyncio.gather(*waits) if note]
+        return notes + await asyncio.to_thread(self._foreign, [*ours, *theirs])
 
     async def _pull_once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str:
         return await self.once(image, lambda: self._in_thread(work, image, say))
@@ -61,7 +64,7 @@ class Pulls:
     def _own(self, image: str, say: Say) -> str:
         if not self._architecture(image):
             self._pull(image, say)
-        return self._foreign(image)
+        return ""
 
     def _application(self, image: str, say: Say) -> str:
         try:
@@ -69,21 +72,31 @@ class Pulls:
         except BackendError as error:
             if not self._architecture(image):
                 raise
-            return "; ".join(filter(None, (f"{error}; the local image is used", self._foreign(image))))
-        return self._foreign(image)
+            return f"{error}; the local image is used"
+        return ""
 
-    def _foreign(self, image: str) -> str:
-        """A sentence where the image is for another kind of machine than the engine's."""
+    def _foreign(self, images: Iterable[str]) -> list[str]:
+        """A sentence on the images for each other kind of machine than the engine's."""
+        here = self._machine
+        kinds: dict[str, list[str]] = {}
+        for image in images:
+            kinds.setdefault(self._architecture(image), []).append(image)
+        usual = ("", here, _UNKNOWN, _SMALLER.get(here))
+        return [
+            f"images for {kind}, which this engine's machine ({here}) can only emulate: {', '.join(found)}"
+            for kind, found in kinds.items()
+            if here and kind not in usual
+        ]
+
+    @cached_property
+    def _machine(self) -> str:
+        """What the engine's machine runs, such as ``amd64``; empty where it does not say."""
         from docker.errors import DockerException
 
         try:
-            here = str(self._client.api.version().get("Arch", ""))
+            return str(self._client.api.version().get("Arch", ""))
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine does not say its version: {error}") from error
-        there = self._architecture(image)
-        if not here or there in ("", here, _UNKNOWN, _SMALLER.get(here)):
-            return ""
-        return f"image {image} is for {there}, this engine's machine is {here}: it runs only by emulation, if at all"
 
     def _architecture(self, image: str) -> str:
         """What a local image is for, such as ``arm64``; empty where there is no such image."""

@@ -34,7 +34,8 @@ def consider(finding: Finding, load: MachineLoad | None) -> Judged:
     often and shortly at 100 Hz, which harms nobody as long as they keep to their schedule, so their lateness counts
     instead, in the same proportion. What the application brings upon itself, with many threads or long computations, is
     left out by the measure: a wait counts only while the machine was full and others than the application took at least
-    half of what was taken. DoDo's own services are such others.
+    half of what was taken. DoDo's own services are such others. An emulated rig that stood still for more than it takes
+    to be late at all is another machine than the rig, whatever else was measured.
     """
     if load is None or finding.result != "failed" or not finding.is_timed or not (why := too_busy(load)):
         return Judged(finding, load)
@@ -45,6 +46,8 @@ def consider(finding: Finding, load: MachineLoad | None) -> Judged:
 
 def too_busy(load: MachineLoad) -> str:
     """How the machine hindered the test, in words; empty when it did not, or that was not measured."""
+    if load.paused_s > 0:
+        return f"the emulated rig could not keep real time and stood still for {load.paused_s:.2f} s"
     if load.application is None or load.services is None or load.crowded_s is None or load.cores is None:
         return ""
     own = load.services.ran_s / (load.cores * load.duration_s)

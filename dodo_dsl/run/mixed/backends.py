@@ -14,7 +14,7 @@ from dodo_dsl.run.mixed.containers import ApplicationContainers
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import own_modules
-from dodo_dsl.run.process.fork_server_client import ForkServer, serving
+from dodo_dsl.run.process.forks.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.attendance import attended

@@ -16,7 +16,7 @@ from dodo_dsl.run.process.commands import Command, Commands, changes
 from dodo_dsl.run.process.confined.confinement import confinement
 from dodo_dsl.run.process.entered import Entered
 from dodo_dsl.run.process.environment import own_environment
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Unstartable

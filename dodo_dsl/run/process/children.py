@@ -15,7 +15,7 @@ from dodo_dsl.run.process.confined import memory_watch
 from dodo_dsl.run.process.confined.confined_process import ConfinedProcess
 from dodo_dsl.run.process.confined.confinement import Confinement
 from dodo_dsl.run.process.confined.places import Places
-from dodo_dsl.run.process.forked_process import ForkedModule
+from dodo_dsl.run.process.forks.forked_process import ForkedModule
 
 GRACE_S = 3.0
 _POLL_S = 0.05

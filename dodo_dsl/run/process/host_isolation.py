@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.process.confined.bubblewrap import PROGRAM
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
 from dodo_dsl.run.process.slot import Slot
@@ -142,6 +142,13 @@ def _claimed(name: str) -> socket.socket | None:
         claim.close()
         return None
     return claim
+
+
+def is_claimed(name: str) -> bool:
+    """Whether a program in this network holds a lease's name."""
+    if claim := _claimed(name):
+        claim.close()
+    return claim is None
 
 
 def listen(cid: int, seconds: float = PROBE_S) -> str:

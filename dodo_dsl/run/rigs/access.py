@@ -12,10 +12,12 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.process.environment import base_environment
 from dodo_dsl.run.process.python_path import package_path
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
-from dodo_dsl.run.rigs.rig_leases import devices_in, leased
+from dodo_dsl.run.rigs.rig_leases import devices_in, leased, release, taken
 
 MANUAL = ("python", "-m", "services.gantry.manual")
 PATIENCE_S = 180.0
+Command = tuple[Sequence[str], Sequence[str]]
+"""A rig's program, and its words."""
 _END_S = 5.0
 
 
@@ -91,7 +93,7 @@ async def _end(process: asyncio.subprocess.Process) -> None:
 def query_exclusively(
     cid: int | None,
     user: str,
-    command: tuple[Sequence[str], Sequence[str]],
+    command: Command,
     say: Callable[[str], None],
     patience_s: float = leases.DEFAULT_PATIENCE_S,
 ) -> dict[str, Any]:
@@ -108,13 +110,44 @@ def query_exclusively(
 async def _query_exclusively(
     cid: int | None,
     user: str,
-    command: tuple[Sequence[str], Sequence[str]],
+    command: Command,
     say: Callable[[str], None],
     patience_s: float,
 ) -> dict[str, Any]:
+    _end_with_signals()
+    async with leased(cid, user, say, patience_s, devices_in(command[1])) as descriptors:
+        return await query(*command, descriptors=descriptors)
+
+
+def _end_with_signals() -> None:
     task = asyncio.current_task()
     assert task is not None
     for number in (signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, task.cancel)
-    async with leased(cid, user, say, patience_s, devices_in(command[1])) as descriptors:
+
+
+@contextlib.contextmanager
+def occupied(
+    cid: int | None, user: str, devices: Sequence[str], say: Callable[[str], None], patience_s: float
+) -> Iterator[Callable[[Command], dict[str, Any]]]:
+    """For several queries, between which nobody else uses the rig either; a signal ends each.
+
+    Raises LeaseTimeout, the queries RigProblem.
+    """
+    held = asyncio.run(taken(cid, user, say, patience_s, devices))
+    descriptors = tuple(lease.descriptor for lease in held)
+
+    async def asked(command: Command) -> dict[str, Any]:
+        _end_with_signals()
         return await query(*command, descriptors=descriptors)
+
+    def ask(command: Command) -> dict[str, Any]:
+        try:
+            return asyncio.run(asked(command))
+        except asyncio.CancelledError:
+            raise KeyboardInterrupt from None
+
+    try:
+        yield ask
+    finally:
+        release(held)

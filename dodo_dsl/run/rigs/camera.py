@@ -18,6 +18,9 @@ PROGRAMS = {
     DRAWN: ("python", "-m", "services.virtual_camera.snapshot"),
 }
 
+_OF_WHO_ASKS = ("truth-sender", "truth-classes")
+"""What a test says of its true boxes is not what a snapshot is asked for."""
+
 
 @dataclass(frozen=True)
 class SnapshotCommand:
@@ -40,7 +43,7 @@ def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> 
     flags = _flags(rig, manifests[CAMERA], spec, use)
     real = PlannedService("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
     service = hardware(real, manifests, "")
-    words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags)
+    words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags if flag.name not in _OF_WHO_ASKS)
     return SnapshotCommand(PROGRAMS[service.uses], words, service.uses == DRAWN)
 
 

@@ -15,6 +15,7 @@ from dodo_dsl.run.rigs.rig_leases import devices_in
 PATIENCE_S, TRIES = 90.0, 2
 """s: from the far corner the rig searches its home position for 20 s, and for most of a minute if it repeats that."""
 RANGES = ("range-x", "range-y", "range-yaw")
+CONSTANTS = tuple(f"{what}-{axis}" for axis in ("x", "y", "yaw") for what in ("steps", "offset"))
 
 
 @dataclass(frozen=True)
@@ -27,10 +28,28 @@ class HealthCheck:
 
 
 CHECKS = {
-    "gantry": HealthCheck("services.gantry.manual", ("check",), ("serial", *RANGES)),
+    "gantry": HealthCheck("services.gantry.manual", ("check",), ("serial", "kind", "limits", *RANGES, *CONSTANTS)),
     "camera": HealthCheck("services.camera.health_check", (), ("source", "width", "height", "freq", "exposure")),
 }
 """By the name of the service."""
+
+
+def refuse_quarantined(plan: Plan) -> None:
+    """Raises BackendError where the rig of a test is in quarantine, or that cannot be known."""
+    try:
+        reason = quarantined(plan.rig, _devices(plan))
+    except RigProblem as problem:
+        raise BackendError(f"the quarantine of rig '{plan.rig}' cannot be read: {problem}") from problem
+    if reason:
+        raise BackendError(_in_quarantine(plan, reason))
+
+
+def _devices(plan: Plan) -> list[str]:
+    return devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
+
+
+def _in_quarantine(plan: Plan, reason: str) -> str:
+    return f"rig '{plan.rig}' is in quarantine: {reason} ('dodo rig clear {plan.rig}' ends it)"
 
 
 async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...]) -> None:
@@ -40,7 +59,7 @@ async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int
     rig's leases, which the check goes on to hold if this process is killed.
     """
     try:
-        devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
+        devices = _devices(plan)
         reason = quarantined(plan.rig, devices)
         if not reason:
             say(f"checking rig '{plan.rig}'")
@@ -50,7 +69,7 @@ async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int
     except RigProblem as problem:
         raise BackendError(f"rig '{plan.rig}' cannot be checked: {problem}") from problem
     if reason:
-        raise BackendError(f"rig '{plan.rig}' is in quarantine: {reason} ('dodo rig clear {plan.rig}' ends it)")
+        raise BackendError(_in_quarantine(plan, reason))
 
 
 async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:

@@ -6,7 +6,7 @@ import stat
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from pathlib import Path
 
-from dodo_dsl.run import leases
+from dodo_dsl.run import lease_queue, leases
 from dodo_dsl.run.rigs.devices import identity
 
 DEVICE_FLAGS = ("--serial", "--source")
@@ -25,15 +25,32 @@ async def leased(
 
     Gives the descriptors by which a program holds them, too. Raises LeaseTimeout when one does not come free.
     """
-    names = [] if cid is None else [f"cid-{cid}"]
-    held: list[leases.Lease] = []
+    held = await taken(cid, user, say, patience_s, devices)
     try:
-        for name in [*names, *device_leases(devices)]:
-            held.append(await leases.lease_any([name], {"test": user}, say, patience_s=patience_s))
         yield tuple(lease.descriptor for lease in held)
     finally:
-        for lease in reversed(held):
-            lease.release()
+        release(held)
+
+
+async def taken(
+    cid: int | None, user: str, say: Callable[[str], None], patience_s: float, devices: Sequence[str]
+) -> list[leases.Lease]:
+    """The same leases, to be released; all or, with LeaseTimeout, none."""
+    held: list[leases.Lease] = []
+    try:
+        with lease_queue.arrived():
+            for name in [*([] if cid is None else [f"cid-{cid}"]), *device_leases(devices)]:
+                held.append(await leases.lease_any([name], {"test": user}, say, patience_s=patience_s))
+    except BaseException:
+        release(held)
+        raise
+    return held
+
+
+def release(held: Sequence[leases.Lease]) -> None:
+    """Gives leases back, the last one first."""
+    for lease in reversed(held):
+        lease.release()
 
 
 def devices_in(words: Iterable[str]) -> list[str]:

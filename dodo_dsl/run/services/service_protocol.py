@@ -20,6 +20,7 @@ from dodo_dsl.run.protocol import (
     MemoryTaken,
     Noted,
     Overrun,
+    Paused,
     Ready,
     Responded,
     Stopped,
@@ -57,6 +58,8 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return Overrun(service, message["messages"])
     if kind == "late":
         return _late(service, message)
+    if kind == "paused":
+        return _paused(service, message.get("s"))
     if kind == "verdict" and is_evaluator:
         if problem := _problem(message):
             return Malformed(service, problem)
@@ -92,6 +95,11 @@ def _late(service: str, message: dict[str, Any]) -> Late | None:
     if type(updates) is not int or type(late) is not int or not 0 < late <= updates < 1 << 63:
         return None
     return Late(service, updates, late, float(worst)) if _is_number(worst) and worst >= 0 else None
+
+
+def _paused(service: str, seconds: Any) -> Paused | None:
+    """For how long what a service emulates stood still, where that can be."""
+    return Paused(service, float(seconds)) if _is_number(seconds) and seconds > 0 else None
 
 
 def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:

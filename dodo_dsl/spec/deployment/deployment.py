@@ -55,8 +55,8 @@ class Deployment:
     sandbox: SandboxLimits = field(default_factory=SandboxLimits)
 
     def rig(self, name: str) -> Rig | None:
-        """A rig of the deployment, or the emulated one."""
-        return rig.emulated() if name == rig.EMULATED else self.rigs.get(name)
+        """A rig of the deployment, or an emulated one."""
+        return rig.emulated(name) if name in rig.EMULATED_RIGS else self.rigs.get(name)
 
 
 def find_deployment(start: Path) -> Path | None:
@@ -188,7 +188,7 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
             continue
         raw = plain(written.value)
         found = Rig(name, raw["kind"], raw["cid"], written.value)
-        if name == rig.EMULATED:
+        if name in rig.EMULATED_RIGS:
             message = f"the name '{name}' is reserved for the built-in rig"
             problems.append(Diagnostic(written.key, "rig-name", message, "choose another name"))
         elif raw["cid"] in taken or raw["cid"] in RESERVED_CIDS:
@@ -197,7 +197,17 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
             problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
         taken.setdefault(raw["cid"], name)
         rigs[name] = found
+        problems.extend(_tags(found))
     return rigs
+
+
+def _tags(found: Rig) -> Iterator[Diagnostic]:
+    """Tags that would send a rig's jobs to a runner that is none of its kind's."""
+    node = found.node.get("tags")
+    for item in node.items if isinstance(node, Sequence) else ():
+        if isinstance(item, Scalar) and item.text in found.more_tags and item.text in rig.RESERVED_TAGS:
+            message = f"'{item.text}' is the tag of other runners, those of rig '{found.name}' have '{found.tag}'"
+            yield Diagnostic(item.span, "rig-tag", message, "remove it, or choose a tag of the rig's own")
 
 
 def _cids(entry: Entry | None, problems: list[Diagnostic]) -> tuple[int, ...]:

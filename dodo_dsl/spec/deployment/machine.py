@@ -16,8 +16,18 @@ from dodo_dsl.spec import quantity
 from dodo_dsl.spec.schema.validation import validate
 
 FILE = Path("/etc/dodo/rigs.yml")
-UNITS = {"x": "m", "y": "m", "yaw": "deg", "speed": "m/s", "yaw-rate": "rad/s"}
+UNITS = {
+    "x": "m",
+    "y": "m",
+    "yaw": "deg",
+    "speed": "m/s",
+    "yaw-rate": "rad/s",
+    "acceleration": "m/s2",
+    "yaw-acceleration": "rad/s2",
+}
 """Of the limits."""
+DENSITIES = {"x": "steps/m", "y": "steps/m", "yaw": "steps/deg"}
+"""The units of an axis' steps."""
 
 
 class MachineError(OSError):
@@ -26,12 +36,16 @@ class MachineError(OSError):
 
 @dataclass(frozen=True)
 class PermittedRig:
-    """Devices that a rig has, its largest limits in ``UNITS``, and folders of repositories that may move it."""
+    """Devices that a rig has, its largest limits in ``UNITS``, and folders of repositories that may move it.
+
+    ``constants`` are those of its axes that the operator measured, by the gantry's flags such as ``steps-x``.
+    """
 
     name: str
     devices: tuple[str, ...]
     repositories: tuple[Path, ...] = ()
     limits: dict[str, float] = field(default_factory=dict)
+    constants: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,8 +92,20 @@ def _rig(path: Path, name: str, raw: dict[str, object]) -> PermittedRig:
     assert isinstance(written, dict)
     try:
         limits = {key: float(quantity.convert(value, UNITS[key])) for key, value in written.items()}
+        constants = {flag: float(quantity.convert(*value)) for flag, value in _constants(raw).items()}
     except quantity.QuantityError as error:
         raise MachineError(None, f"rig '{name}': {error}", str(path)) from None
     devices, repositories = raw["devices"], raw.get("repositories") or []
     assert isinstance(devices, list) and isinstance(repositories, list)
-    return PermittedRig(name, tuple(devices), tuple(map(Path, repositories)), limits)
+    return PermittedRig(name, tuple(devices), tuple(map(Path, repositories)), limits, constants)
+
+
+def _constants(raw: dict[str, object]) -> dict[str, tuple[str, str]]:
+    """Quantities of the axes as written, and their units, by the gantry's flags."""
+    axes = raw.get("axes") or {}
+    assert isinstance(axes, dict)
+    return {
+        f"{what}-{axis}": (text, DENSITIES[axis] if what == "steps" else "steps")
+        for axis, about in axes.items()
+        for what, text in (about or {}).items()
+    }

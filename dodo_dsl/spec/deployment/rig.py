@@ -1,29 +1,54 @@
 """Rigs: the hardware that a deployment has, and the emulated one that every machine has."""
 
+import contextlib
 import functools
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, parse
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, parse
+from dodo_dsl.spec import quantity
 
 EMULATED = "emulated"
+EMULATED_CIRCLE = "emulated-circle"
+EMULATED_RIGS = (EMULATED, EMULATED_CIRCLE)
+"""The rigs that every machine has."""
 EMULATED_FILE = "the emulated rig"
+CIRCLE = "circle"
+"""The kind of a rig whose yaw turns without end. Such a rig alone has its kind under this key, too, for a flag."""
+MEMORY = "memory"
+"""The key of a flag for all limits of a rig, as its own memory keeps them: ``x=1.5,speed=0.4``, in m, rad and s."""
+MEMORY_FLAG = "limits"
+"""That flag of the gantry."""
+LIMIT_UNITS = {
+    "x": "m",
+    "y": "m",
+    "yaw": "rad",
+    "speed": "m/s",
+    "yaw-rate": "rad/s",
+    "acceleration": "m/s2",
+    "yaw-acceleration": "rad/s2",
+}
 RPICAM = "rpicam"
 """The source of a camera of a Raspberry Pi."""
 CAMERA_SOURCE = "camera.source"
+KIND_TAGS = {kind: f"hil-{kind}" for kind in ("static", "dynamic", CIRCLE)}
+"""The tags of GitLab runners by the kinds of their rigs."""
+SIMULATION_TAG = "sil"
+"""The tag of runners without a rig."""
+RESERVED_TAGS = frozenset({SIMULATION_TAG, *KIND_TAGS.values()})
 PORT = "serial"
 """The key of a rig's port. A service whose manifest takes a parameter from it moves the rig."""
 
 _EMULATED = """
-kind: dynamic
+kind: {kind}
 serial: emulated
-camera: {source: emulated, width: 640, height: 480}
+camera: {{source: emulated, width: 640, height: 480}}
 """
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig; ``kind`` is static or dynamic, ``cid`` the one reserved for it, None for the emulated one."""
+    """A rig; ``kind`` is static, dynamic or circle, ``cid`` the one reserved for it, None for an emulated one."""
 
     name: str
     kind: str
@@ -32,12 +57,19 @@ class Rig:
 
     @property
     def is_emulated(self) -> bool:
-        return self.name == EMULATED
+        return self.name in EMULATED_RIGS
 
     @property
     def tag(self) -> str:
         """The tag of its GitLab runner; the emulated rig runs wherever simulations do."""
-        return "sil" if self.is_emulated else f"hil-{self.kind}"
+        return SIMULATION_TAG if self.is_emulated else KIND_TAGS[self.kind]
+
+    @property
+    def more_tags(self) -> tuple[str, ...]:
+        """Further tags of its runner, which tell it from other rigs of its kind."""
+        node = self.node.get("tags")
+        texts = [item.text for item in node.items if isinstance(item, Scalar)] if isinstance(node, Sequence) else []
+        return tuple(dict.fromkeys(text for text in texts if text != self.tag))
 
     @property
     def isolation(self) -> str:
@@ -50,6 +82,17 @@ class Rig:
         node = self.node.get("privileged")
         return isinstance(node, Scalar) and node.value is True
 
+    @property
+    def arch(self) -> str:
+        """What its computer is, such as ``arm64``; empty where ``dodo.yml`` does not say."""
+        return self.text("arch")
+
+    @property
+    def disk(self) -> int | None:
+        """Bytes that the images of its tests may take on its computer; None for no limit but the disk's own."""
+        written = self.text("disk")
+        return int(quantity.convert(written, "B")) if written else None
+
     def text(self, key: str) -> str:
         """The string at a dotted key; empty where there is none."""
         entry = self.entry(key)
@@ -57,6 +100,10 @@ class Rig:
 
     def entry(self, key: str) -> Entry | None:
         """The rig's entry at a dotted key such as ``camera.width``."""
+        if key == CIRCLE:
+            return self.node.entries.get("kind") if self.kind == CIRCLE else None
+        if key == MEMORY:
+            return self._memory
         node: Node = self.node
         entry = None
         for part in key.split("."):
@@ -66,6 +113,21 @@ class Rig:
             node = entry.value
         return entry
 
+    @functools.cached_property
+    def _memory(self) -> Entry | None:
+        """All limits in one entry; one that is no quantity is left out, as the flag of its own has the problem."""
+        entry = self.node.entries.get("limits")
+        if entry is None or not isinstance(entry.value, Mapping):
+            return None
+        words = []
+        for name, unit in LIMIT_UNITS.items():
+            limit = entry.value.get(name)
+            with contextlib.suppress(quantity.QuantityError):
+                if isinstance(limit, Scalar):
+                    words.append(f"{name}={quantity.decimal_text(quantity.convert(limit.text, unit))}")
+        text = ",".join(words)
+        return Entry(entry.key, Scalar(entry.value.span, text, text)) if words else None
+
 
 def is_simulated(port: str) -> bool:
     """Whether no hardware is at a port: the emulated rig's, or a pseudo-terminal, whose other end is a program."""
@@ -73,8 +135,9 @@ def is_simulated(port: str) -> bool:
 
 
 @functools.cache
-def emulated() -> Rig:
-    """The rig whose firmware runs in a simulator."""
-    node, _ = parse(_EMULATED, EMULATED_FILE)
+def emulated(name: str = EMULATED) -> Rig:
+    """A rig whose firmware runs in a simulator, of EMULATED_RIGS."""
+    kind = CIRCLE if name == EMULATED_CIRCLE else "dynamic"
+    node, _ = parse(_EMULATED.format(kind=kind), EMULATED_FILE)
     assert isinstance(node, Mapping)
-    return Rig(EMULATED, "dynamic", None, node)
+    return Rig(name, kind, None, node)

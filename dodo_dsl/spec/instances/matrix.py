@@ -21,14 +21,19 @@ SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 
 @dataclass(frozen=True)
 class Choice:
-    """One value of each dimension, in the order in which the dimensions are written; empty without a matrix."""
+    """One value of each dimension, in the order in which the dimensions are written; empty without a matrix.
+
+    ``shown`` are values that the label has, but not the slug.
+    """
 
     values: tuple[tuple[str, Scalar], ...] = ()
+    shown: tuple[tuple[str, Scalar], ...] = ()
 
     @property
     def label(self) -> str:
         """``[light=dark,speed=2]``"""
-        return f"[{','.join(f'{k}={v.text}' for k, v in self.values)}]" if self.values else ""
+        values = (*self.values, *self.shown)
+        return f"[{','.join(f'{k}={v.text}' for k, v in values)}]" if values else ""
 
     @property
     def slug(self) -> str:

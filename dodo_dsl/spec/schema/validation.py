@@ -7,16 +7,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from dodo_dsl import __version__, package_data
+from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.schema.consequences import unindented, without_consequences
+from dodo_dsl.spec.schema.validity import UNIT, WORDS, check_quantity, is_valid, schema_of
 
-_UNIT = "x-unit"
-_WORDS = "x-words"
-"""Allowed in place of a quantity."""
 _HINT = "x-hint"
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
@@ -35,9 +33,8 @@ def _validator(name: str) -> Any:
     from jsonschema.validators import extend
 
     def is_quantity(_: Any, unit: str, instance: object, schema: dict[str, Any]) -> Iterator[Any]:
-        with_unit = isinstance(instance, str) and instance not in schema.get(_WORDS, ())
         try:
-            quantity.convert(instance, unit) if with_unit else None
+            check_quantity(unit, instance, schema)
         except quantity.QuantityError as error:
             yield ValidationError(str(error))
 
@@ -53,16 +50,16 @@ def _validator(name: str) -> Any:
                 if error is None:
                     valid.add(known_as)
 
-    schema = json.loads((package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
-    schema.get("$defs", {}).get("use", {}).pop("allOf", None)  # for editors; the rules give better messages
-    return extend(Draft202012Validator, {_UNIT: is_quantity, "properties": properties})(schema)  # type: ignore[no-untyped-call]
+    return extend(Draft202012Validator, {UNIT: is_quantity, "properties": properties})(schema_of(name))  # type: ignore[no-untyped-call]
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
     """All violations of ``schemas/<schema>.schema.json``; tags are refused as well."""
-    found = list(_tags(node))
+    found, document = list(_tags(node)), plain(node)
+    if is_valid(document, schema):
+        return found
     validator = _validator(schema)
-    errors = itertools.islice(validator.iter_errors(plain(node)), MAX_PROBLEMS)
+    errors = itertools.islice(validator.iter_errors(document), MAX_PROBLEMS)
     for error in without_consequences(error for error in errors if not _is_of_rules(error)):
         place = _locate(node, error.absolute_path)
         if not error.absolute_path:
@@ -123,6 +120,9 @@ def _shown(value: object) -> str:
     return f"'{text if len(text) <= 60 else text[:57] + '...'}'"
 
 
+_USE = {"uses", "with"}
+
+
 def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
     known = error.schema.get("properties", {})
     beside = unindented(error.instance, known)
@@ -133,7 +133,10 @@ def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
             yield Diagnostic(place.key(name), "unknown-key", found.message, found.hint, fix=found.fix)
         elif name not in beside:
             message, fix = f"unknown key {_shown(name)}", only_fix(name, known, error.instance)
-            yield Diagnostic(place.key(name), "unknown-key", message, did_you_mean(name, known), fix=fix)
+            hint = did_you_mean(name, known)
+            if set(known) == _USE and not fix:
+                hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
+            yield Diagnostic(place.key(name), "unknown-key", message, hint, fix=fix)
         elif name == next(key for key in beside if beside[key] == beside[name]):
             message = f"{_shown(name)} stands beside '{beside[name]}', which is empty"
             hint = f"indent what belongs to '{beside[name]}'"
@@ -157,7 +160,7 @@ def _companion(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    if _UNIT in error.schema:
+    if UNIT in error.schema:
         yield from _quantity(error, place)
         return
     wanted = error.validator_value
@@ -182,14 +185,14 @@ def _kind(value: object) -> str:
 
 
 def _quantity(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    words = error.schema.get(_WORDS, ())
+    words = error.schema.get(WORDS, ())
     if words and isinstance(error.instance, str) and error.instance[:1].isalpha():
         message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(words)}"
         hint = did_you_mean(error.instance, words)
         yield Diagnostic(place.span, "wrong-value", message, hint if hint.startswith("did") else "")
         return
     try:
-        quantity.convert(place.node.text if isinstance(place.node, Scalar) else None, error.schema[_UNIT])
+        quantity.convert(place.node.text if isinstance(place.node, Scalar) else None, error.schema[UNIT])
     except quantity.QuantityError as problem:
         yield Diagnostic(place.span, "wrong-unit", f"{place.name}: {problem}", problem.hint, fix=problem.fix)
 
@@ -253,7 +256,7 @@ _TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
     "required": _required,
     "dependentRequired": _companion,
     "type": _type,
-    _UNIT: _quantity,
+    UNIT: _quantity,
     "enum": _choices,
     "const": _const,
     "pattern": _pattern,

@@ -8,12 +8,13 @@ import pytest
 import yaml
 
 from dodo_dsl.cli.main import main
+from services.gantry.rig_table import LIMITS
 from tests.run.rigs.place import Place, busy, place
 
 __all__ = ["place"]
 
 
-@pytest.mark.parametrize("action", ["status", "home", "goto", "calibrate", "clear", "truth"])
+@pytest.mark.parametrize("action", ["status", "home", "goto", "calibrate", "clear", "truth", "measure"])
 def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["rig", action, "--help"], sys.stdout, sys.stderr) == 0
     assert "RIG" in capsys.readouterr().out
@@ -33,6 +34,18 @@ def test_manual_use(place: Place) -> None:
 
 
 @pytest.mark.realtime
+def test_calibrate_writes_the_limits_of_the_file_into_the_rig_and_status_shows_them(place: Place) -> None:
+    place.rig.memory, place.rig.source = list(map(max, LIMITS.values())), 0
+    assert "limits" not in place.dodo("rig", "status", code=0)
+    said = place.dodo("rig", "goto", "fake", "0", "0", "0", code=3)
+    assert "has other limits than its file: y 1.4 m, expected y 1 m; calibrate it" in said
+    place.dodo("rig", "calibrate", "fake", code=0)
+    assert "limits in its memory: x 1.85 m, y 1 m, yaw 2.96706 rad, speed 1 m/s" in place.dodo("rig", "status", code=0)
+    place.rig.source = 2
+    assert "its memory is damaged" in place.dodo("rig", "status", code=0)
+
+
+@pytest.mark.realtime
 def test_one_user_at_a_time(place: Place) -> None:
     with busy(place, "rig", "goto", "fake", "0", "0", "0"):
         said = place.dodo("rig", "status", "fake", "--wait", "0.3", code=3)
@@ -44,8 +57,8 @@ def test_one_user_at_a_time(place: Place) -> None:
 def test_two_repositories_that_name_one_port_exclude_each_other(place: Place, tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.mkdir()
-    rigs = {"theirs": {"kind": "dynamic", "cid": 3, "serial": str(place.rig.path.resolve())}}
-    (other / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "rigs": rigs}))
+    fake = {"kind": "dynamic", "cid": 3, "serial": str(place.rig.path.resolve()), "limits": {"y": "1 m"}}
+    (other / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "rigs": {"theirs": fake}}))
     with busy(place, "rig", "goto", "theirs", "0", "0", "0", folder=other):
         said = place.dodo("rig", "status", "fake", "--wait", "0.3", code=3)
         assert "no device came free within 0.3 s; test 'dodo rig goto'" in said

@@ -135,7 +135,10 @@ DESK = ("desk", "--picture", "desk.png")
         (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),
         (("desk", *BOX, "--test", "sil-open-straight"), "has no service 'camera'"),
         (("blind", *BOX), "rig 'blind' has no camera in dodo.yml"),
-        (("nobody", *BOX), "there is no rig 'nobody', expected one of emulated, blind, desk, kiwi-static"),
+        (
+            ("nobody", *BOX),
+            "there is no rig 'nobody', expected one of emulated, emulated-circle, blind, desk, kiwi-static",
+        ),
         (("emulated",), "the emulated rig's camera sees the map of a test: name one with --test"),
         (("emulated", "--test", "hil-camera-scenes"), "matches 6 tests, expected one"),
         pytest.param(

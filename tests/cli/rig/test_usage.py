@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.rig import command
+from dodo_dsl.cli.rig import command, gantry_flags
+from dodo_dsl.spec.deployment.deployment import load_deployment
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +30,11 @@ def test_without_rigs_the_emulated_one_is_named() -> None:
 
 def test_an_unknown_rig_and_those_that_are_known(folder: Path) -> None:
     (folder / "dodo.yml").write_text("dodo: 1\nrigs: {desk: {kind: static, cid: 120, camera: {source: a.png}}}\n")
-    assert rig("home", "dask") == (2, "", "dodo rig: there is no rig 'dask', expected one of emulated, desk\n")
+    assert rig("home", "dask") == (
+        2,
+        "",
+        "dodo rig: there is no rig 'dask', expected one of emulated, emulated-circle, desk\n",
+    )
     assert rig("home", "desk") == (2, "", "dodo rig: rig 'desk' has no serial port, so it cannot move\n")
 
 
@@ -38,6 +43,15 @@ def test_a_deployment_with_errors_is_shown_with_all_of_them(folder: Path) -> Non
     code, out, err = rig("status")
     assert (code, out, err.splitlines()[0]) == (2, "", "dodo rig: dodo.yml has problems:")
     assert err.count("error[") >= 2 and not err.endswith("\n\n")
+
+
+def test_constants_of_the_rig_are_flags_of_the_gantry(folder: Path) -> None:
+    axes = "x: {steps: 3.3 steps/mm, offset: 2990.5 steps}, yaw: {steps: 31.5 steps/rad}"
+    (folder / "dodo.yml").write_text(f"dodo: 1\nrigs: {{desk: {{kind: dynamic, cid: 120, axes: {{{axes}}}}}}}\n")
+    deployment, problems = load_deployment(folder / "dodo.yml")
+    assert not problems
+    flags = gantry_flags.flags(deployment.rigs["desk"])
+    assert flags == ["--steps-x=3300", "--offset-x=2990.5", "--steps-yaw=0.549778714378214"]
 
 
 def test_a_result_in_words() -> None:
@@ -49,7 +63,7 @@ def test_a_result_in_words() -> None:
     assert command._sentence(broken) == "desk: no answer; in quarantine: belt; 'dodo rig clear desk' ends it"
 
 
-@pytest.mark.parametrize("action", [*command.ACTIONS, "truth"])
+@pytest.mark.parametrize("action", [*command.ACTIONS, "truth", "measure"])
 def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
     parser = argparse.ArgumentParser(prog="dodo rig")
     command.add(parser)

@@ -45,6 +45,18 @@ def test_what_hinders_dodo_is_no_fault_of_the_application(load: MachineLoad, why
     )
 
 
+@pytest.mark.parametrize("load", [CALM, MachineLoad(7.5)], ids=["measured", "not measured"])
+def test_an_emulated_rig_that_stood_still_is_no_rig(load: MachineLoad) -> None:
+    paused = replace(load, paused_s=0.061)
+    judged = consider(FAILED, paused)
+    assert judged.finding.reason.startswith(
+        "the machine was too busy to judge: the emulated rig could not keep real time and stood still for 0.06 s; it "
+    )
+    assert judged.load == replace(paused, undecided=True)
+    passed = Finding("passed", "it drove", "judge", is_timed=True)
+    assert consider(passed, paused).finding == passed
+
+
 @pytest.mark.parametrize(
     "load",
     [

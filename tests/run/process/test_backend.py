@@ -53,7 +53,7 @@ DECISIONS = {
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="this kernel counts no waits")
 def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
     """The application's part is that of a process which it has started, and which has ended before the test does."""
-    work = "import time\nwhile time.process_time() < 0.5: pass"
+    work = "import time\nwhile time.process_time() < 1.2: pass"
     application = f"import subprocess\nsubprocess.run([sys.executable, '-c', {work!r}])\n" + STARTED + WAIT
     judge = READY + AFTER_START + "time.sleep(0.5)\n" + PASS
     (outcome,) = bench.run(bench.plan(application=application, judge=judge))
@@ -126,7 +126,7 @@ def test_tests_at_once_are_apart_and_leave_nothing(bench: Bench) -> None:
 def _fork_servers() -> list[str]:
     """Those that this process has started."""
     children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-    return [pid for pid in processes_with("dodo_dsl.run.process.fork_server") if pid in children]
+    return [pid for pid in processes_with("dodo_dsl.run.process.forks.fork_server") if pid in children]
 
 
 def test_application_without_flags_runs_alone_on_the_host(host: Bench) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from dodo_dsl.run import leases
 from dodo_dsl.run.process import leftovers
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 from dodo_dsl.run.process.host_isolation import host_slot, namespaces_refusal, runs_alone
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError

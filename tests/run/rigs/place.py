@@ -16,6 +16,7 @@ import pytest
 import yaml
 
 from dodo_dsl.cli.main import main
+from services.gantry.rig_table import LIMITS
 from tests.drive.applications import KIWI, ROOT, results
 from tests.services.gantry.fake_rig import FakeRig
 
@@ -36,6 +37,7 @@ class Place:
 
     def __init__(self, folder: Path, cid: int, rig: FakeRig) -> None:
         self.folder, self.rig = folder, rig
+        rig.memory, rig.source = [1.0 if name == "y" else widest for name, (_, widest) in LIMITS.items()], 1
         self._started: list[subprocess.Popen[bytes]] = []
         for name in ("maps", "sil-closed-straight", "hil-dynamic"):
             shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)

@@ -33,6 +33,15 @@ def test_a_hil_test_on_a_real_rig(place: Place) -> None:
     assert len([envelope for envelope in recording if envelope.data_type == alive]) >= 3
 
 
+def test_a_tuned_rig_is_checked_and_calibrated_once(place: Place) -> None:
+    words = ("tune", "hil-fake", *APPLICATION, "--runs", "1", "--metres", "20")
+    out = place.dodo(*words, code=0)
+    assert "on rig fake: at most 30 min, and 20 m of way" in out and "2 of 2 drives" in out
+    received = [word for word, _ in place.rig.received]
+    assert "CALIBRATE" in received and "CALIBRATE" not in received[received.index("RUN") :]
+    assert place.rig.last() == "STOP"
+
+
 def drive(place: Place) -> "subprocess.Popen[bytes]":
     """A run whose vehicle moves the rig by now."""
     run = place.start("run", "hil-fake", *APPLICATION, "--backend", "process")
@@ -88,7 +97,8 @@ def test_what_a_killed_runner_leaves_misses_it_and_stops_the_rig(place: Place, c
     live += f"async def main():\n async with heartbeat({cid}):\n  await asyncio.sleep(60)\nasyncio.run(main())\n"
     runner = subprocess.Popen([sys.executable, "-c", live])
     place.rig.at = [0.0, 0.0, 0.0]
-    with Session(cid) as session, running("gantry", tmp_path, f"--cid={cid}", f"--serial={place.rig.path}") as gantry:
+    flags = f"--cid={cid}", f"--serial={place.rig.path}", "--limits=y=1"
+    with Session(cid) as session, running("gantry", tmp_path, *flags) as gantry:
         ready = time.time_ns() // 1000
         while receive(session, "dodo.Alive")[0].sent < ready:
             pass  # the gantry was not there yet

@@ -8,6 +8,7 @@ import pytest
 
 from dodo_dsl.run import leases
 from dodo_dsl.run.rigs.rig_leases import device_leases, devices_in, leased
+from tests.run.scripted import run
 
 
 def test_flags_name_hardware() -> None:
@@ -48,6 +49,30 @@ def test_the_emulated_rig_has_none(folder: Path) -> None:
             return descriptors
 
     assert asyncio.run(scene()) == ()
+
+
+def test_who_has_waited_for_the_cid_is_not_the_last_for_the_device(folder: Path) -> None:
+    (device,) = device_leases(["/dev/null"])
+    held = [leases.try_lease(name, {"test": "theirs"}) for name in ("cid-121", device)]
+    order: list[str] = []
+
+    async def user(name: str, cid: int | None) -> None:
+        async with leased(cid, name, lambda _: None, devices=["/dev/null"]):
+            order.append(name)
+
+    async def scene() -> None:
+        users = []
+        for name, cid in (("both", 121), ("device", None)):
+            users.append(asyncio.ensure_future(user(name, cid)))
+            await asyncio.sleep(0.05)
+        for lease in held:
+            assert lease is not None
+            lease.release()
+            await asyncio.sleep(0.5)
+        await asyncio.gather(*users)
+
+    run(scene())
+    assert order == ["both", "device"]
 
 
 def test_a_busy_device_gives_the_cid_back(folder: Path) -> None:

@@ -17,6 +17,7 @@ from dodo_dsl.run.protocol import (
     Malformed,
     Noted,
     Overrun,
+    Paused,
     Ready,
     Responded,
     Stopped,
@@ -56,6 +57,12 @@ def test_lateness_is_taken_from_every_service() -> None:
     assert read_line("camera", False, text) == Late("camera", 12, 3, 0.25)
     for change in ({"late": 13}, {"late": 0}, {"updates": "12"}, {"worst_s": -1}, {"worst_s": None}, {"late": 1.5}):
         assert read_line("camera", False, json.dumps({**json.loads(text), **change}).encode()) is None
+
+
+def test_pauses_are_taken_from_every_service() -> None:
+    assert read_line("pose", False, b'{"dodo": "paused", "s": 0.061}\n') == Paused("pose", 0.061)
+    for seconds in (b"0", b"-1", b'"1"', b"null", b"true", b"NaN", b"[]"):
+        assert read_line("pose", False, b'{"dodo": "paused", "s": ' + seconds + b"}") is None
 
 
 def test_notes_and_the_end_of_the_input_are_taken_from_every_service() -> None:

@@ -1,12 +1,26 @@
 """Rigs, of hardware and emulated."""
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl import package_data
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.deployment.rig import EMULATED, EMULATED_FILE, Rig, emulated, is_simulated
+from dodo_dsl.spec.deployment.rig import (
+    CIRCLE,
+    EMULATED,
+    EMULATED_CIRCLE,
+    EMULATED_FILE,
+    LIMIT_UNITS,
+    MEMORY,
+    Rig,
+    emulated,
+    is_simulated,
+)
+from services.gantry.memory import UNITS
+from services.gantry.rig_table import LIMITS
 from tests.source.nodes import mapping
 
 KIWI = Rig("kiwi", "static", 121, mapping("kind: static\ncamera: {width: 640}\nprivileged: true\n"))
@@ -17,6 +31,36 @@ def test_hardware_and_the_emulated_rig() -> None:
     rig = emulated()
     assert (rig.name, rig.cid) == (EMULATED, None)
     assert (rig.is_emulated, rig.tag, rig.isolation, rig.privileged) == (True, "sil", "network", False)
+
+
+def test_its_runner_may_have_more_tags_than_that_of_its_kind() -> None:
+    tagged = Rig("kiwi", "dynamic", 121, mapping("tags: [hil-dynamic, rig-2, rig-2, cellar]\n"))
+    assert (tagged.tag, tagged.more_tags) == ("hil-dynamic", ("rig-2", "cellar"))
+    assert KIWI.more_tags == emulated().more_tags == ()
+
+
+def test_a_rig_that_turns_without_end_alone_gives_its_kind_to_the_gantry() -> None:
+    endless = emulated(EMULATED_CIRCLE)
+    assert (endless.name, endless.kind, endless.tag, endless.is_emulated) == (EMULATED_CIRCLE, CIRCLE, "sil", True)
+    assert Rig("round", CIRCLE, 122, mapping("kind: circle\n")).tag == "hil-circle"
+    entry = endless.entry(CIRCLE)
+    assert entry is not None and isinstance(entry.value, Scalar) and entry.value.value == CIRCLE
+    assert emulated().entry(CIRCLE) is None and KIWI.entry(CIRCLE) is None
+
+
+def test_its_limits_are_one_text_for_its_memory() -> None:
+    rig = Rig("kiwi", "dynamic", 121, mapping("limits: {speed: 40 cm/s, x: 150 cm, yaw: 90 deg, y: many}\n"))
+    entry = rig.entry(MEMORY)
+    assert entry is not None and isinstance(entry.value, Scalar) and entry is rig.entry(MEMORY)
+    assert entry.value.text == "x=1.5,yaw=1.5707963267949,speed=0.4"
+    assert KIWI.entry(MEMORY) is None and emulated().entry(MEMORY) is None
+
+
+def test_limits_have_the_names_and_units_of_the_schema_and_of_the_rigs_memory() -> None:
+    schema = json.loads((package_data.schemas() / "deployment.schema.json").read_text())
+    limits = schema["$defs"]["rig"]["properties"]["limits"]["properties"]
+    assert {name: about["x-unit"] for name, about in limits.items()} == LIMIT_UNITS == UNITS
+    assert list(LIMIT_UNITS) == list(LIMITS)
 
 
 @pytest.mark.parametrize("key", ["", "camera.height", "kind.width", "camera.width.x", "other"])

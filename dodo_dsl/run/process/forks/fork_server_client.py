@@ -27,7 +27,7 @@ class ForkServer:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "dodo_dsl.run.process.fork_server", str(theirs.fileno())],
+                [sys.executable, "-P", "-m", "dodo_dsl.run.process.forks.fork_server", str(theirs.fileno())],
                 pass_fds=(theirs.fileno(), *descriptors),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,

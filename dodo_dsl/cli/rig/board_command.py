@@ -1,0 +1,27 @@
+"""dodo rig board: the board by which a camera is measured, to be printed."""
+
+import argparse
+from pathlib import Path
+
+from dodo_dsl import atomic
+from dodo_dsl.rec.outputs import refuse_existing
+
+SUMMARY = "write the board by which a camera is measured, to be printed"
+EXAMPLES = """examples:
+  dodo rig board -o board.svg           A4, in true size; print it without scaling
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-o", "--output", metavar="FILE.svg", type=Path, required=True, help="file to write")
+    parser.add_argument("--force", action="store_true", help="replace an existing file")
+
+
+def make(options: argparse.Namespace) -> str:
+    """Writes the board; a sentence about it. Raises OutputExists and OSError."""
+    from dodo_dsl.calibration import board  # OpenCV takes a second to import
+
+    refuse_existing([options.output], options.force)
+    atomic.write_text(options.output, board.svg())
+    squares = f"{board.COLUMNS} x {board.ROWS} squares of {board.SQUARE:g} mm"
+    return f"{options.output}: {squares} on A4; print it without scaling, and glue it onto something flat"

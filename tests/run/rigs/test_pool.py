@@ -1,0 +1,228 @@
+"""Any rig of a pool: the one that is free is taken, in turn; rigs that are not here or unfit are left out."""
+
+import asyncio
+import contextlib
+import os
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from dodo_dsl.plan.model import Flag, PlannedService, Pooled
+from dodo_dsl.run import leases
+from dodo_dsl.run.attempts import Attempts
+from dodo_dsl.run.backends import Job
+from dodo_dsl.run.process import host_isolation
+from dodo_dsl.run.protocol import Backend, BackendError, Ready
+from dodo_dsl.run.rigs.pool import opened
+from dodo_dsl.run.rigs.quarantine import quarantine
+from dodo_dsl.run.rigs.rig_leases import leased
+from tests.run.scripted import ScriptedBackend, drives, plan, run
+
+DEVICES = {"kiwi-1": "/dev/null", "kiwi-2": "/dev/zero"}
+CIDS = {"kiwi-1": 121, "kiwi-2": 122}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path))
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path / "state"))
+    return tmp_path
+
+
+def on(rig: str, slug: str = "any") -> Job:
+    pose = PlannedService("action", "pose", "mover", "x", (), (Flag("serial", DEVICES[rig]),))
+    made = replace(plan(slug), rig=rig, cid=CIDS[rig], isolation="host", pool=Pooled(slug, slug))
+    return Job(replace(made, services=(*made.services, pose)), Path(rig), Path("report"))
+
+
+def pool(slug: str = "any") -> Job:
+    return replace(on("kiwi-1", slug), others=(on("kiwi-2", slug),))
+
+
+def backend(job: Job) -> contextlib.AbstractAsyncContextManager[Backend]:
+    """Holds the leases of a test's rig."""
+
+    @contextlib.asynccontextmanager
+    async def held() -> AsyncIterator[Backend]:
+        async with leased(job.plan.cid, job.plan.slug, lambda _: None, devices=[DEVICES[job.plan.rig]]):
+            yield cast(Any, None)
+
+    return held()
+
+
+async def drive(slug: str, seconds: float, said: list[str] | None = None, one: Job | None = None) -> str:
+    """The rig that a test took, after it had it for some time."""
+    say = (said if said is not None else []).append
+    async with opened(one or pool(slug), say, backend) as (chosen, _):
+        await asyncio.sleep(seconds)
+        return chosen.plan.rig
+
+
+def test_each_takes_another_rig_and_the_next_the_first_that_comes_free(folder: Path) -> None:
+    said: list[str] = []
+
+    async def scene() -> list[str]:
+        tests = []
+        for slug, seconds in (("a", 30.0), ("b", 10.0)):
+            tests.append(asyncio.ensure_future(drive(slug, seconds)))
+            await asyncio.sleep(0.1)
+        tests.append(asyncio.ensure_future(drive("c", 1.0, said)))
+        return await asyncio.gather(*tests)
+
+    assert run(scene()) == ["kiwi-1", "kiwi-2", "kiwi-2"]
+    assert said == [f"waiting for test a of process {os.getpid()}", "on rig 'kiwi-2'"]
+    assert [path.name for path in folder.glob("queue.*")] == []
+
+
+def test_who_waits_for_one_rig_and_who_waits_for_any_are_one_queue() -> None:
+    """The second came first for both, so it has the rig that comes free first; the third wants the other one."""
+
+    async def scene() -> tuple[list[str], list[str]]:
+        order: list[str] = []
+
+        async def then(slug: str, seconds: float, one: Job | None = None) -> str:
+            rig = await drive(slug, seconds, one=one)
+            order.append(slug)
+            return rig
+
+        held = [
+            asyncio.ensure_future(then("a", 20.0, on("kiwi-1"))),
+            asyncio.ensure_future(then("b", 60.0, on("kiwi-2"))),
+        ]
+        await asyncio.sleep(0.1)
+        tests = []
+        for slug, one in (("c", None), ("d", on("kiwi-1", "d")), ("e", None)):
+            tests.append(asyncio.ensure_future(then(slug, 5.0, one)))
+            await asyncio.sleep(0.1)
+        await asyncio.gather(*held, *tests)
+        return [test.result() for test in tests], order
+
+    assert run(scene()) == (["kiwi-1", "kiwi-1", "kiwi-1"], ["a", "c", "d", "e", "b"])
+
+
+def test_who_takes_a_rig_no_longer_waits_and_keeps_it_from_those_who_come_later(folder: Path) -> None:
+    """A health check takes its time before the leases are all there."""
+    said: list[str] = []
+
+    @contextlib.asynccontextmanager
+    async def slowly(job: Job) -> AsyncIterator[Backend]:
+        await asyncio.sleep(10.0)
+        async with backend(job) as made:
+            yield made
+
+    async def first() -> str:
+        async with opened(pool("a"), lambda _: None, slowly) as (chosen, _):
+            return chosen.plan.rig
+
+    async def scene() -> tuple[str, ...]:
+        tests = [asyncio.ensure_future(first())]
+        await asyncio.sleep(0.1)
+        tests.append(asyncio.ensure_future(drive("b", 30.0)))
+        await asyncio.sleep(0.1)
+        tests.append(asyncio.ensure_future(drive("c", 1.0, said)))
+        return tuple(await asyncio.gather(*tests))
+
+    assert run(scene()) == ("kiwi-1", "kiwi-2", "kiwi-1")
+    assert "before this one" not in "".join(said)
+
+
+def test_who_has_chosen_a_rig_and_waits_for_the_machine_waits_for_nobody_who_waits_for_that_rig() -> None:
+    """The second holds the machine as others do, and needs the rig that the first has chosen but not taken yet."""
+
+    @contextlib.asynccontextmanager
+    async def alone(job: Job) -> AsyncIterator[Backend]:
+        await asyncio.sleep(1.0)
+        lease = await leases.lease_any(["machine"], {"test": "a"}, lambda _: None)
+        async with backend(job) as made:
+            yield made
+        lease.release()
+
+    async def first() -> str:
+        async with opened(pool("a"), lambda _: None, alone) as (chosen, _):
+            return chosen.plan.rig
+
+    async def second() -> None:
+        lease = await leases.lease_any(["machine"], {"test": "b"}, lambda _: None, shared=True)
+        assert await drive("b", 5.0, one=on("kiwi-1")) == "kiwi-1"
+        lease.release()
+
+    async def scene() -> float:
+        test = asyncio.ensure_future(first())
+        await asyncio.sleep(0.1)
+        await second()
+        assert await test == "kiwi-1"
+        return asyncio.get_running_loop().time()
+
+    assert run(scene()) < 10.0
+
+
+def test_a_rig_that_another_user_has_is_not_free() -> None:
+    """Their leases may be in another folder; the network is the same."""
+    claim = host_isolation._claimed("cid-121")
+    assert claim is not None
+    with claim:
+        assert run(drive("a", 0.0)) == "kiwi-2"
+    assert run(drive("a", 0.0)) == "kiwi-1"
+
+
+def test_rigs_that_are_not_here_or_in_quarantine_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(DEVICES, "kiwi-1", "/dev/serial/by-id/elsewhere")
+    assert run(drive("a", 0.0)) == "kiwi-2"
+    quarantine("kiwi-2", "it lost its home", ["/dev/zero"])
+    with pytest.raises(BackendError) as caught:
+        run(drive("a", 0.0))
+    assert str(caught.value) == (
+        "no rig of the pool can be used here: kiwi-1: there is no '/dev/serial/by-id/elsewhere'; "
+        "kiwi-2: in quarantine: it lost its home"
+    )
+
+
+def test_who_is_interrupted_leaves_the_queue(folder: Path) -> None:
+    async def scene() -> None:
+        held = [asyncio.ensure_future(drive(slug, 30.0)) for slug in "ab"]
+        await asyncio.sleep(0.1)
+        waiter = asyncio.ensure_future(drive("c", 1.0))
+        await asyncio.sleep(0.1)
+        assert len(list(folder.glob("queue.*"))) == 1
+        waiter.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await waiter
+        assert list(folder.glob("queue.*")) == []
+        assert await asyncio.gather(*held) == ["kiwi-1", "kiwi-2"]
+
+    run(scene())
+
+
+def test_waiting_has_a_limit_after_the_queue_last_moved(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(leases, "DEFAULT_PATIENCE_S", 60.0)
+
+    async def scene() -> str:
+        held = [asyncio.ensure_future(drive(slug, 500.0)) for slug in "ab"]
+        await asyncio.sleep(0.1)
+        with pytest.raises(BackendError) as caught:
+            await drive("c", 1.0)
+        await asyncio.gather(*held)
+        return str(caught.value)
+
+    said = run(scene())
+    assert said.startswith("none of the rigs kiwi-1, kiwi-2 came free: no cid came free within 60 s; test a of process")
+
+
+def test_the_outcome_names_the_rig() -> None:
+    class Backends:
+        name = "process"
+
+        @contextlib.asynccontextmanager
+        async def open(self, job: Job, _say: object, _keep: bool) -> AsyncIterator[Backend]:
+            assert job.folder == Path("kiwi-2")
+            yield ScriptedBackend(job.plan, {**drives(), "action": [(0.5, Ready("pose"))]})
+
+    held = leases.try_lease("cid-121", {"test": "theirs"})
+    assert held is not None
+    attempts = Attempts(cast(Any, Backends()), lambda *_: None, 0, False, lambda: False, lambda *_: None)
+    outcome = run(attempts.outcome(pool()))
+    held.release()
+    assert (outcome.outcome, outcome.slug, outcome.notes) == ("passed", "any", ("ran on rig 'kiwi-2'",))

@@ -1,0 +1,62 @@
+"""Pools of rigs: an instance of a test for each rig that will do."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from dodo_dsl.source import Scalar
+from dodo_dsl.spec.deployment.rig import Rig
+from dodo_dsl.spec.instances.matrix import Choice
+from dodo_dsl.spec.instances.pools import members, of_test, on_each
+from dodo_dsl.spec.model import Spec, spec_of
+from dodo_dsl.spec.pool import Pool, pool_of
+from dodo_dsl.spec.registry import Location
+from tests.source.nodes import mapping
+
+RIGS = {
+    name: Rig(name, kind, cid, mapping(f"kind: {kind}\n"))
+    for name, kind, cid in (("b", "dynamic", 122), ("desk", "static", 123), ("a", "dynamic", 121))
+}
+
+
+def written(text: str) -> Spec:
+    spec, problems = spec_of(Location(Path("t.dodo.yml"), Path()), mapping(f"name: t\nrig: {text}\n"), Choice(), True)
+    assert problems == [] and spec.is_whole
+    return spec
+
+
+def rigs(text: str) -> list[str]:
+    pool = written(text).pool
+    assert pool is not None
+    return [rig.name for rig in members(pool, RIGS)]
+
+
+def test_all_rigs_of_a_kind_or_those_of_a_list() -> None:
+    assert rigs("{any: dynamic}") == ["b", "a"]
+    assert rigs("{any: [a, none, desk, a]}") == ["a", "desk"]
+    assert rigs("{any: circle}") == rigs("{any: []}") == []
+
+
+def test_an_instance_for_each_rig() -> None:
+    found = on_each(written("{any: dynamic}"), RIGS)
+    assert [(one.rig, one.title, one.slug) for one in found] == [
+        ("b", "t[rig=b]", "t--rig-b"),
+        ("a", "t[rig=a]", "t--rig-a"),
+    ]
+
+
+def test_the_test_of_an_instance_has_no_rig_but_what_else_its_name_says() -> None:
+    spec = written("{any: dynamic}")
+    dimension = [("rig", Scalar(spec.span("rig"), "old", "old"))]
+    (one, _) = on_each(replace(spec, choice=Choice(tuple(dimension))), RIGS)
+    sample = ("sample", Scalar(spec.span("rig"), "2", "2"))
+    sampled = replace(one, choice=Choice((*one.choice.values, sample), (sample,)))
+    assert of_test(sampled).title == "t[rig=old,sample=2,sample=2]"
+    assert of_test(written("a")) == written("a")
+
+
+def test_other_tests_stay_as_they_are() -> None:
+    for text in ("emulated", "a", "{any: circle}", "{some: dynamic}", "{any: 3}", "[a]"):
+        spec = written(text)
+        assert on_each(spec, RIGS) == [spec], text
+    assert (written("a").rig, written("a").pool) == ("a", None)
+    assert pool_of(None) is None and Pool().text == "[]"
