@@ -1,4 +1,4 @@
-"""dodo images: build and push the images of DoDo's services, and say what they are made of."""
+"""dodo images: build, push and pull images, and say what they are made of."""
 
 import argparse
 import tempfile
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import atomic
-from dodo_dsl.cli import selection
+from dodo_dsl.cli import image_pull, selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
@@ -21,6 +21,7 @@ EXAMPLES = """examples:
   dodo images build --platform linux/arm64            for a Raspberry Pi, on another machine with QEMU
   dodo images push --prefix registry.example.org/dodo
   dodo images push --platform linux/amd64,linux/arm64 --prefix registry.example.org/dodo
+  dodo images pull --for kiwi-dynamic                 on the rig's computer, before its first test
   dodo images sbom --output build/sbom                a bill of materials of each image, and of this Python
 """
 _INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"
@@ -35,6 +36,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     build.add_argument("--source", metavar="URL", default="", help="URL of the sources, for the images' labels")
     _action(actions, "push", "push images to their registry; log in with 'docker login' first")
+    text = "pull the images that the tests of a rig need, if there is room for them"
+    image_pull.add(actions.add_parser("pull", help=text, description=text))
     sbom = _action(actions, "sbom", "write what built images, and the Python that runs DoDo, are made of (CycloneDX)")
     sbom.add_argument("--no-images", action="store_true", help="only the Python that runs DoDo; needs no Docker engine")
     sbom.add_argument("-o", "--output", metavar="DIR", default="build/sbom", help="folder (default: build/sbom)")
@@ -68,6 +71,8 @@ def _platforms(text: str) -> list[str]:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if options.action == "pull":
+        return image_pull.pull(options, stdout)
     images = _chosen(options, selection.checked_deployment())
     if options.action == "sbom" and options.no_images:
         images = []

@@ -42,6 +42,13 @@ def write(compiled: Compiled, pipeline: File, out: Path) -> None:
         shutil.rmtree(folder)
 
 
+def add_images(compiled: Compiled, images: Sequence[str], out: Path) -> None:
+    """Adds lines ``DODO_IMAGE_<SERVICE>=<image>`` to the ``.env`` of each test that was written below ``out``."""
+    for plan in compiled.suite.plans:
+        path = out / plan.slug / ".env"
+        atomic.write_text(path, "".join([path.read_text(encoding="utf-8"), *(f"{image}\n" for image in images)]))
+
+
 def _refuse_links(folder: Path) -> None:
     for path in (folder, *folder.rglob("*")):
         if path.is_symlink():

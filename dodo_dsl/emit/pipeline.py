@@ -1,14 +1,18 @@
-"""The child pipeline: one job per instance, and GitLab's limits for it."""
+"""The child pipeline: one job per instance or per batch, and GitLab's limits for it."""
 
 import math
 import shlex
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
+from dodo_dsl.emit.batches import packed
+from dodo_dsl.emit.job_options import NO_OPTIONS, JobOptions
+from dodo_dsl.emit.pipeline_job import SPARE_MINUTES, PipelineJob
 from dodo_dsl.plan.model import Plan, Suite
-from dodo_dsl.spec.deployment.rig import EMULATED
+from dodo_dsl.plan.pools import by_test, named, pooled
+from dodo_dsl.spec.deployment.rig import EMULATED_RIGS
 from dodo_dsl.spec.model import LEVELS
 
 CHILD = "child.gitlab-ci.yml"
@@ -19,22 +23,7 @@ MAX_BYTES = 5 << 20
 MAX_JOBS_FREE = 500
 MAX_JOBS_PARSED = 850
 
-_SPARE_MINUTES = 10
 _SEARCH_OPTIONS = '--study "$CI_PIPELINE_ID" --report dodo-search $DODO_SEARCH_OPTIONS'
-
-
-@dataclass(frozen=True)
-class PipelineJob:
-    """A job of the child pipeline; ``rig`` is the resource that it locks, or empty."""
-
-    name: str
-    stage: str
-    tag: str
-    gated: bool
-    rig: str
-    minutes: int
-    interruptible: bool
-    script: str
 
 
 @dataclass(frozen=True)
@@ -59,16 +48,22 @@ class SearchJobs:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The stages in order, whether a gate precedes hil, whether images are pulled, and the jobs."""
+    """The stages in order, whether a gate precedes hil, the variables, the jobs, and what those without a test have."""
 
     stages: tuple[str, ...]
     gate: bool
-    images: bool
+    variables: dict[str, str]
     jobs: tuple[PipelineJob, ...]
     searches: tuple[SearchJobs, ...] = ()
+    options: JobOptions = NO_OPTIONS
 
 
-def pipeline(suite: Suite, folder: str, searches: Sequence[SearchJobs] = ()) -> Pipeline:
+def pipeline(
+    suite: Suite,
+    folder: str,
+    searches: Sequence[SearchJobs] = (),
+    options: JobOptions = NO_OPTIONS,
+) -> Pipeline:
     """The jobs of a suite; ``folder`` is the output folder's name, as the parent's artifact has it."""
     levels = {plan.level for plan in suite.plans}
     gate = _gated(suite)
@@ -77,8 +72,18 @@ def pipeline(suite: Suite, folder: str, searches: Sequence[SearchJobs] = ()) -> 
         stages.insert(stages.index("hil"), "gate")
     if searches:
         stages.append("search")
-    jobs = tuple(_job(plan, gate, folder) for plan in suite.plans)
-    return Pipeline(tuple(stages), gate, any(_needs_images(plan) for plan in suite.plans), jobs, tuple(searches))
+    jobs = tuple(_job(plans, gate, folder, options) for plans in pooled(suite.plans))
+    if options.most_jobs:
+        timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
+        jobs = packed(jobs, options.most_jobs, {**timeouts, **options.seconds(by_test(suite.plans))})
+    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options)
+
+
+def _variables(suite: Suite, options: JobOptions) -> dict[str, str]:
+    """Those that a parent has not set for its child."""
+    pulls = options.images or any(_needs_images(plan) for plan in suite.plans)
+    wanted = {"DODO_REGISTRY": "$CI_REGISTRY" if pulls else "", "DODO_RUN_OPTIONS": options.run_options}
+    return {name: value for name, value in wanted.items() if value}
 
 
 def _gated(suite: Suite) -> bool:
@@ -90,22 +95,30 @@ def _needs_images(plan: Plan) -> bool:
     return any(service.process is None for service in plan.application.services)
 
 
-def _job(plan: Plan, gate: bool, folder: str) -> PipelineJob:
-    rig = plan.rig
-    real = plan.level == "hil" and rig != EMULATED
+def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) -> PipelineJob:
+    """The job of a test, of whose Plans there are several where any rig of a pool will do."""
+    plan, rig = plans[0], plans[0].rig
+    shared = [tag for tag in plan.more_tags if all(tag in other.more_tags for other in plans)]
+    real = plan.level == "hil" and rig not in EMULATED_RIGS
     return PipelineJob(
-        name=plan.slug,
+        name=named(plan).slug,
         stage=plan.level,
-        tag=plan.tag,
+        tags=(plan.tag, *shared) if real else options.tags,
         gated=gate and plan.level == "hil",
-        rig=rig if real else "",
-        minutes=math.ceil((plan.timeout_s + sum(s.setup_s for s in plan.services)) / 60) + _SPARE_MINUTES,
+        rig=rig if real and not plan.pool else "",
+        pool=tuple(one.rig for one in plans) if plan.pool else (),
+        minutes=max(math.ceil((p.timeout_s + sum(s.setup_s for s in p.services)) / 60) for p in plans) + SPARE_MINUTES,
         interruptible=not real,
-        script=f"dodo run --compiled {shlex.quote(f'{folder}/{plan.slug}')} --report dodo-report $DODO_RUN_OPTIONS",
+        tests=(named(plan).slug,),
+        folders=tuple(f"{folder}/{one.slug}" for one in plans),
+        image="" if real else options.image,
+        backend=options.backend,
     )
 
 
-def pipeline_problems(suite: Suite, text: str, searches: Sequence[SearchJobs] = ()) -> list[Diagnostic]:
+def pipeline_problems(
+    suite: Suite, text: str, searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
+) -> list[Diagnostic]:
     """What GitLab would refuse in the child pipeline ``text`` of a suite, at the test with the largest share.
 
     A job's name has at most 255 characters. The archive of an artifact that holds the YAML of a child pipeline has at
@@ -118,20 +131,22 @@ def pipeline_problems(suite: Suite, text: str, searches: Sequence[SearchJobs] = 
     Sources: https://docs.gitlab.com/administration/cicd/limits/ and
     https://docs.gitlab.com/user/gitlab_com/#cicd
     """
-    return [*_names(suite), *_whole(suite, text, sum(search.workers + 1 for search in searches))]
+    made = pipeline(suite, "", searches, options)
+    number = len(made.jobs) + made.gate + sum(search.workers + 1 for search in searches)
+    return [*_names(suite, {job.name for job in made.jobs}), *_whole(suite, text, number)]
 
 
-def _names(suite: Suite) -> Iterator[Diagnostic]:
+def _names(suite: Suite, jobs: Collection[str]) -> Iterator[Diagnostic]:
     for plan in suite.plans:
-        if len(plan.slug) > MAX_NAME:
+        if len(plan.slug) > MAX_NAME and plan.slug in jobs:
             message = f"the job '{plan.slug[:40]}...' has a name of {len(plan.slug)} characters, more than {MAX_NAME}"
             yield Diagnostic(_place(plan), RULE, message, "shorten the test's name, or the keys and values of 'matrix'")
 
 
-def _whole(suite: Suite, text: str, more: int) -> Iterator[Diagnostic]:
-    """Problems of all jobs together; ``more`` are those that run no single test."""
-    jobs, size = len(suite.plans) + _gated(suite) + more, len(text.encode())
-    hint = "compile fewer tests into one pipeline, or a smaller 'matrix'"
+def _whole(suite: Suite, text: str, jobs: int) -> Iterator[Diagnostic]:
+    """Problems of all ``jobs`` together."""
+    size = len(text.encode())
+    hint = "pack them into fewer with --jobs, compile fewer tests into one pipeline, or a smaller 'matrix'"
     if size > MAX_BYTES:
         message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab accepts 5 MB"
         yield _largest(suite, message, hint, "error")

@@ -13,6 +13,7 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.emit.containers import containers
+from dodo_dsl.emit.job_options import NO_OPTIONS, JobOptions
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
 from dodo_dsl.plan.plan_json import to_json
@@ -122,9 +123,14 @@ def render_plan(plan: Plan) -> list[File]:
     return files
 
 
-def render_pipeline(suite: Suite, folder: str, searches: Sequence[SearchJobs] = ()) -> File:
+def render_pipeline(
+    suite: Suite,
+    folder: str,
+    searches: Sequence[SearchJobs] = (),
+    options: JobOptions = NO_OPTIONS,
+) -> File:
     """The child pipeline; ``folder`` is the output folder's name, as the parent's artifact has it."""
-    child = pipeline(suite, folder, searches)
+    child = pipeline(suite, folder, searches, options)
     parts = {field.name: getattr(child, field.name) for field in fields(child)}
     return File(CHILD, _render("child.gitlab-ci.yml.j2", **parts))
 

@@ -14,7 +14,7 @@ LOCK = "locks/base.txt"
 """Versions of all packages, with the hashes of their wheels."""
 REQUIREMENTS = "services/requirements"
 _DOCKERFILE = "services/Dockerfile"
-_FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf")
+_FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf", "gantry-circle.elf")
 """The emulated rig, if ``make firmware`` has built it: part of the gantry's image."""
 
 

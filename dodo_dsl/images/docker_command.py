@@ -18,9 +18,10 @@ def _docker() -> str:
     return path
 
 
-def ask(*words: str) -> str:
+def ask(*words: str, folder: Path | None = None) -> str:
     """The standard output of a docker command; raises DockerError with the last line of its standard error."""
-    result = subprocess.run((_docker(), *words), capture_output=True, text=True, errors="replace", check=False)
+    command = (_docker(), *words)
+    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
     if result.returncode:
         said = [line.strip() for line in result.stderr.splitlines() if line.strip()]
         raise DockerError(said[-1] if said else f"docker {words[0]} ended with {result.returncode}")

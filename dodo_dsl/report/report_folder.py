@@ -15,12 +15,13 @@ from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING, SNAPSHOT
-from dodo_dsl.report import check_history, html, junit, links, metrics, results
+from dodo_dsl.report import junit, links, metrics, results
 from dodo_dsl.report.changes import markdown
 from dodo_dsl.report.changes.comparison import Comparison
 from dodo_dsl.report.pictures.duration_plot import Times
 from dodo_dsl.report.pictures.duration_plot import draw as draw_times
 from dodo_dsl.report.pictures.trajectory import read_drive
+from dodo_dsl.report.suite import check_history, html
 from dodo_dsl.report.viewer import names as viewer
 from dodo_dsl.spec.instances.matrix import SLUG
 from dodo_dsl.spec.registry import SUFFIX

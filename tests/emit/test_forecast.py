@@ -1,19 +1,22 @@
 """How long a pipeline takes with so many runners."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.emit.forecast import forecast
-from dodo_dsl.emit.pipeline import Pipeline, PipelineJob
+from dodo_dsl.emit.pipeline import Pipeline
+from dodo_dsl.emit.pipeline_job import PipelineJob
 
 
 def job(name: str, level: str = "sil", rig: str = "", gated: bool = False) -> PipelineJob:
-    return PipelineJob(name, level, rig or "sil", gated, rig, 12, not rig, "true")
+    return PipelineJob(name, level, (rig or "sil",), gated, rig, 12, not rig, (name,))
 
 
 def of(*jobs: PipelineJob) -> Pipeline:
-    return Pipeline(("sil", "hil"), any(j.gated for j in jobs), False, jobs)
+    return Pipeline(("sil", "hil"), any(j.gated for j in jobs), {}, jobs)
 
 
 @given(took=st.lists(st.floats(0, 600), min_size=1, max_size=30), runners=st.integers(1, 8), overhead=st.floats(0, 30))
@@ -33,6 +36,13 @@ def test_each_job_gets_the_first_runner_that_is_free() -> None:
     took = {"a": 10.0, "b": 2.0, "c": 5.0, "d": 4.0}
     found = forecast(of(*map(job, took)), took.__getitem__, 2, 1.0)
     assert (found.seconds, found.last) == (14.0, "d")  # a until 11, b until 3, c until 9, d until 14
+
+
+def test_a_pool_takes_the_rig_that_is_free_first() -> None:
+    took = {"on one": 10.0, "any": 4.0, "any again": 4.0}
+    jobs = [job("on one", rig="one"), *(replace(job(name), pool=("one", "two")) for name in ("any", "any again"))]
+    assert forecast(of(*jobs), took.__getitem__, 1, 1.0).seconds == 11.0, "both on the other, one after the other"
+    assert forecast(of(*jobs[:2]), took.__getitem__, 1, 1.0).last == "on one"
 
 
 def test_rigs_wait_for_the_gate_and_for_themselves() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl import package_data
+from tests.gitlab.inputs import TEMPLATES
 from tests.gitlab.test_local import PROGRAMS, commit, pipeline, run
 
 pytestmark = pytest.mark.slow
@@ -40,6 +40,24 @@ stages: [test, tools]
 tools: {stage: tools, script: [make], rules: [{changes: [tools/**/*]}]}
 variables: {DODO_COMPOSE_FILE: robots/kiwi/docker-compose.yml}
 """
+COMPONENTS = """\
+  - component: $CI_SERVER_FQDN/$CI_PROJECT_PATH/deployment@$CI_COMMIT_SHA
+    inputs: &inputs {stage: verify, tags: [], image: "dodo-runner:1.0", run-options: --isolation host}
+  - component: $CI_SERVER_FQDN/$CI_PROJECT_PATH/application@$CI_COMMIT_SHA
+    inputs: *inputs
+"""
+INPUTS = """\
+  - local: .gitlab/dodo/application.gitlab-ci.yml
+    inputs: {stage: verify}
+"""
+NO_IMAGES = """\
+  - local: .gitlab/dodo/application.gitlab-ci.yml
+    inputs: {images: false}
+"""
+OWN_STAGE = """\
+stages: [build, verify]
+make: {stage: build, script: [make]}
+"""
 LINT = "lint: {script: [make lint]}\n"
 AROUND = {"make": "build", "upload": "release"}
 CASES: dict[str, tuple[str, str, Jobs, Jobs, str]] = {
@@ -53,6 +71,9 @@ CASES: dict[str, tuple[str, str, Jobs, Jobs, str]] = {
         "test",
     ),
     "a stage of its own": (DEPLOYMENT + APPLICATION, NO_TEST, {"make": "build"}, {**COMMON, **IMAGES}, "verify"),
+    "a stage by an input": (INPUTS, OWN_STAGE, {"make": "build"}, {**COMMON, **IMAGES}, "verify"),
+    "components with inputs": (COMPONENTS, OWN_STAGE, {"make": "build"}, {**COMMON, **IMAGES}, "verify"),
+    "processes alone": (NO_IMAGES, LINT, {"lint": "test"}, {**COMMON, "compile": ""}, "test"),
     "a monorepo": (APPLICATION, MONOREPO, {}, {**COMMON, **IMAGES}, "test"),
 }
 
@@ -61,7 +82,10 @@ CASES: dict[str, tuple[str, str, Jobs, Jobs, str]] = {
 def repository(tmp_path: Path) -> Path:
     if not (PROGRAMS / "gitlab-ci-local").exists() or not shutil.which("rsync"):
         pytest.skip("gitlab-ci-local or rsync is not installed; scripts/install-gitlab-ci-local installs them")
-    shutil.copytree(package_data.templates() / "gitlab", tmp_path / ".gitlab/dodo")
+    (tmp_path / ".gitlab/dodo").mkdir(parents=True)
+    for template in TEMPLATES:
+        shutil.copyfile(template, tmp_path / ".gitlab/dodo" / f"{template.parent.name}.gitlab-ci.yml")
+        shutil.copytree(template.parent, tmp_path / "templates" / template.parent.name)
     for words in (["init", "-q", "-b", "main"], ["remote", "add", "origin", "git@gitlab.example.org:team/car.git"]):
         run(tmp_path, "git", *words)
     return tmp_path
@@ -83,7 +107,7 @@ def test_the_jobs_are_there_and_foreign_ones_stay(case: str, repository: Path) -
     (repository / ".gitlab-ci.yml").write_text(f"include:\n{includes}{text}")
     found = jobs(repository)
     assert {name: job["stage"] for name, job in found.items()} == {**foreign, **dict.fromkeys(expected, stage)}
-    needs = {name: ",".join(need["job"] for need in found[name]["needs"]) for name in expected}
+    needs = {name: ",".join(need["job"] for need in found[name]["needs"] if need["job"] in found) for name in expected}
     assert needs == expected
 
 

@@ -9,9 +9,10 @@ import pytest
 import yaml
 
 from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.emit.job_options import JobOptions
 from dodo_dsl.emit.pipeline import SearchJobs, pipeline_problems
 from dodo_dsl.emit.render import render_pipeline
-from dodo_dsl.plan.model import Place, Plan, Suite
+from dodo_dsl.plan.model import Place, Plan, Pooled, Suite
 
 OnRig = Callable[[str, str], Plan]
 
@@ -92,6 +93,38 @@ def test_a_rig_is_for_one_test_at_a_time_and_never_cancelled(on_rig: OnRig) -> N
     assert made["model"]["tags"] == ["sil"]
 
 
+def test_more_tags_of_a_rig_tell_its_runner_from_others(on_rig: OnRig) -> None:
+    made = child(replace(on_rig("real", "kiwi"), more_tags=("rig-2",)))
+    assert made["real"]["tags"] == ["hil-dynamic", "rig-2"]
+
+
+def test_any_rig_of_a_pool_is_one_job_that_locks_none_of_them(
+    on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]
+) -> None:
+    pool = Pooled("hil", "hil")
+    first, second = (
+        replace(on_rig(f"hil--rig-{rig}", rig), name=f"hil[rig={rig}]", pool=pool, more_tags=(rig, "cellar"))
+        for rig in ("kiwi-1", "kiwi-2")
+    )
+    suite = Suite((first, second, replace(first, slug="hil-2--rig-kiwi-1", pool=Pooled("hil-2", "hil-2"))))
+    text = render_pipeline(suite, "out").text
+    (tmp_path / "child.yml").write_text(text)
+    accepted(tmp_path / "child.yml")
+    made = yaml.safe_load(text)
+    assert [name for name in made if "script" in made[name]] == ["hil", "hil-2"]
+    assert (made["hil"]["tags"], made["hil"]["interruptible"]) == (["hil-dynamic", "cellar"], False)
+    assert "resource_group" not in made["hil"]
+    words = "--compiled out/hil--rig-kiwi-1 --compiled out/hil--rig-kiwi-2"
+    assert made["hil"]["script"] == [f"dodo run {words} --report dodo-report $DODO_RUN_OPTIONS"]
+    assert made["hil-2"]["tags"] == ["hil-dynamic", "kiwi-1", "cellar"]
+    packed = yaml.safe_load(render_pipeline(suite, "out", (), JobOptions(most_jobs=1)).text)
+    assert [name for name in packed if "script" in packed[name]] == ["hil", "hil-2"], "pools of other rigs do not mix"
+    again = replace(second, slug="hil-3--rig-kiwi-2", pool=Pooled("hil-3", "hil-3"))
+    both = Suite((first, second, replace(first, slug="hil-3--rig-kiwi-1", pool=again.pool), again))
+    packed = yaml.safe_load(render_pipeline(both, "out", (), JobOptions(most_jobs=1)).text)
+    assert packed["rig kiwi-1 or kiwi-2"]["script"][0].endswith(" --jobs 1")
+
+
 def test_only_failures_of_runners_are_tried_again(plan: Plan) -> None:
     assert child(plan)["default"]["retry"]["when"] == ["runner_system_failure", "stuck_or_timeout_failure"]
 
@@ -103,6 +136,67 @@ def test_tests_of_images_log_in_to_the_registry(plan: Plan) -> None:
     assert made["variables"] == {"DODO_REGISTRY": "$CI_REGISTRY"}
     assert "variables" not in child(plan)
     assert "--password-stdin" in made["default"]["before_script"][0]
+
+
+def test_all_jobs_but_those_on_rigs_run_as_the_parent_wants(
+    plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]
+) -> None:
+    suite, searches = (
+        Suite((plan, on_rig("hil-model", "emulated"), on_rig("hil-real", "kiwi"))),
+        [SearchJobs("a", "a", 2)],
+    )
+    options = JobOptions((), 'dodo: "1"', "--isolation host")
+    text = render_pipeline(suite, "generated", searches, options).text
+    (tmp_path / "child.yml").write_text(text)
+    accepted(tmp_path / "child.yml")
+    made = yaml.safe_load(text)
+    assert made["variables"] == {"DODO_RUN_OPTIONS": "--isolation host"}
+    assert (made["hil-real"]["tags"], "image" in made["hil-real"]) == (["hil-dynamic"], False)
+    for name in (plan.slug, "hil-model", "gate", "search a", "search a report"):
+        assert (made[name]["image"], "tags" in made[name]) == ('dodo: "1"', False), name
+    tagged = yaml.safe_load(render_pipeline(suite, "generated", searches, JobOptions(("big", "a, b"))).text)
+    assert tagged["gate"]["tags"] == tagged["hil-model"]["tags"] == ["big", "a, b"]
+    assert "image" not in tagged["gate"] and "variables" not in tagged
+
+
+def test_images_that_were_built_are_what_is_tested(plan: Plan) -> None:
+    """A variable DODO_RUN_OPTIONS of a project replaces the options of the parent, and not this one."""
+
+    def child(*given: Any) -> Any:
+        return yaml.safe_load(render_pipeline(Suite((plan,)), "out", (), JobOptions(("sil",), "", *given)).text)
+
+    assert "variables" not in child() and "--backend" not in child()[plan.slug]["script"][0]
+    made = child("-v", ("DODO_IMAGE_STEERING=steering:1",))
+    assert made["variables"] == {"DODO_REGISTRY": "$CI_REGISTRY", "DODO_RUN_OPTIONS": "-v"}
+    expected = f"dodo run --compiled out/{plan.slug} --backend docker --report dodo-report $DODO_RUN_OPTIONS"
+    assert made[plan.slug]["script"] == [expected], "further options win"
+
+
+def test_packed_tests_share_jobs(plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]) -> None:
+    plans = [replace(plan, slug=f"sil-{n}") for n in range(5)] + [replace(plan, slug="dil-0", level="dil")]
+    rigs = [on_rig("hil-a", "kiwi"), on_rig("hil-b", "kiwi"), on_rig("hil-c", "other"), on_rig("hil-d", "emulated")]
+    suite, options = Suite((*plans, *rigs)), JobOptions(most_jobs=2)
+    text = render_pipeline(suite, "generated", (), options).text
+    (tmp_path / "child.yml").write_text(text)
+    accepted(tmp_path / "child.yml")
+    made = yaml.safe_load(text)
+    assert [name for name in made if "script" in made[name]] == [
+        "gate", "tests 1/2", "tests 2/2", "rig kiwi", "hil-c", "hil-d"
+    ]  # fmt: skip
+    assert made["tests 1/2"]["script"] == [
+        "dodo run --compiled generated/sil-0 --compiled generated/sil-2 --compiled generated/sil-4 "
+        "--report dodo-report $DODO_RUN_OPTIONS"
+    ]
+    assert (made["tests 1/2"]["stage"], made["tests 2/2"]["stage"]) == ("sil", "dil")
+    assert made["tests 1/2"]["timeout"] == "13 minutes", "a minute a test, and the same to spare"
+    rig = made["rig kiwi"]
+    assert (rig["resource_group"], rig["tags"], rig["interruptible"]) == ("kiwi", ["hil-dynamic"], False)
+    assert rig["script"] == [
+        "dodo run --compiled generated/hil-a --compiled generated/hil-b --report dodo-report $DODO_RUN_OPTIONS --jobs 1"
+    ]
+    assert rig["needs"][1:] == ["gate"] and made["stages"] == ["sil", "dil", "gate", "hil"]
+    many = Suite(tuple(replace(plan, slug=f"sil-{'x' * 260}-{n}") for n in range(900)))
+    assert pipeline_problems(many, text, (), JobOptions(most_jobs=9)) == []
 
 
 def test_a_folder_is_one_word_to_the_shell(plan: Plan) -> None:

@@ -14,10 +14,15 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.cli.main import main
+from tests.gitlab.inputs import TEMPLATES, Refused, included, is_run, jobs, specified
 
-TEMPLATES = sorted((package_data.templates() / "gitlab").glob("*.yml"))
+APPLICATION, DEPLOYMENT, RUN = TEMPLATES
+TRIGGERS = {"allow_failure", "extends", "inherit", "interruptible", "needs", "rules", "stage", "trigger", "variables"}
+"""Keywords of a job that triggers a pipeline, of those that GitLab allows: no image, tags, script or artifacts."""
+PAGE = Path(__file__).parents[2] / "docs/how-to/gitlab.md"
 DIGEST = "sha256:" + "0123456789abcdef" * 4
 
+NO_BUILD = {"group": {"default": {"targets": None}}, "target": {}}
 BAKE = {
     "group": {"default": {"targets": ["steering", "lane-finder"]}},
     "target": {"lane-finder": {"context": "."}, "steering": {"context": "."}},
@@ -35,9 +40,107 @@ esac
 """
 
 
-@pytest.mark.parametrize("template", TEMPLATES, ids=lambda p: p.name)
-def test_gitlab_accepts_the_template(template: Path, accepted: Callable[..., None]) -> None:
-    accepted(template)
+def named(path: Path) -> str:
+    return path.parent.name
+
+
+each = pytest.mark.parametrize("template", TEMPLATES, ids=named)
+each_parent = pytest.mark.parametrize("template", [APPLICATION, DEPLOYMENT], ids=named)
+
+
+def test_each_template_is_a_component() -> None:
+    """GitLab finds `templates/<name>/template.yml`, and no other file below `templates/` by mistake."""
+    folder = package_data.templates()
+    assert sorted(folder.glob("*/template.yml")) == sorted(TEMPLATES)
+    assert not list(folder.glob("*.yml"))
+
+
+def test_gitlab_accepts_the_templates(tmp_path: Path, accepted: Callable[..., None]) -> None:
+    """As they are, and as their jobs are with inputs, extended."""
+    for template in TEMPLATES:
+        header = next(yaml.safe_load_all(template.read_text()))
+        (tmp_path / f"{named(template)}.header.yml").write_text(yaml.safe_dump(header))
+        for case, given in {
+            "default": {},
+            "given": {"tags": [], "image": "dodo-runner:1.0", "stage": "verify"},
+        }.items():
+            config = included(template, **given)
+            (tmp_path / f"{named(template)}.{case}.yml").write_text(yaml.safe_dump(config))
+            text = yaml.safe_dump(jobs(config))
+            (tmp_path / f"{named(template)}.{case}.jobs.yml").write_text(text)
+    accepted(*tmp_path.iterdir())
+
+
+@each
+def test_inputs_reach_all_jobs(template: Path) -> None:
+    for name, job in jobs(included(template)).items():
+        assert (job["stage"], job["inherit"], "image" in job) == ("test", {"default": False}, False)
+        assert job.get("tags") == (None if "trigger" in job else [] if template == RUN else ["$DODO_TAG"]), name
+    for name, job in jobs(included(template, tags=[], image="registry/dodo:1", stage="verify")).items():
+        found = job["stage"], job.get("tags"), job.get("image")
+        assert found == (("verify", None, None) if "trigger" in job else ("verify", [], "registry/dodo:1")), name
+
+
+@each
+def test_jobs_that_trigger_have_what_gitlab_allows_them(template: Path) -> None:
+    for job in jobs(included(template, image="registry/dodo:1")).values():
+        assert "trigger" not in job or job.keys() <= TRIGGERS
+
+
+def test_a_newer_commit_may_cancel_all_but_the_images_of_the_default_branch() -> None:
+    """One job that has begun and may not be cancelled keeps GitLab from cancelling the others."""
+    for template in TEMPLATES:
+        assert all(job["interruptible"] is True for job in jobs(included(template)).values())
+    rules = [rule for job in jobs(included(APPLICATION)).values() for rule in job["rules"] if "interruptible" in rule]
+    assert rules == [{"if": "$CI_COMMIT_BRANCH == $CI_DEFAULT_BRANCH", "interruptible": False}]
+
+
+@each
+def test_every_input_is_described_used_and_optional(template: Path) -> None:
+    _, text = template.read_text().split("\n---\n")
+    for name, spec in specified(template).items():
+        assert spec["description"] and "default" in spec
+        assert f"$[[ inputs.{name} ]]" in text
+        assert name == "compose-file" or "regex" in spec or spec["type"] in ("array", "boolean"), "narrow"
+
+
+@each
+def test_no_input_becomes_text_of_a_shell(template: Path) -> None:
+    """They are variables there: a shell takes those as words, whatever they hold."""
+    for job in yaml.safe_load(template.read_text().split("\n---\n")[1]).values():
+        assert "$[[" not in str([job.get(key) for key in ("before_script", "script", "after_script")])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("compile_options", "--check; rm -rf ."),
+        ("run_options", "$(touch x)"),
+        ("run_options", "`touch x`"),
+        ("image", "dodo runner"),
+        ("platforms", "linux/amd64 --push"),
+        ("platforms", "linux/amd64,"),
+        ("deployment", "group/car\n    branch: x"),
+        ("tags", "sil"),
+        ("stage", ""),
+    ],
+)
+def test_inputs_that_cannot_be_meant_are_refused(name: str, value: str) -> None:
+    with pytest.raises(Refused):
+        included(APPLICATION, **{name: value})
+
+
+def test_inputs_that_can_be_meant_are_taken() -> None:
+    config = included(
+        APPLICATION,
+        compile_options="--search 'sil-*' --workers 4",
+        platforms="linux/amd64,linux/arm/v7",
+        image="$CI_REGISTRY_IMAGE/dodo@sha256:12",
+        deployment="$CI_PROJECT_NAMESPACE/deployment",
+        tags=["sil", "large machine"],
+    )
+    assert config["variables"]["DODO_TEST_TAGS"] == ' ["sil", "large machine"]'
+    assert config["variables"]["DODO_PLATFORMS"] == "linux/amd64,linux/arm/v7"
 
 
 def test_gitlab_accepts_what_dodo_new_writes(
@@ -46,47 +149,97 @@ def test_gitlab_accepts_what_dodo_new_writes(
     monkeypatch.chdir(tmp_path)
     for words in (["new", "--deployment"], ["new", "first"], ["compile"]):
         assert main(words, StringIO(), StringIO()) == 0
-    pipelines = (".gitlab-ci.yml", ".gitlab/dodo/deployment.gitlab-ci.yml", "generated/child.gitlab-ci.yml")
-    accepted(*(tmp_path / name for name in pipelines))
+    accepted(tmp_path / ".gitlab-ci.yml", tmp_path / "generated/child.gitlab-ci.yml")
     included = yaml.safe_load((tmp_path / ".gitlab-ci.yml").read_text())["include"]
     assert all((tmp_path / entry["local"]).is_file() for entry in included)
 
 
-@pytest.mark.parametrize("template", TEMPLATES, ids=lambda p: p.name)
+@each_parent
 def test_the_child_is_triggered_as_its_jobs_need_it(template: Path) -> None:
     """The child's jobs take their files from ``compile``; its YAML comes from an artifact that holds nothing else."""
-    jobs = yaml.safe_load(template.read_text())
-    (trigger,) = [job for job in jobs.values() if "PARENT_PIPELINE_ID" in str(job) and "trigger" in job]
+    found = included(template)
+    (trigger,) = [job for job in found.values() if "PARENT_PIPELINE_ID" in str(job) and "trigger" in job]
     assert trigger["variables"] == {"PARENT_PIPELINE_ID": "$CI_PIPELINE_ID"}
     assert trigger["trigger"]["strategy"] == "depend"
     (include,) = trigger["trigger"]["include"]
-    assert jobs[include["job"]]["artifacts"]["paths"] == [include["artifact"]]
-    assert jobs["compile"]["artifacts"]["paths"] == ["generated/"]
+    assert found[include["job"]]["artifacts"]["paths"] == [include["artifact"]]
+    assert found["compile"]["artifacts"]["paths"] == ["generated/"]
 
 
 def test_jobs_of_both_templates_are_the_same() -> None:
     """A pipeline that includes both has each of them once, whatever the order: GitLab merges jobs of one name."""
-    first, second = (yaml.safe_load(template.read_text()) for template in TEMPLATES)
-    shared = first.keys() & second.keys() - {"variables"}
-    assert shared == {".dodo", ".dodo-rules", "dodo-check", "compile", "dodo-pipeline", "dodo-tests", "dodo-report"}
-    assert {name: first[name] for name in shared} == {name: second[name] for name in shared}
-    variables = (template["variables"] for template in (first, second))
-    assert all(
-        a == b for a, b in zip(*(map(v.get, ("DODO_TAG", "DODO_COMPILE_OPTIONS")) for v in variables), strict=True)
-    )
+    first, second = (yaml.safe_load(template.read_text().split("\n---\n")[1]) for template in (APPLICATION, DEPLOYMENT))
+    common = {"dodo-check", "compile", "dodo-pipeline", "dodo-tests", "dodo-report"}
+    shared = {name for name in first.keys() & second.keys() if not name.startswith(".")} - {"variables"}
+    assert shared == common
+    assert {name for name in first if name.startswith(".")} == {name for name in second if name.startswith(".")}
+    assert all(first[name] == second[name] for name in first.keys() & second.keys() - {"variables"})
+    both = first["variables"].keys() & second["variables"].keys()
+    assert all(first["variables"][name] == second["variables"][name] for name in both)
+    inputs = specified(APPLICATION), specified(DEPLOYMENT)
+    assert inputs[1].keys() < inputs[0].keys()
+    assert all(inputs[0][name] == spec for name, spec in inputs[1].items())
 
 
-@pytest.mark.parametrize("template", TEMPLATES, ids=lambda p: p.name)
+BRANCH = {"CI_PIPELINE_SOURCE": "push", "CI_COMMIT_BRANCH": "curve", "CI_DEFAULT_BRANCH": "main"}
+DEFAULT = {**BRANCH, "CI_COMMIT_BRANCH": "main"}
+REVIEWED = {**BRANCH, "CI_OPEN_MERGE_REQUESTS": "team/car!7"}
+MERGE_REQUEST = {"CI_PIPELINE_SOURCE": "merge_request_event", "CI_DEFAULT_BRANCH": "main"}
+CHILD = {"dodo-check", "compile", "dodo-pipeline", "dodo-tests", "dodo-report"}
+
+
+@pytest.mark.parametrize(
+    ("situation", "of_application", "of_deployment"),
+    [
+        (MERGE_REQUEST, {"dodo-images", *CHILD}, CHILD),
+        (DEFAULT, {"dodo-images", "dodo-check"}, CHILD),
+        ({**DEFAULT, "CI_OPEN_MERGE_REQUESTS": "team/car!8"}, {"dodo-images", "dodo-check"}, {"dodo-check"}),
+        (BRANCH, set(), CHILD),
+        (REVIEWED, set(), set()),
+        ({"CI_PIPELINE_SOURCE": "push", "CI_COMMIT_TAG": "1.0", "CI_DEFAULT_BRANCH": "main"}, set(), set()),
+    ],
+    ids=["merge request", "default branch", "default branch to be merged", "branch", "branch with a request", "tag"],
+)
+def test_each_situation_has_its_jobs(
+    situation: dict[str, str], of_application: set[str], of_deployment: set[str]
+) -> None:
+    """Code quality of the default branch is what GitLab compares merge requests with, so that it is always there."""
+    for template, expected in ((APPLICATION, of_application), (DEPLOYMENT, of_deployment)):
+        config = included(template)
+        variables = {**config["variables"], **situation}
+        assert {name for name, job in jobs(config).items() if is_run(job, variables)} == expected
+    without = jobs(included(APPLICATION, images=False))
+    found = {name for name, job in without.items() if is_run(job, {**situation, "DODO_DEPLOYMENT": "a/b"})}
+    assert found == of_application - {"dodo-images"}
+
+
+@pytest.mark.parametrize(
+    ("situation", "there"), [(MERGE_REQUEST, True), (DEFAULT, True), (BRANCH, True), (REVIEWED, False)]
+)
+def test_one_job_runs_the_tests_once_a_commit(situation: dict[str, str], there: bool) -> None:
+    config = included(RUN)
+    assert config.keys() == {"dodo-run", ".dodo-run-image-"}, "it meets nothing of the other templates"
+    assert is_run(config["dodo-run"], situation) is there
+
+
+def test_a_deployment_is_triggered_where_one_is_named() -> None:
+    config = included(APPLICATION, deployment="group/deployment")
+    job = jobs(config)["dodo-deployment"]
+    assert is_run(job, {**config["variables"], **DEFAULT})
+    assert not is_run(job, {**config["variables"], **MERGE_REQUEST})
+
+
+@each
 def test_a_template_is_a_guest_in_the_repository_s_pipeline(template: Path) -> None:
     """No workflow, stages or defaults, which would change other jobs; and no job but ``compile`` of a common name."""
-    found = yaml.safe_load(template.read_text())
+    found = included(template)
     assert not found.keys() & {"workflow", "stages", "default", "image", "before_script", "after_script", "cache"}
-    names = found.keys() - {"variables", "compile"}
+    names = found.keys() - {"variables", *([] if template == RUN else ["compile"])}
     assert all(name.startswith(("dodo-", ".dodo")) for name in names)
-    assert all(name.startswith("DODO_") for name in found["variables"])
+    assert all(name.startswith("DODO_") for name in found.get("variables", {}))
 
 
-@pytest.mark.parametrize("template", TEMPLATES, ids=lambda p: p.name)
+@each
 def test_no_template_names_a_host_or_shows_the_token(template: Path) -> None:
     text = template.read_text()
     assert not re.findall(r"https?://|[a-z0-9-]+\.(?:com|org|io|net)\b", text)
@@ -94,8 +247,9 @@ def test_no_template_names_a_host_or_shows_the_token(template: Path) -> None:
         assert "CI_JOB_TOKEN" not in line or line.strip().startswith("- printf '%s' \"$CI_JOB_TOKEN\" | docker login")
 
 
-def run_images(tmp_path: Path, docker: str) -> "subprocess.CompletedProcess[str]":
-    job = yaml.safe_load((package_data.templates() / "gitlab/application.gitlab-ci.yml").read_text())["dodo-images"]
+def run_images(tmp_path: Path, docker: str, **inputs: Any) -> "subprocess.CompletedProcess[str]":
+    config = included(APPLICATION, **inputs)
+    job = config["dodo-images"]
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin/docker").write_text(docker)
     (tmp_path / "bin/docker").chmod(0o755)
@@ -108,6 +262,7 @@ def run_images(tmp_path: Path, docker: str) -> "subprocess.CompletedProcess[str]
         "CI_REGISTRY_IMAGE": "registry.example.org/team/car",
         "CI_COMMIT_SHA": "c0ffee",
         "DODO_COMPOSE_FILE": "app/docker-compose.yml",
+        "DODO_PLATFORMS": config["variables"]["DODO_PLATFORMS"],
         "DODO_DEPLOYMENT": "team/deployment",
         "DODO_DEPLOYMENT_BRANCH": "main",
     }
@@ -141,17 +296,34 @@ def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Cal
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("*--print*) ", "*--print*) exit 0 ;; *--other*) "), "No service of app/docker-compose.yml has a build"),
+        (("*--print*) ", "*--print*) echo no such file; exit 1 ;; *--other*) "), ""),
         (("containerimage.digest", "image.name"), "The build of lane-finder has said no digest"),
     ],
 )
 def test_a_build_without_images_fails(tmp_path: Path, change: tuple[str, str], said: str) -> None:
     result = run_images(tmp_path, DOCKER.replace(*change))
-    assert (result.returncode, result.stdout.splitlines()[-1]) == (1, said)
+    assert (result.returncode, "".join(result.stdout.splitlines()[-1:])) == (1, said)
+
+
+def test_images_are_built_for_the_platforms_that_are_asked_for(tmp_path: Path) -> None:
+    assert run_images(tmp_path, DOCKER, platforms="linux/amd64,linux/arm64").returncode == 0
+    calls = (tmp_path / "calls.txt").read_text()
+    assert " --push --set lane-finder.platform=linux/amd64,linux/arm64 --metadata-file " in calls
+
+
+def test_an_application_without_a_build_has_no_images(tmp_path: Path, accepted: Callable[..., None]) -> None:
+    """It runs as processes, or its images come from elsewhere; the deployment is triggered all the same."""
+    result = run_images(tmp_path, DOCKER.replace(json.dumps(BAKE, indent=2), json.dumps(NO_BUILD, indent=2)))
+    assert result.returncode == 0, result.stderr
+    assert "No service of app/docker-compose.yml has a build" in result.stdout
+    assert (tmp_path / "dodo-images.env").read_text() == ""
+    downstream = tmp_path / "dodo-deployment.gitlab-ci.yml"
+    assert "variables" not in yaml.safe_load(downstream.read_text())["deployment"]
+    accepted(downstream)
 
 
 def test_the_page_s_variables_are_those_of_the_templates() -> None:
-    page = (Path(__file__).parents[2] / "docs/how-to/gitlab.md").read_text()
+    page = PAGE.read_text()
     templates = "".join(template.read_text() for template in TEMPLATES)
     for variable in set(re.findall(r"DODO_[A-Z_]+[A-Z]", page)) - {
         "DODO_IMAGE",
@@ -159,8 +331,22 @@ def test_the_page_s_variables_are_those_of_the_templates() -> None:
         "DODO_API_TOKEN",
         "DODO_SEARCH_STORAGE",
         "DODO_SEARCH_OPTIONS",
+        "DODO_RUN_OPTIONS",
     }:
         assert f"  {variable}:" in templates, variable
-    (block,) = [b for b in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "include:" in b]
-    (included,) = yaml.safe_load(block)["include"]
-    assert Path(included["local"]).name in {template.name for template in TEMPLATES}
+
+
+def test_the_page_s_inputs_are_those_of_the_templates() -> None:
+    blocks = [yaml.safe_load(b) for b in re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)]
+    includes = [entry for block in blocks for entry in block.get("include", [])]
+    assert len(includes) >= len(TEMPLATES)
+    for entry in includes:
+        name = re.search(r"(\w+)(\.gitlab-ci\.yml|@[\d.]+)$", entry.get("local", entry.get("component")))
+        included(package_data.templates() / name[1] / "template.yml", **entry.get("inputs", {}))  # type: ignore[index]
+    rows = re.findall(
+        r"^\| `([\w-]+)` \| .*? \| (all|pipelines|application|run|application, run) \| ", PAGE.read_text(), re.MULTILINE
+    )
+    columns = {"all": TEMPLATES, "pipelines": [APPLICATION, DEPLOYMENT], "application": [APPLICATION], "run": [RUN]}
+    columns["application, run"] = [APPLICATION, RUN]
+    for template in TEMPLATES:
+        assert {name for name, of in rows if template in columns[of]} == specified(template).keys()

@@ -3,7 +3,9 @@
 import json
 from pathlib import Path
 
-from dodo_dsl import __version__
+import pytest
+
+from dodo_dsl import __version__, package_data
 from dodo_dsl.images import build_context
 from dodo_dsl.images.names import Image
 from tests.images.dockerfile import ROOT
@@ -20,6 +22,24 @@ def test_context_has_the_bus_and_the_services_and_no_more(tmp_path: Path) -> Non
     assert {"services/base/process.py", "services/collision/service.yml", "services/Dockerfile.dockerignore"} <= found
     assert not [name for name in found if "__pycache__" in name or name.startswith(("dodo_dsl/cli", "wheels", "tests"))]
     assert (tmp_path / "services/base/loop.py").stat().st_mtime == (ROOT / "services/base/loop.py").stat().st_mtime
+
+
+def test_the_emulated_rigs_come_along_where_both_builds_of_the_firmware_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root, firmware = tmp_path / "root", tmp_path / "root" / "build" / "firmware"
+    firmware.mkdir(parents=True)
+    for name in ("services", "locks"):
+        (root / name).symlink_to(ROOT / name)
+    monkeypatch.setattr(package_data, "root", lambda: root)
+    for name in ("rig-emulator", "gantry.elf", "gantry-circle.elf"):
+        folder = tmp_path / name
+        folder.mkdir()
+        build_context.assemble(folder, None)
+        assert not (folder / "rig").exists()
+        (firmware / name).touch()
+    build_context.assemble(tmp_path / "root" / "build", None)
+    assert files(tmp_path / "root" / "build" / "rig") == {"rig-emulator", "gantry.elf", "gantry-circle.elf"}
 
 
 def test_wheels_come_along(tmp_path: Path) -> None:

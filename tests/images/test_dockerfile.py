@@ -12,6 +12,7 @@ from dodo_dsl import __version__
 from dodo_dsl.images.names import SANDBOX, SHARED, known
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from tests.images.dockerfile import ROOT, stages
+from tests.images.service_folders import folders_of
 
 MANIFESTS, _ = load_manifests()
 DOCKERFILES = (ROOT / "services" / "Dockerfile", ROOT / "examples" / "kiwi" / "Dockerfile")
@@ -20,9 +21,8 @@ DOCKERFILES = (ROOT / "services" / "Dockerfile", ROOT / "examples" / "kiwi" / "D
 @pytest.mark.parametrize("manifest", MANIFESTS.values(), ids=lambda m: m.name)
 def test_each_service_has_a_stage_that_starts_it(manifest: Manifest) -> None:
     stage = stages()[manifest.image]
-    folder = manifest.folder.name
     assert stage.entrypoint == ["python3", *manifest.process[1:]]
-    assert stage.copies == [(f"/opt/dodo/services/{folder}", f"services/{folder}")]
+    assert stage.copies == [(f"/opt/dodo/services/{name}", f"services/{name}") for name in folders_of(manifest)]
     assert stage.labels == {"org.opencontainers.image.title": manifest.image, "dodo.service": manifest.name}
     assert stage.stands_on in ("base", "geometry", "vision")
 

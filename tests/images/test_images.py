@@ -18,6 +18,7 @@ from dodo_dsl.spec.manifest import Manifest, load_manifests
 from tests.images.conftest import build, docker
 from tests.images.dockerfile import ROOT
 from tests.images.layers import layers
+from tests.images.service_folders import folders_of
 
 pytestmark = pytest.mark.engine
 
@@ -93,11 +94,11 @@ print(json.dumps({"modules": len(names), "held": held, "files": files}))
 """
 
 
-def holds_its_own_service(told: str, folder: str) -> None:
+def holds_its_own_service(told: str, folders: list[str]) -> None:
     """Its modules and no others, all that they import (also where a flag asks for it), and the bytecode of each."""
     found = json.loads(told)
     assert found["modules"] >= 2
-    assert set(found["held"]) == {"__init__.py", "__pycache__", "base", folder}
+    assert set(found["held"]) == {"__init__.py", "__pycache__", "base", *folders}
     sources = [Path(file) for file in found["files"] if file.endswith(".py")]
     compiled = {str(file).partition(".cpython-")[0] for file in found["files"] if file.endswith(".pyc")}
     assert len(sources) > 20
@@ -109,8 +110,8 @@ def test_service_starts_from_an_image_that_holds_all_it_needs(
     built: dict[str, str], volume: str, manifest: Manifest
 ) -> None:
     """It gets healthy with its example, so the libraries are there that it loads late, such as the video decoder."""
-    inside, folder = ("python3", "-c", INSIDE, f"services.{manifest.folder.name}"), manifest.folder.name
-    holds_its_own_service(run(built[manifest.image], *inside), folder)
+    inside = ("python3", "-c", INSIDE, f"services.{manifest.folder.name}")
+    holds_its_own_service(run(built[manifest.image], *inside), folders_of(manifest))
     about = yaml.safe_load((manifest.folder / "service.yml").read_text())
     if "example" not in about or manifest.devices == ("{serial}",):  # which needs a rig, or the clock of a test
         out = docker("run", "--rm", "--network", "none", *HARDENED, built[manifest.image], "--help")

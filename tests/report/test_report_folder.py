@@ -12,8 +12,8 @@ from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
-from dodo_dsl.report.html import MEANINGS
 from dodo_dsl.report.report_folder import Drawable, forget, write_report
+from dodo_dsl.report.suite.html import MEANINGS
 from tests.run.helpers import Bench
 
 OUTCOME = Outcome(

@@ -5,6 +5,7 @@ finish. Obstacles: ``left`` and ``right`` are walls through the cones, ``finish`
 lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it says so; its rows begin behind
 the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
 the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that backs up to the finish.
+An oval has ``far`` instead, the line half-way round.
 ``static-rig`` is no track but a board with eight cones, seen from x = 0, y = 0 along +x.
 """
 
@@ -56,13 +57,17 @@ class Section:
 
 @dataclass(frozen=True)
 class Track:
-    """A centre line; it starts at ``x``, ``y`` with ``heading`` (m, rad). A ``lap`` ends where it begins."""
+    """A centre line; it starts at ``x``, ``y`` with ``heading`` (m, rad). A ``lap`` ends where it begins.
+
+    With ``far``, a lap has this line half-way round, for gates, instead of the wall behind the start.
+    """
 
     sections: list[Section]
     x: float = 0.0
     y: float = 0.0
     heading: float = math.pi / 2
     lap: bool = False
+    far: bool = False
 
     @property
     def start(self) -> Place:
@@ -72,6 +77,12 @@ class Track:
 def left(degrees: float, radius: float) -> Section:
     """A bend; negative degrees turn right."""
     return Section(radius * math.radians(abs(degrees)), math.radians(degrees))
+
+
+def oval() -> list[Section]:
+    """A lap that a camera on a table of 1.9 m by 1.4 m drives with 10 cm to its edges."""
+    straight, bend = Section(0.45), left(180, 0.6)
+    return [straight, bend, straight, bend]
 
 
 def kiwi_track() -> list[Section]:
@@ -86,6 +97,7 @@ TRACKS = {
     "straight": Track([Section(3.0)]),
     "left-curve": Track([Section(1.0), Section(1.5 * math.pi / 2, math.pi / 2), Section(0.5)]),
     "kiwi-track": Track(kiwi_track(), y=-LEAD, lap=True),
+    "rig-oval": Track(oval(), x=-0.2, y=-0.6, heading=0.0, lap=True, far=True),
     "rig-straight": Track([Section(1.3)], x=-0.75, heading=0.0),
 }
 BOARD = {
@@ -155,7 +167,10 @@ def track_map(track: Track) -> dict[str, object]:
     rows = {side: row([*driven, *beyond], side * LANE / 2, begin) for side in (1, -1)}
     *_, finish = poses(driven, 0.0, begin)
     lines = [wall("left", rows[1]), wall("right", rows[-1]), wall("finish", across(finish, LANE / 2))]
-    if track.lap:
+    if track.far:
+        *_, half = poses(track.sections[: len(track.sections) // 2], 0.0, begin)
+        lines.append(wall("far", across(ahead(half, track.sections[0].length / 2), LANE / 2)))
+    elif track.lap:
         lines.append(wall("behind", across(ahead(track.start, LEAD - BACK), LANE / 2)))
         rows = {side: places[:-1] for side, places in rows.items()}
     red = model("cone_red", "finish-cone.obj", [0.9, 0.05, 0.05], across(finish, LANE / 2 + BESIDE))

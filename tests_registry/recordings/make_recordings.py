@@ -30,13 +30,14 @@ from services.dynamic_model.model import Vehicle  # noqa: E402
 from services.integrator.model import BodyPose, Integrator, Twist  # noqa: E402
 from services.integrator.rotation import quaternion  # noqa: E402
 from services.rec_recorder.model import RecordingFile  # noqa: E402
-from services.virtual_camera.camera import Pinhole  # noqa: E402
-from services.virtual_camera.draw.render import Renderer  # noqa: E402
-from services.virtual_camera.draw.scene import SceneOptions, load_scene  # noqa: E402
-from services.virtual_camera.image.lens import Distortion  # noqa: E402
+from services.scene.camera import Pinhole  # noqa: E402
+from services.scene.draw.render import Renderer  # noqa: E402
+from services.scene.draw.scene import SceneOptions, load_scene  # noqa: E402
+from services.scene.lens import Distortion  # noqa: E402
+from services.scene.vehicle import mount  # noqa: E402
 from services.virtual_camera.image.optics import Optics  # noqa: E402
 from services.virtual_camera.image.sensor import Sensor  # noqa: E402
-from services.virtual_camera.model import VirtualCamera, mount  # noqa: E402
+from services.virtual_camera.model import VirtualCamera  # noqa: E402
 
 BEGIN = 1_700_000_000_000_000  # us since the epoch
 SIZE, FOVY, ABOVE = (640, 480), math.radians(48.8), 0.095

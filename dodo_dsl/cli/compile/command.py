@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.compile import fixes
+from dodo_dsl.cli.compile import fixes, job_options
 from dodo_dsl.cli.compile.formats import FORMATS, rendered
 from dodo_dsl.cli.display import verbosity
 from dodo_dsl.cli.display.colours import write_diagnostics
@@ -16,7 +16,8 @@ from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import patience, positive
 from dodo_dsl.compiler import Checked, NoApplication, plan
 from dodo_dsl.diagnostics import Diagnostic, forget_lines, has_errors, ordered, shown_path
-from dodo_dsl.emit.output_folder import differences, stale_folders, write
+from dodo_dsl.emit.job_options import JobOptions
+from dodo_dsl.emit.output_folder import add_images, differences, stale_folders, write
 from dodo_dsl.emit.pipeline import SearchJobs
 from dodo_dsl.plan.model import Suite
 from dodo_dsl.terminal import printable
@@ -29,6 +30,8 @@ EXAMPLES = """examples:
   dodo compile --check --format gitlab     the same as a code quality report; sarif and junit are others
   dodo compile --forecast 4 --times dodo-report    how long the pipeline takes with four runners
   dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
+  dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
+  dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
 """
 
 
@@ -64,6 +67,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="add jobs that together search TEST; repeatable")  # fmt: skip
     parser.add_argument("--workers", type=positive, metavar="N",
                         help=f"with --search: jobs of each search (default: {_WORKERS})")  # fmt: skip
+    job_options.add(parser)
     selection.add_application(parser)
 
 
@@ -72,6 +76,8 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         raise UsageError("--forecast needs the pipeline, which --check does not write: call dodo compile without it")
     if options.fix and not options.check:
         raise UsageError("--fix applies to --check")
+    if options.images and options.check:
+        raise UsageError("--images are for what is written: call dodo compile without --check")
     if options.workers and not options.search:
         raise UsageError("--workers are jobs of a search: name its test with --search")
     checked = selection.select(options.path, (), options.application)
@@ -110,7 +116,7 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = list(checked.diagnostics), {}
     if checked.ok and checked.application is not None and checked.specs:
-        made = plan(checked, options.output, _searches(options))
+        made = plan(checked, options.output, _searches(options), job_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)
@@ -151,20 +157,23 @@ def _names(names: Sequence[str]) -> str:
 
 
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    jobs = job_options.job_options(options)
     if not checked.ok:
         _show(list(checked.diagnostics), options.format, checked, stdout)
         return Exit.USAGE
     try:
-        made = plan(checked, options.output, _searches(options))
+        made = plan(checked, options.output, _searches(options), jobs)
     except NoApplication:
         raise UsageError(NO_APPLICATION) from None
     diagnostics = ordered([*checked.diagnostics, *made.problems])
     _show(diagnostics, options.format, checked, stdout)
     if has_errors(diagnostics):
         return Exit.USAGE
-    expected = _forecast(made.compiled.suite, options)
+    expected = _forecast(made.compiled.suite, jobs, options)
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output)
+    if options.images:
+        add_images(made.compiled, jobs.images, options.output)
     if options.format == "text" and options.verbosity is not Verbosity.QUIET:
         plans = made.compiled.suite.plans
         _list(options, stdout, "compiled", [(plan.name, str(options.output / plan.slug)) for plan in plans])
@@ -183,13 +192,15 @@ def _searches(options: argparse.Namespace) -> tuple[SearchJobs, ...]:
     return search_jobs(options.search, options.workers or _WORKERS, options.application)
 
 
-def _forecast(suite: Suite, options: argparse.Namespace) -> str:
-    """How long the pipeline takes, if that is wanted; raises UsageError for what has no times."""
-    if not options.forecast or not suite.plans:
+def _forecast(suite: Suite, jobs: JobOptions, options: argparse.Namespace) -> str:
+    """How long the pipeline or its longest job takes, if that is wanted; raises UsageError for what has no times."""
+    if not (options.forecast or options.jobs) or not suite.plans:
         return ""
-    from dodo_dsl.cli.compile.forecast import forecast_text
+    from dodo_dsl.cli.compile.forecast import forecast_text, packing_text
 
-    return forecast_text(suite, options.forecast, options.times, options.overhead)
+    if options.forecast:
+        return forecast_text(suite, options.forecast, jobs, options.overhead)
+    return packing_text(suite, jobs)
 
 
 def _count(number: int, what: str = "test") -> str:

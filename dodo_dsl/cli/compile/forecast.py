@@ -5,24 +5,44 @@ from pathlib import Path
 
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.emit.forecast import forecast
+from dodo_dsl.emit.job_options import JobOptions, Seconds
 from dodo_dsl.emit.pipeline import pipeline
 from dodo_dsl.plan.model import Plan, Suite
+from dodo_dsl.plan.pools import by_test
 from dodo_dsl.report import results
 
 
-def forecast_text(suite: Suite, runners: int, times: Sequence[Path], overhead: float) -> str:
-    """One line, and a second one for tests of which no time is known; raises UsageError for ``times``.
+def forecast_text(suite: Suite, runners: int, options: JobOptions, overhead: float) -> str:
+    """One line, and a second one for tests of which no time is known; raises UsageError for reports that are none.
 
     ``overhead`` are seconds from when GitLab gives a job to a runner until its test begins, and at its end.
     """
-    known = _from_results(times) if times else _from_history(suite.plans)
-    timeouts = {plan.slug: plan.timeout_s for plan in suite.plans}
+    known = dict(options.seconds(by_test(suite.plans)))
+    timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
     unknown = [slug for slug in timeouts if slug not in known]
-    found = forecast(pipeline(suite, ""), (timeouts | known).__getitem__, runners, overhead)
+    found = forecast(pipeline(suite, "", (), options), (timeouts | known).__getitem__, runners, overhead)
     who = f"{runners} runner{'s' if runners > 1 else ''}"
     line = f"forecast with {who}: {'at most' if unknown else 'about'} {_duration(found.seconds)}"
     parts = [f"{_duration(found.work)} of work", f"{overhead:g} s a job before its test", f"{found.last} ends last"]
     return f"{line} ({', '.join(parts)})\n{_without(unknown)}"
+
+
+def packing_text(suite: Suite, options: JobOptions) -> str:
+    """How many jobs share the tests, and how long the tests of the longest take if they run one after the other."""
+    known, jobs = options.seconds(by_test(suite.plans)), pipeline(suite, "", (), options).jobs
+    took = {plan.slug: known.get(plan.slug, plan.timeout_s) for plan in by_test(suite.plans)}
+    unknown = [slug for slug in took if slug not in known]
+    seconds, longest = max((sum(map(took.__getitem__, job.tests)), job.name) for job in jobs)
+    size = f"{'at most' if unknown else 'about'} {_duration(seconds)}"
+    return f"packed into {len(jobs)} job{'s' if len(jobs) > 1 else ''}, {size} in '{longest}'\n{_without(unknown)}"
+
+
+def known_seconds(times: Sequence[Path]) -> Seconds:
+    """From reports, else from the history of this machine; raises UsageError for a report that is none."""
+    if not times:
+        return _from_history
+    known = _from_results(times)
+    return lambda _plans: known
 
 
 def _without(unknown: Sequence[str]) -> str:

@@ -9,7 +9,6 @@ from urllib.parse import quote
 from dodo_dsl import __version__
 from dodo_dsl.check import catalogue
 from dodo_dsl.diagnostics import Diagnostic, fingerprints, format_gitlab, format_json, format_text, shown_path
-from dodo_dsl.report.junit import xml_text
 from dodo_dsl.terminal import json_text
 
 _SARIF = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -61,6 +60,8 @@ def _sentence(diagnostic: Diagnostic) -> str:
 def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -> str:
     """A test case a file: it fails by its errors; warnings are its output. ``files`` are those that were checked."""
     from junitparser import Failure, JUnitXml, TestCase, TestSuite
+
+    from dodo_dsl.report.junit import xml_text
 
     by_file = {file: list(found) for file, found in groupby(diagnostics, lambda d: d.span.file)}
     suite = TestSuite("dodo compile --check")

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from dodo_dsl.cli.main import main
 
@@ -59,3 +60,23 @@ def test_what_has_no_times_is_refused_and_nothing_written(tmp_path: Path, capsys
     assert "there is no " in forecast(tmp_path, capsys, "1", "--times", tmp_path / "gone.json", code=2)
     assert "--check does not write" in forecast(tmp_path, capsys, "1", "--check", code=2)
     assert not (tmp_path / "out").exists()
+
+
+def test_tests_share_jobs_by_their_times(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    times = results(tmp_path / "times", **{STRAIGHT: 99.0, "sil-open-straight": 60.0, "sil-open-left-curve": 30.0})
+    words = [*times_of(times), "-o", str(tmp_path / "out"), "--jobs", "2"]
+    command = ["compile", STRAIGHT, "sil-open-straight", "sil-open-left-curve", *words]
+    assert main(command, sys.stdout, sys.stderr) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "packed into 2 jobs, about 1 min 39 s in 'sil-closed-straight'"
+    made = yaml.safe_load((tmp_path / "out/child.gitlab-ci.yml").read_text())
+    assert "sil-open-left-curve --compiled" in made["tests 2/2"]["script"][0]
+    assert main([*command, "--check"], sys.stdout, sys.stderr) == 0, "nothing is stale"
+    assert main([*command, "--forecast", "2"], sys.stdout, sys.stderr) == 0
+    assert "forecast with 2 runners: about 1 min 49 s (" in capsys.readouterr().out
+    assert main([*command[:4], *words[2:]], sys.stdout, sys.stderr) == 0
+    said = capsys.readouterr().out.splitlines()[-2:]
+    assert said[0].startswith("packed into 2 jobs, at most ") and "and 2 more never ran here" in said[1]
+
+
+def times_of(folder: Path) -> list[str]:
+    return ["--times", str(folder)]

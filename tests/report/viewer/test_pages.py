@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -86,6 +87,17 @@ def middle(page: Page, selector: str) -> float:
     return float(page.pixels()[int(y), int(x)].mean())
 
 
+_NEAR, _PATIENCE_S = 6, 10.0
+
+
+def soon(page: Page, selector: str, brightness: float) -> float:
+    """The same when it has become as bright as that, or in the end: a busy machine draws later than it seeks."""
+    end = time.monotonic() + _PATIENCE_S
+    while abs((found := middle(page, selector)) - brightness) > _NEAR and time.monotonic() < end:
+        page.wait("true")
+    return found
+
+
 @pytest.mark.parametrize("page", ["wall hit"], indirect=True)
 def test_keys_clicks_and_addresses_move_the_cursor(page: Page) -> None:
     times = []
@@ -111,12 +123,11 @@ def test_a_frame_is_shown_with_its_boxes(page: Page) -> None:
     kinds = {kind: [each["label"] for each in frame[kind]] for kind in ("hit", "false", "missed")}
     assert kinds == {"hit": ["yellow"], "false": ["blue"], "missed": ["blue"]}
     assert frame["hit"][0]["score"] == pytest.approx(0.09 / 0.11, abs=1e-3)
-    for time in (0.7, 1.25, 0.35):
-        page.value(f"dodo.cursor.move({time})")
-        shown = math.floor(time * 10 + 0.01)
+    for at in (0.7, 1.25, 0.35):
+        page.value(f"dodo.cursor.move({at})")
+        shown = math.floor(at * 10 + 0.01)
         page.wait(f"Math.round(dodo.camera.screen().currentTime * 10) === {shown} && !dodo.camera.screen().seeking")
-        page.wait("true")
-        assert middle(page, ".view canvas") == pytest.approx(10 * shown, abs=6), time
+        assert soon(page, ".view canvas", 10 * shown) == pytest.approx(10 * shown, abs=_NEAR), at
     page.wait("dodo.film.pictures.length === 16")
     strip = page.value("(b => [b.x, b.y, b.width])(document.querySelector('.slider canvas').getBoundingClientRect())")
     page.wait("true")

@@ -15,6 +15,8 @@ def machine_line(load: MachineLoad) -> str:
         parts.append(
             f"{load.late_pictures_share * 100:.0f} % of the pictures came late, by up to {load.lateness_s:.2f} s"
         )
+    if load.paused_s:
+        parts.append(f"the emulated rig stood still for {load.paused_s:.2f} s")
     return "; ".join(parts)
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport
-from dodo_dsl.report.html import ReportFiles, ReportPicture, render
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.suite.html import ReportFiles, ReportPicture, breakable, render
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named, write
 from tests.report.viewer.chromium import Chromium, Page
@@ -144,3 +144,7 @@ def test_strings_of_others_are_text(chromium: Chromium, tmp_path: Path) -> None:
         assert page.faults == []
         assert [url for url in page.requests if not url.startswith((tmp_path.as_uri(), "data:,"))] == []
     assert (tmp_path / "index.html").stat().st_size < 1_000_000
+
+
+def test_names_of_matrices_break_between_their_values_alone() -> None:
+    assert breakable("t[a=0.45,b=<x>]") == "t<wbr>[a=0.45,<wbr>b=&lt;x&gt;]"

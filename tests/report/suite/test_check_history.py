@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dodo_dsl.report import check_history
 from dodo_dsl.report.report_folder import write_report, write_summaries
+from dodo_dsl.report.suite import check_history
 from tests.report.joined.reports import named
 
 CHECK: dict[str, Any] = {"name": "wall-margin", "value": 0.2, "limit": {"min": 0.1}, "unit": "m", "ok": True}

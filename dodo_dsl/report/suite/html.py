@@ -6,6 +6,7 @@ It shows everything without its script, which searches, filters and sorts.
 import base64
 import functools
 import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -15,11 +16,11 @@ from markupsafe import Markup
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report import check_history, matrix_grid
 from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.comparison import KINDS, Comparison
-from dodo_dsl.report.machine_line import machine_line
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
+from dodo_dsl.report.suite import check_history, matrix_grid
+from dodo_dsl.report.suite.machine_line import machine_line
 from dodo_dsl.template_cache import compiled_templates
 
 
@@ -56,6 +57,7 @@ MEANINGS = {
 """Explanations of checks whose names do not explain them, as in the READMEs of the evaluators."""
 
 
+_BREAKS = re.compile(r"(?=\[)|(?<=,)")
 _MOST_TEXT = 10_000
 """Characters of one text of others on the page."""
 _URGENCIES = ("error", "failed", "passed")
@@ -69,46 +71,60 @@ def render(
     circumstances: Circumstances = NO_CIRCUMSTANCES,
 ) -> str:
     """The page; with a comparison, what changed since the report that it names."""
-    folder = package_data.templates()
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
-    script, style = ((folder / "report" / name).read_text(encoding="utf-8") for name in ("suite.js", "suite.css"))
-    return _template().render(
-        outcomes=outcomes,
-        files=files,
-        meanings=MEANINGS,
-        counts=counts,
-        not_run=circumstances.not_run,
-        runs=circumstances.runs,
-        version=__version__,
-        machine_line=machine_line,
-        curve=check_history.curve,
-        grids=matrix_grid.grids(outcomes),
-        decisive_value=matrix_grid.decisive_value,
-        comparison=comparison,
-        changed=comparison.by_slug() if comparison else {},
-        words=words,
-        kinds=KINDS,
-        directions=_DIRECTIONS,
-        urgencies=_URGENCIES,
-        script=script,
-        style=style,
-        hash=_source_hash,
+    script = (package_data.templates() / "report" / "suite.js").read_text(encoding="utf-8")
+    return (
+        environment()
+        .get_template("report.html.j2")
+        .render(
+            outcomes=outcomes,
+            files=files,
+            meanings=MEANINGS,
+            counts=counts,
+            not_run=circumstances.not_run,
+            runs=circumstances.runs,
+            version=__version__,
+            machine_line=machine_line,
+            curve=check_history.curve,
+            grids=matrix_grid.grids(outcomes),
+            decisive_value=matrix_grid.decisive_value,
+            comparison=comparison,
+            changed=comparison.by_slug() if comparison else {},
+            words=words,
+            kinds=KINDS,
+            directions=_DIRECTIONS,
+            urgencies=_URGENCIES,
+            script=script,
+            style=style(),
+            hash=source_hash,
+            breakable=breakable,
+        )
     )
 
 
+def style() -> str:
+    """The style sheet of pages."""
+    return (package_data.templates() / "report" / "suite.css").read_text(encoding="utf-8")
+
+
 @functools.cache
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
+def environment() -> jinja2.Environment:
+    """Renders pages of texts that come from strangers."""
+    return jinja2.Environment(
         bytecode_cache=compiled_templates(),
         loader=jinja2.FileSystemLoader(package_data.templates()),
         undefined=jinja2.StrictUndefined,
         autoescape=True,
         finalize=_harmless,
     )
-    return environment.get_template("report.html.j2")
 
 
-def _source_hash(text: str) -> str:
+def breakable(name: str) -> Markup:
+    """A test's name, which lines may break before its values and between them."""
+    return Markup("<wbr>").join(_BREAKS.split(_harmless(name)))
+
+
+def source_hash(text: str) -> str:
     """A script or style, as a Content-Security-Policy allows it alone (CSP level 3, section 2.3.1)."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 

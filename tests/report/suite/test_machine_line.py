@@ -1,7 +1,9 @@
 """The line about a busy machine."""
 
+from dataclasses import replace
+
 from dodo_dsl.outcome import MachineLoad, Wait
-from dodo_dsl.report.machine_line import machine_line
+from dodo_dsl.report.suite.machine_line import machine_line
 
 
 def test_the_line() -> None:
@@ -11,4 +13,5 @@ def test_the_line() -> None:
         "DoDo's services waited 0.5 s of 7.5 s for a processor (camera); "
         "others took 61 % of 2 cores; 5 % of the pictures came late, by up to 0.06 s"
     )
+    assert machine_line(replace(load, paused_s=0.061)).endswith("; the emulated rig stood still for 0.06 s")
     assert machine_line(MachineLoad(7.5)) == "waits for a processor were not measured"

@@ -1,0 +1,71 @@
+"""``dodo compile --tags --image --run-options --images --jobs``: what the jobs of the pipeline have in common."""
+
+import argparse
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from dodo_dsl.cli.errors import UsageError, files_of_the_user
+from dodo_dsl.cli.numbers import positive
+from dodo_dsl.emit.job_options import DEFAULT_TAGS, JobOptions, Seconds
+from dodo_dsl.opendlv import regular_file
+
+_IMAGE = re.compile(r"DODO_IMAGE_[A-Z0-9_]+=[A-Za-z0-9_.:/@-]+")
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--tags", type=tags, default=DEFAULT_TAGS, metavar="TAGS",
+                        help="tags of the runners of all jobs but those on rigs, separated by commas, or a JSON list; "
+                        "'' for none (default: sil)")  # fmt: skip
+    parser.add_argument("--image", default="", metavar="IMAGE",
+                        help="image of all jobs but those on rigs (default: the runner's own)")  # fmt: skip
+    parser.add_argument("--run-options", default="", metavar="OPTIONS",
+                        help="dodo run options of every test; the variable DODO_RUN_OPTIONS replaces them")  # fmt: skip
+    parser.add_argument("--jobs", type=positive, metavar="N",
+                        help="pack the tests into N jobs, evenly by their times, and one a rig "
+                        "(default: one a test)")  # fmt: skip
+    parser.add_argument("--images", type=Path, metavar="FILE",
+                        help="lines DODO_IMAGE_<SERVICE>=IMAGE of the application's images that were built: tests run "
+                        "in containers of them")  # fmt: skip
+
+
+def job_options(options: argparse.Namespace) -> JobOptions:
+    """The options as ``add`` has them; raises UsageError for a file of images that is none."""
+    images = _images(options.images) if options.images else ()
+    texts = options.image.strip(), options.run_options.strip()
+    made = JobOptions(options.tags, *texts, images, options.jobs or 0)
+    return replace(made, seconds=_seconds(options.times)) if options.jobs or options.forecast else made
+
+
+def _seconds(times: Sequence[Path]) -> Seconds:
+    from dodo_dsl.cli.compile.forecast import known_seconds
+
+    return known_seconds(times)
+
+
+def _images(path: Path) -> tuple[str, ...]:
+    with files_of_the_user():
+        lines = regular_file.text(path).splitlines()
+    for number, line in enumerate(lines, 1):
+        if not _IMAGE.fullmatch(line):
+            raise UsageError(
+                f"{path}:{number}: expected a line such as DODO_IMAGE_STEERING=registry.example.org/steering:1"
+            )
+    return tuple(lines)
+
+
+def tags(text: str) -> tuple[str, ...]:
+    """``sil,docker``, or the JSON list as which a GitLab variable holds an input of type array."""
+    words = text.split(",")
+    if text.strip().startswith("["):
+        try:
+            words = json.loads(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(
+                f"'{text}' is no list of tags, such as '[\"sil\"]' or 'sil,docker'"
+            ) from None
+    if not all(isinstance(word, str) for word in words):
+        raise argparse.ArgumentTypeError(f"'{text}' holds something that is no tag")
+    return tuple(dict.fromkeys(word.strip() for word in words if word.strip()))

@@ -1,0 +1,129 @@
+"""``dodo images pull --for RIG``: the images that the tests of a rig need, before its first test needs them."""
+
+import argparse
+import json
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl import compiler
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.compiler import Checked
+from dodo_dsl.diagnostics import did_you_mean, has_errors
+from dodo_dsl.emit.output_folder import write
+from dodo_dsl.images import docker_command, remote
+from dodo_dsl.images.remote import UNPACKED, RemoteImage
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.spec.deployment.rig import Rig
+from dodo_dsl.terminal import printable
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--for", dest="rig", required=True, metavar="RIG", help="the rig of dodo.yml whose tests run here"
+    )
+    parser.add_argument(
+        "--backend", choices=("mixed", "docker"), default="mixed",
+        help="docker: also the images of DoDo's services (default: mixed, which needs the application's alone)"
+    )  # fmt: skip
+    selection.add_application(parser)
+
+
+def pull(options: argparse.Namespace, stdout: TextIO) -> int:
+    """Pulls what is missing or newer in its registry; raises UsageError where there is no room for it."""
+    checked, rig = _tests(options)
+    docker_command.require_engine()
+    docker_command.require_buildx()
+    engine = docker_command.ask("version", "--format", "{{.Server.Os}}/{{.Server.Arch}}")
+    platform = f"linux/{rig.arch}" if rig.arch else engine
+    if platform != engine:
+        stdout.write(f"note: rig '{rig.name}' is {platform}, and this engine's machine {engine}\n")
+    wanted, built = _images(checked, options.backend == "docker")
+    for name in built:
+        stdout.write(f"{printable(name)} has a 'build': the first test builds it\n")
+    if not wanted:
+        stdout.write(f"the tests of rig '{rig.name}' need no images of a registry\n")
+        return Exit.OK
+    images = [remote.remote_image(name, platform) for name in wanted]
+    stdout.write(_room(rig, images))
+    for number, image in enumerate(images, 1):
+        stdout.write(f"[{number}/{len(images)}] {printable(image.reference)}\n")
+        code, _ = docker_command.show(("pull", "--platform", platform, image.reference), stdout)
+        if code:
+            raise docker_command.DockerError(f"{image.reference} cannot be pulled; the output above says why")
+    for image in images:
+        size = docker_command.size(image.reference)
+        stdout.write(f"{printable(image.reference)}  {docker_command.platform(image.reference)}  {_megabytes(size)}\n")
+    return Exit.OK
+
+
+def _tests(options: argparse.Namespace) -> tuple[Checked, Rig]:
+    """The tests of the rig, and of its pools; raises UsageError."""
+    rigs = selection.checked_deployment().rigs
+    if options.rig not in rigs:
+        hint = did_you_mean(options.rig, rigs)
+        raise UsageError(f"there is no rig '{options.rig}' in dodo.yml" + (f"; {hint}" if hint else ""))
+    checked = selection.select([], (), options.application)
+    tests = tuple(test for test in checked.tests if test.spec.rig == options.rig)
+    if not tests:
+        raise UsageError(f"no test runs on rig '{options.rig}'")
+    if any(d.severity == "error" for test in tests for d in checked.by_rules.get(test.spec.path, ())):
+        raise UsageError(f"tests of rig '{options.rig}' have problems; dodo compile --check shows them")
+    return replace(checked, tests=tests), rigs[options.rig]
+
+
+def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str]]:
+    """The images of a registry that the tests' containers need, and the names of services that are built."""
+    wanted: set[str] = set()
+    built: set[str] = set()
+    with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
+        folder = Path(name)
+        try:
+            made = compiler.plan(checked, folder)
+        except compiler.NoApplication:
+            raise UsageError(NO_APPLICATION) from None
+        if has_errors(made.problems):
+            raise UsageError("the tests cannot be compiled; dodo compile --check says why")
+        write(made.compiled, made.pipeline, folder)
+        for plan in made.compiled.suite.plans:
+            found, own = _of_application(plan, folder / plan.slug)
+            wanted |= found | ({service.image for service in plan.services} if with_own else set())
+            built |= own
+    return sorted(wanted), sorted(built)
+
+
+def _of_application(plan: Plan, folder: Path) -> tuple[set[str], set[str]]:
+    """Images of the application's services as compose fills in their variables, and services with a ``build``."""
+    services = json.loads(docker_command.ask("compose", "config", "--format", "json", folder=folder))["services"]
+    own = {service.name: services.get(service.name, {}) for service in plan.application.services}
+    built = {name for name, service in own.items() if "build" in service}
+    return {str(own[name]["image"]) for name in own.keys() - built if "image" in own[name]}, built
+
+
+def _room(rig: Rig, images: Sequence[RemoteImage]) -> str:
+    """How much room the images need and find; raises UsageError where they find too little."""
+    all_of_them = UNPACKED * remote.bytes_of(images)
+    packed = remote.bytes_of(images, remote.local_layers())
+    folder = Path(docker_command.ask("info", "--format", "{{.DockerRootDir}}"))
+    free = shutil.disk_usage(folder).free if folder.is_dir() else None
+    if rig.disk is not None and all_of_them > rig.disk:
+        text = f"the images of rig '{rig.name}' take about {_megabytes(all_of_them)}, and its 'disk' in dodo.yml is"
+        raise UsageError(f"{text} {_megabytes(rig.disk)}; make them smaller, or the budget larger")
+    need = UNPACKED * packed
+    if free is not None and need > free:
+        raise UsageError(
+            f"the images need about {_megabytes(need)} more, and {folder} has {_megabytes(free)} left; "
+            "'docker image prune' removes images that have no name"
+        )
+    budget = f", budget {_megabytes(rig.disk)}" if rig.disk is not None else ""
+    there = f", free {_megabytes(free)}" if free is not None else ""
+    return f"to fetch {_megabytes(packed)}, room about {_megabytes(need)} of {_megabytes(all_of_them)}{budget}{there}\n"
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:,.1f} MB" if size < 10e6 else f"{size / 1e6:,.0f} MB"
