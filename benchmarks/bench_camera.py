@@ -27,16 +27,16 @@ from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, cost_row, rate_row, report
 from benchmarks.pictures.gl_peer import GlPeer, ssim
 from dodo_dsl import package_data
-from services.virtual_camera.camera import CameraPose, Pinhole
-from services.virtual_camera.draw.light import Light
-from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import SceneOptions, load_scene
-from services.virtual_camera.image.lens import Distortion
+from services.scene.camera import CameraPose, Pinhole
+from services.scene.draw.light import Light
+from services.scene.draw.raster import Image
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.lens import Distortion
+from services.scene.motion import CameraMotion, still
+from services.scene.truth import SceneTruth, TruthLimits, classes_of
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.sensor import Sensor
-from services.virtual_camera.motion import CameraMotion, still
-from services.virtual_camera.truth import SceneTruth, TruthLimits, classes_of
 
 SIZE, FOVY = (1280, 720), math.radians(48.8)
 CONES = 90

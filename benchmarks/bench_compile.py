@@ -1,4 +1,4 @@
-"""Compiling and checking 10 to 10,000 instances, beside ``docker compose config -q`` on the output; and start-up.
+"""Compiling and checking 10 to 10,000 instances, beside ``docker compose config -q`` on the output.
 
 Each number of instances is compiled twice: as one spec with a matrix, and as as many specs; 10,000 only as a matrix.
 The seconds a test include the start of the command. Everything is written below the system's temporary folder, so its
@@ -31,8 +31,6 @@ CASES = ((100, True, 0.25), (100, False, 0.4), (1000, True, 0.8), (10, True, 0.8
 """Instances, whether of a matrix, and the part of the budget by which they are done."""
 ROUNDS = 5
 PEER_CALLS = 10
-STARTS = {"--help": 0.2, "compile --check": 0.4}
-"""Commands and the seconds that are their goal."""
 
 
 class Call(NamedTuple):
@@ -64,7 +62,7 @@ def write_specs(folder: Path, name: str, number: int, matrix: bool) -> None:
 
 def dodo(folder: Path, *words: str) -> tuple[float, float]:
     """Seconds of one cold call, and its peak memory in MiB."""
-    return cost_of([sys.executable, "-m", "dodo_dsl", *words], folder)
+    return cost_of([sys.executable, "-m", "dodo_dsl", *words], folder)[:2]
 
 
 def peer(folder: Path) -> float:
@@ -109,25 +107,8 @@ def kind_of(matrix: bool) -> str:
     return "of a matrix" if matrix else "specs"
 
 
-def starts(budget: Budget) -> None:
-    """How long short commands take, from a cold start, beside ``docker compose version``."""
-    found: dict[str, list[float]] = {words: [] for words in STARTS}
-    peers: list[float] = []
-    for _ in budget.rounds(ROUNDS, until=0.1):
-        if PLUGIN is not None:
-            peers.append(cost_of([PLUGIN, "version"], ROOT)[0])
-        for words, times in found.items():
-            times.append(dodo(ROOT, *words.split(), *(("-o", "build/absent") if "--check" in words else ()))[0])
-    for words, times in found.items():
-        rest = ("compose version", peers) if peers else ()
-        row = cost_row(f"dodo {words}", "s", times, *rest, goal=Goal(STARTS[words], of="value"))
-        report(row)
-        print(f"dodo {words}: {statistics.median(times) * 1000:.0f} ms")
-
-
 def main() -> int:
     budget = Budget.given()
-    starts(budget)
     print("instances          check    compile     peak    peer a test   times as fast a test: check, compile")
     plan(*(row for number, matrix, _ in CASES for row in rows(number, matrix, []) if row.goal))
     each = 0.0

@@ -75,16 +75,16 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def export(path: Path, folder: Path) -> Run:
     words = ["rec", "export", path, "--csv", "--messages=1.0", "-o", folder]
-    return cost_of([sys.executable, "-m", "dodo_dsl", *words], ROOT)
+    return cost_of([sys.executable, "-m", "dodo_dsl", *words], ROOT)[:2]
 
 
 def info(path: Path, _folder: Path) -> Run:
-    return cost_of([sys.executable, "-m", "dodo_dsl", "rec", "info", path], ROOT)
+    return cost_of([sys.executable, "-m", "dodo_dsl", "rec", "info", path], ROOT)[:2]
 
 
 def peer(path: Path, folder: Path) -> Run:
     folder.mkdir()
-    return cost_of([PEER, f"--rec={path}", f"--odvd={STANDARD}"], folder)
+    return cost_of([PEER, f"--rec={path}", f"--odvd={STANDARD}"], folder)[:2]
 
 
 WORKS = {"export": export, "info": info, "peer": peer}

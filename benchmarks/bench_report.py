@@ -22,8 +22,8 @@ from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
 from dodo_dsl.opendlv.video.encoder import VideoEncoder
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report import check_history
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.suite import check_history
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import PROGRAM, Chromium
 

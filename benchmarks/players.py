@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 _MEASURE = """
@@ -15,7 +15,8 @@ import os, sys, time
 begin = time.perf_counter()
 child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=[(os.POSIX_SPAWN_DUP2, 2, 1)])
 _, status, usage = os.wait4(child, 0)
-print(time.perf_counter() - begin, usage.ru_maxrss / 1024, os.waitstatus_to_exitcode(status))
+seconds, processor = time.perf_counter() - begin, usage.ru_utime + usage.ru_stime
+print(seconds, usage.ru_maxrss / 1024, processor, os.waitstatus_to_exitcode(status))
 """
 
 
@@ -34,17 +35,25 @@ class Measured:
         return self._last
 
 
-def cost_of(command: Sequence[str | Path], folder: Path) -> tuple[float, float]:
-    """Seconds of a program by its path, and its peak memory in MiB; raises RuntimeError with its output when it fails.
+class Cost(NamedTuple):
+    """Seconds that pass, peak memory in MiB, and seconds of processors."""
+
+    seconds: float
+    memory: float
+    processor: float
+
+
+def cost_of(command: Sequence[str | Path], folder: Path) -> Cost:
+    """What a program costs, by its path; raises RuntimeError with its output when it fails.
 
     A small process starts it, as Linux counts the memory of the one that starts a program as the program's own.
     """
     words = [sys.executable, "-ISc", _MEASURE, *map(str, command)]
     found = subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True)
-    seconds, memory, code = map(float, found.stdout.split())
+    *numbers, code = map(float, found.stdout.split())
     if code:
         raise RuntimeError(f"{' '.join(map(str, command))} ended with {code:.0f}: {found.stderr.strip()[:500]}")
-    return seconds, memory
+    return Cost(*numbers)
 
 
 def finished(command: Sequence[str | Path], folder: Path, environment: dict[str, str] | None = None) -> int:

@@ -9,16 +9,16 @@ import cv2
 import numpy as np
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import CameraPose, Pinhole
-from services.virtual_camera.draw.light import Light
-from services.virtual_camera.draw.raster import Image
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import SceneOptions, load_scene
-from services.virtual_camera.image.lens import Distortion
+from services.scene.camera import CameraPose, Pinhole
+from services.scene.draw.light import Light
+from services.scene.draw.raster import Image
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.lens import Distortion
+from services.scene.motion import CameraMotion
+from services.scene.truth import SceneTruth, TruthLimits, classes_of
 from services.virtual_camera.image.optics import Optics
 from services.virtual_camera.image.sensor import Sensor
-from services.virtual_camera.motion import CameraMotion
-from services.virtual_camera.truth import SceneTruth, TruthLimits, classes_of
 
 MAP = package_data.registry() / "maps" / "left-curve"
 SIZE, FOVY, COLUMNS = (288, 216), math.radians(48.8), 4

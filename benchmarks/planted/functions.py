@@ -14,7 +14,7 @@ import importlib.util
 import random
 import statistics
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,19 +122,27 @@ def ways() -> dict[str, Callable[[Bug, int], Iterator[float]]]:
     return {**found, "VerifAI": by_cross_entropy} if importlib.util.find_spec("verifai") else found
 
 
-def main() -> None:
+def options() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="Drives until the first failure, median (least to most) of the seeds.")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--most", type=int, default=400)
-    flags = parser.parse_args()
+    return parser
+
+
+def print_table(bugs: Iterable[Bug], flags: argparse.Namespace) -> None:
+    """A line a bug, as soon as it is known."""
     names = "".join(f"{name:<18}" for name in ways())
     print(f"{'bug':<30} volume  {names}random, by the volume", flush=True)
-    for bug in BUGS:
+    for bug in bugs:
         cells = []
         for way in ways().values():
             found = [until_failure(way(bug, seed), flags.most) for seed in range(flags.seeds)]
             cells.append(f"{f'{statistics.median(found):g} ({min(found)} to {max(found)})':<18}")
         print(f"{bug.name:<30} {bug.volume:6.2%}  {''.join(cells)}{0.693 / bug.volume:.0f}", flush=True)
+
+
+def main() -> None:
+    print_table(BUGS, options().parse_args())
 
 
 if __name__ == "__main__":

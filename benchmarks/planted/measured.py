@@ -8,7 +8,6 @@ random drives and VerifAI's sampler are compared without thousands of drives. Wh
 its corner is left out, which makes it harder to find than programs.py does.
 """
 
-import argparse
 import json
 import sqlite3
 import statistics
@@ -24,7 +23,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 from bugs import BUGS, RANGES, UNITS  # noqa: E402
-from functions import FAILED, Bug, until_failure, ways  # noqa: E402
+from functions import FAILED, Bug, options, print_table  # noqa: E402
 from programs import ROOT  # noqa: E402
 
 NAMES = list(RANGES)
@@ -70,24 +69,22 @@ def error(points: Any, margins: Any) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Drives until the first failure, median (least to most) of the seeds.")
+    parser = options()
     parser.add_argument("--drives", type=Path, default=STORE)
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--most", type=int, default=400)
+    parser.add_argument("bugs", nargs="*", metavar="BUG", help="of bugs.py (default: all)")
     flags = parser.parse_args()
+    if not flags.drives.is_file():
+        parser.error(f"{flags.drives} is missing: run programs.py none --most 300 first")
     points, margins = measured(flags.drives)
     good = interpolation(points, margins)
     spread = f"{margins.min():.3f} to {margins.max():.3f}, deviation {margins.std():.3f}"
     print(f"{len(points)} drives, margins {spread}, mean error of the interpolation {error(points, margins):.3f}")
-    print(f"{'bug':<14} volume  {''.join(f'{name:<18}' for name in ways())}random, by the volume", flush=True)
-    for name, bug in BUGS.items():
-        trigger = {NAMES.index(one): limits for one, limits in bug.corner.items()}
-        stand_in = Measured(name, len(NAMES), trigger, {}, good)
-        cells = []
-        for way in ways().values():
-            found = [until_failure(way(stand_in, seed), flags.most) for seed in range(flags.seeds)]
-            cells.append(f"{f'{statistics.median(found):g} ({min(found)} to {max(found)})':<18}")
-        print(f"{name:<14} {bug.volume:6.2%}  {''.join(cells)}{0.693 / bug.volume:.0f}", flush=True)
+    print_table((stand_in(name, good) for name in flags.bugs or BUGS), flags)
+
+
+def stand_in(name: str, good: Callable[[Any], Any]) -> Measured:
+    trigger = {NAMES.index(one): limits for one, limits in BUGS[name].corner.items()}
+    return Measured(name, len(NAMES), trigger, {}, good)
 
 
 if __name__ == "__main__":

@@ -1,16 +1,19 @@
 """How many real drives dodo search needs until it finds a planted bug, and whether it shrinks it to its causes.
 
-    python benchmarks/planted/programs.py [BUG...] [--seed 0] [--most 400] [--work build/planted]
+    python benchmarks/planted/programs.py [BUG...] [--seed 0] [--most 400] [--first] [--work build/planted]
 
 Each bug of bugs.py gets a folder with the example application, whose steering has it, and a test with seven ranges.
 `dodo search --until-failure` drives there until it finds a failure, and shrinks it; the test that it writes is then
 driven ten times. Random drives would need 0.693 / volume of them as the median, as a drive outside the corner passes.
+With --first, a search is interrupted at its failure, before it is shrunk, so that many seeds take less time.
 """
 
 import argparse
 import json
 import re
 import shutil
+import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -71,6 +74,41 @@ def again(folder: Path, spec: str, reason: str) -> str:
     return f"{len(ends)} of {TIMES}, {same} with its sentence"
 
 
+def kept(folder: Path) -> list[tuple[int, str]]:
+    """Numbers and outcomes of the drives that a search has kept so far, in order."""
+    store = folder / "dodo-report" / "search" / "planted" / "search.sqlite"
+    try:
+        with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as database:
+            return database.execute("select number, outcome from drives order by number").fetchall()
+    except sqlite3.OperationalError:  # not there yet
+        return []
+
+
+def first_of(bug: str, work: Path, seed: int, most: int) -> str:
+    """A search that ends at its first failure."""
+    folder = work / f"{bug}-{seed}"
+    prepare(bug, folder)
+    words = ["search", "planted", "--runs", str(most), "--seed", str(seed), "--until-failure"]
+    begin = time.monotonic()
+    with subprocess.Popen([*DODO, *words], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as search:
+        number = None
+        while number is None and search.poll() is None:
+            time.sleep(1)
+            failed = [one for one, outcome in kept(folder) if outcome == "failed"]
+            number = min(failed, default=None)
+        search.send_signal(signal.SIGINT)
+    drives = kept(folder)
+    number = min((one for one, outcome in drives if outcome == "failed"), default=None)
+    return row(bug, number, len(drives), time.monotonic() - begin)
+
+
+def row(bug: str, number: int | None, drives: int, seconds: float) -> str:
+    volume = BUGS[bug].volume if bug in BUGS else 0.0
+    random = f"{0.693 / volume:.0f}" if volume else ""
+    first = str(number) if number else f"none in {drives}"
+    return f"{bug:<14}  {volume:6.2%}  {first:>13}  {random:>6}  {seconds:6.0f} s"
+
+
 def measure(bug: str, work: Path, seed: int, most: int) -> str:
     folder = work / f"{bug}-{seed}"
     prepare(bug, folder)
@@ -86,17 +124,13 @@ def measure(bug: str, work: Path, seed: int, most: int) -> str:
     corner = set(BUGS[bug].corner) if bug in BUGS else set()
     foreign = sorted(set(changed) - corner)
     verdict = again(folder, shrunk["spec"], shrunk["reason"]) if shrunk and shrunk["spec"] else ""
-    volume = BUGS[bug].volume if bug in BUGS else 0.0
-    random = f"{0.693 / volume:.0f}" if volume else ""
-    cells = [
-        f"{bug:<14}",
-        f"{volume:6.2%}",
-        f"{number or f'none in {drives}':>12}",
-        f"{random:>6}",
-        f"{seconds:6.0f} s",
-    ]
     return "  ".join(
-        [*cells, f"{','.join(changed).lower():<32}", "foreign: " + ",".join(foreign) if foreign else "", verdict]
+        [
+            row(bug, number, drives, seconds),
+            f"{','.join(changed).lower():<32}",
+            "foreign: " + ",".join(foreign) if foreign else "",
+            verdict,
+        ]
     )
 
 
@@ -105,11 +139,13 @@ def main() -> None:
     parser.add_argument("bugs", nargs="*", metavar="BUG", help="of bugs.py, or none (default: all of bugs.py)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--most", type=int, default=400)
+    parser.add_argument("--first", action="store_true", help="shrink nothing")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "planted")
     flags = parser.parse_args()
-    print("bug             volume  first failure  random  search    shrunk to                         its test, again")
+    one = first_of if flags.first else measure
+    print("bug             volume  first failure  random    search  shrunk to                         its test, again")
     for bug in flags.bugs or BUGS:
-        print(measure(bug, flags.work.resolve(), flags.seed, flags.most), flush=True)
+        print(one(bug, flags.work.resolve(), flags.seed, flags.most), flush=True)
 
 
 if __name__ == "__main__":

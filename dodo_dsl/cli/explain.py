@@ -77,6 +77,7 @@ def _file(instances: Sequence[Explanation]) -> str:
 
 def _head(one: Explanation) -> str:
     rig = f", rig {one.rig}" if one.rig else ""
+    rig += f" of any {one.pool}" if one.pool else ""
     return f"{printable(f'{one.name} ({one.level}, {one.kind}{rig})')}\n{printable(one.file)}\n"
 
 

@@ -2,13 +2,16 @@
 
 import argparse
 import shlex
+from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl import package_data
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
+from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -91,7 +94,8 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
             others = [*["another service of the test"] * parameter.shared, *["the rig"] * bool(parameter.rig)]
             facts += f", required unless {' or '.join(others)} provides it" if others else ", required"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
-        lines += [f"  {parameter.name}: {facts} {unit}".rstrip(), f"      {parameter.help}"]
+        bounds = f"; {text}" if (text := _bounds(parameter)) else ""
+        lines += [f"  {parameter.name}: {facts} {unit}".rstrip() + bounds, f"      {parameter.help}"]
     for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):
         for direction, names in (("in", ports.inputs), ("out", ports.outputs)):
             if names:
@@ -100,9 +104,20 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
         checks = (f"{check} ({unit})" if unit else check for check, unit in manifest.checks.items())
         lines.append(f"checks: {', '.join(checks)}")
     if manifest.example is not None:
-        lines.append(f"standalone: {shlex.join([*manifest.process, '--cid=128', *manifest.example])}")
+        found = "" if Path("services", "base").is_dir() else f"PYTHONPATH={shlex.quote(str(package_data.root()))} "
+        lines.append(f"standalone: {found}{shlex.join([*manifest.process, '--cid=128', *manifest.example])}")
     stdout.writelines(f"{printable(line)}\n" for line in lines)
     return Exit.OK
+
+
+def _bounds(parameter: Parameter) -> str:
+    """What values it may have."""
+    if parameter.choices:
+        return f"one of {', '.join(parameter.choices)}"
+    low, high = parameter.minimum, parameter.maximum
+    if low is not None and high is not None:
+        return f"{low:.10g} to {high:.10g}"
+    return f"at least {low:.10g}" if low is not None else f"at most {high:.10g}" if high is not None else ""
 
 
 def _table(rows: list[dict[str, str]], columns: tuple[str, ...], stdout: TextIO) -> None:

@@ -42,7 +42,7 @@ COMMANDS = {
     "completion": Subcommand(
         "completion.command", "print what lets a shell complete commands, options, tests, services and rigs"
     ),
-    "images": Subcommand("images", "build and push the images of DoDo's services, and say what they are made of"),
+    "images": Subcommand("images", "build, push and pull images, and say what they are made of"),
     "rig": Subcommand("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }

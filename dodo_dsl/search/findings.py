@@ -84,6 +84,18 @@ def kind_of(reason: str) -> str:
     return _NUMBER.sub("#", reason)
 
 
+def is_alike(one: Drive, other: Drive) -> bool:
+    """Whether drives failed in the same way: the same checks, or for the same reason where one names none.
+
+    So a car that hits one wall fails like one that hits the other, where values are nearer to the nominal ones.
+    """
+    if one.outcome != other.outcome:
+        return False
+    if one.checks and other.checks:
+        return one.checks == other.checks
+    return kind_of(one.reason) == kind_of(other.reason)
+
+
 def find(
     test: str, seed: int, space: Space, nominal: Drive | None, swept: Sequence[Drive], proposed: Sequence[Drive] = ()
 ) -> Findings:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dodo_dsl.search.space import Point, Space, texts
+from dodo_dsl.search.space import Point, Space
 from dodo_dsl.search.surrogate import Array, Surrogate, is_flat
 from dodo_dsl.spec.instances.vary import Values
 
@@ -54,19 +54,19 @@ def propose(
     found: list[Values] = []
     for turn in range(number):
         candidates = _candidates(space, points[np.argsort(margins, kind="stable")[:_LEADERS]], generator)
-        choices = [space.values(tuple(map(float, one))) for one in candidates]
-        free = [n for n, values in enumerate(choices) if tuple(texts(values).values()) not in taken]
+        snapped = (space.snapped(tuple(one)) for one in candidates.tolist())
+        free = [(n, written, shares) for n, (written, shares) in enumerate(snapped) if written not in taken]
         if not free:
             break
-        best = free[0]
+        index = 0
         if surrogate is not None:
-            driven = np.array([space.point(texts(choices[n])) for n in free])
+            driven = np.array([shares for _, _, shares in free])
             mean, deviation = surrogate.expect(driven)
             index = int(np.argmin(mean - _BOLDNESS[turn % len(_BOLDNESS)] * deviation))
-            best = free[index]
             surrogate = surrogate.believing(driven[index : index + 1])
-        found.append(choices[best])
-        taken.add(tuple(texts(choices[best]).values()))
+        best, written, _ = free[index]
+        found.append(space.values(tuple(candidates[best].tolist())))
+        taken.add(written)
     return found
 
 

@@ -40,6 +40,12 @@ _TABLES = (
     "number integer not null, outcome text not null, margin double precision, reason text not null, "
     "worker text not null, ended timestamptz not null default now(), primary key (study, point))",
 )
+_LATER = "alter table dodo_drive add column if not exists checks text not null default ''"
+"""The tables may have been made by a version that did not keep it; only their owner may alter them."""
+_HAS_LATER = (
+    "select count(*) from pg_attribute where attrelid = to_regclass('dodo_drive') and attname = 'checks' "
+    "and not attisdropped"
+)
 
 
 class StorageProblem(Exception):
@@ -78,6 +84,8 @@ class SharedStore:
             if self._one("select to_regclass('dodo_study')") is None:
                 for table in _TABLES:
                     self._ask(table)
+            if self._one(_HAS_LATER) == 0:
+                self._ask(_LATER)
             self._ask(
                 "insert into dodo_study (name, test, key) values (%s, %s, %s) on conflict do nothing", name, test, key
             )
@@ -95,7 +103,7 @@ class SharedStore:
     def known(self, points: Sequence[Mapping[str, str]]) -> Sequence[Drive | None]:
         by_text = {point_text(values): values for values in points}
         if missing := [text for text in by_text if text not in self._drives]:
-            columns = "point, number, outcome, margin, reason"
+            columns = "point, number, outcome, margin, reason, checks"
             with self._told():
                 rows = self._ask(
                     f"select {columns} from dodo_drive where study = %s and point = any(%s)",  # noqa: S608
@@ -119,10 +127,10 @@ class SharedStore:
     def add(self, drive: Drive) -> None:
         with self._told():
             self._ask(
-                "insert into dodo_drive (study, point, number, outcome, margin, reason, worker) "
-                "values (%s, %s, %s, %s, %s, %s, %s) on conflict do nothing",
+                "insert into dodo_drive (study, point, number, outcome, margin, reason, checks, worker) "
+                "values (%s, %s, %s, %s, %s, %s, %s, %s) on conflict do nothing",
                 *(self._study, point_text(drive.values), drive.number, drive.outcome, drive.margin),
-                *(_storable(drive.reason), self._worker),
+                *(_storable(drive.reason), drive.checks, self._worker),
             )
             self._ask("select pg_advisory_unlock(%s)", self._lock(drive.values))
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.source import Mapping, Scalar, resolve
@@ -33,25 +34,52 @@ class Space:
         """Where values lie, by their texts: the middle of the shares that become whole numbers and values of lists."""
         return tuple(self._share(one, texts[one.name]) for one in self.ranges)
 
+    def snapped(self, point: Point) -> tuple[tuple[str, ...], Point]:
+        """The texts of the ``values`` at a point, and the ``point`` of these, in less time than by both."""
+        written, shares = [], []
+        for one, share in zip(self.ranges, point, strict=True):
+            if one.is_list:
+                text = _listed(one, share).text
+                shares.append(self._share(one, text))
+            else:
+                number = self._number(one, share)
+                text = text_of(one, number)
+                shares.append(self._share_of(one, number))
+            written.append(text)
+        return tuple(written), tuple(shares)
+
+    @cached_property
+    def _numbers(self) -> dict[str, tuple[Decimal, Decimal, Decimal]]:
+        """Both ends and the resolution of each range of numbers: they are needed for each of thousands of points."""
+        found = {}
+        for one in self.ranges:
+            if not one.is_list:
+                low, high = (one.number(end.text) for end in one.ends)
+                found[one.name] = low, high, step_of(one)
+        return found
+
     def _share(self, one: Range, text: str) -> float:
         if one.is_list:
             return ([end.text for end in one.ends].index(text) + 0.5) / len(one.ends)
-        low, high = (one.number(end.text) for end in one.ends)
+        return self._share_of(one, one.number(text))
+
+    def _share_of(self, one: Range, number: Decimal) -> float:
+        low, high, _ = self._numbers[one.name]
         if one.name in self.whole:
             first, last = math.ceil(low), math.floor(high)
-            return float((one.number(text) - first) + Decimal("0.5")) / (last - first + 1)
-        return float((one.number(text) - low) / (high - low))
+            return float((number - first) + Decimal("0.5")) / (last - first + 1)
+        return float((number - low) / (high - low))
 
     def _value(self, one: Range, share: float) -> Scalar:
-        if one.is_list:
-            return one.ends[int(min(share, _LAST) * len(one.ends))]
-        low, high = (one.number(end.text) for end in one.ends)
+        return _listed(one, share) if one.is_list else scalar(one, self._number(one, share))
+
+    def _number(self, one: Range, share: float) -> Decimal:
+        low, high, step = self._numbers[one.name]
         if one.name in self.whole:
             first, last = math.ceil(low), math.floor(high)
-            return scalar(one, Decimal(first + int(min(share, _LAST) * (last - first + 1))))
-        step = step_of(one)
+            return Decimal(first + int(min(share, _LAST) * (last - first + 1)))
         number = ((low + (high - low) * Decimal(share)) / step).to_integral_value() * step
-        return scalar(one, min(max(number, low), high))
+        return min(max(number, low), high)
 
 
 def step_of(one: Range) -> Decimal:
@@ -62,8 +90,16 @@ def step_of(one: Range) -> Decimal:
 
 def scalar(one: Range, number: Decimal) -> Scalar:
     """A number of a range as an author writes it."""
-    text = f"{quantity.decimal_text(number)} {one.unit}".strip()
+    text = text_of(one, number)
     return Scalar(one.nominal.span, resolve(text), text)
+
+
+def text_of(one: Range, number: Decimal) -> str:
+    return f"{quantity.decimal_text(number)} {one.unit}".strip()
+
+
+def _listed(one: Range, share: float) -> Scalar:
+    return one.ends[int(min(share, _LAST) * len(one.ends))]
 
 
 def texts(values: Values) -> dict[str, str]:

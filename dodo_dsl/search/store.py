@@ -12,9 +12,12 @@ FILE_NAME = "search.sqlite"
 _TABLES = """
 create table if not exists study (key text not null);
 create table if not exists drives (
-    point text primary key, number integer not null, outcome text not null, margin real, reason text not null
+    point text primary key, number integer not null, outcome text not null, margin real, reason text not null,
+    checks text not null default ''
 );
 """
+_LATER = "alter table drives add column checks text not null default ''"
+"""For a file of before; it was written by a version that did not keep it."""
 
 
 class OtherSearch(Exception):
@@ -27,7 +30,8 @@ class OtherSearch(Exception):
 class Drive:
     """What became of a test at some values; ``number`` counts drives in the order in which they were asked for.
 
-    ``margin`` is the least of its checks, from -1 to 1, negative where it failed; None for an error.
+    ``margin`` is the least of its checks, from -1 to 1, negative where it failed; None for an error. ``checks`` are the
+    names of those that failed, with commas.
     """
 
     number: int
@@ -35,6 +39,7 @@ class Drive:
     outcome: str
     margin: float | None
     reason: str
+    checks: str = ""
 
 
 class Store(Protocol):
@@ -71,6 +76,8 @@ class FileStore:
         try:
             self._connection = sqlite3.connect(self._path)
             self._connection.executescript(_TABLES)
+            if "checks" not in {row[1] for row in self._connection.execute("pragma table_info(drives)")}:
+                self._connection.execute(_LATER)
             found = self._connection.execute("select key from study").fetchone()
         except sqlite3.Error as error:
             raise OtherSearch(f"'{self._path}' cannot be used: {error}") from error
@@ -86,12 +93,12 @@ class FileStore:
     def add(self, drive: Drive) -> None:
         with self._told(), self._connection:
             self._connection.execute(
-                "insert or ignore into drives values (?, ?, ?, ?, ?)",
-                (point_text(drive.values), drive.number, drive.outcome, drive.margin, drive.reason),
+                "insert or ignore into drives values (?, ?, ?, ?, ?, ?)",
+                (point_text(drive.values), drive.number, drive.outcome, drive.margin, drive.reason, drive.checks),
             )
 
     def get(self, values: Mapping[str, str]) -> Drive | None:
-        columns = "number, outcome, margin, reason"
+        columns = "number, outcome, margin, reason, checks"
         with self._told():
             found = self._connection.execute(f"select {columns} from drives where point = ?", (point_text(values),))  # noqa: S608
             row = found.fetchone()

@@ -47,7 +47,7 @@ def main() -> int:
     flags = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     if not flags.model.is_file():
-        print(f"driver: there is no file '{flags.model}': train.py writes it", file=sys.stderr)
+        print(f"driver: '{flags.model}' is missing: train.py writes it", file=sys.stderr)
         return 2
     with np.load(flags.model, allow_pickle=False) as model:
         weights = model["weights"]

@@ -1,5 +1,8 @@
 """``dodo list`` shows what there is, whatever is wrong with some of it."""
 
+import shlex
+import subprocess
+import sys
 from io import StringIO
 from pathlib import Path
 
@@ -40,8 +43,22 @@ def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch
 def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
     code, out, _ = dodo("list", "--services", "collision")
     assert code == 0
+    assert "  fovy: number, default 48.8 deg; 1 to 170\n" in dodo("list", "--services", "virtual-camera")[1]
     assert "  map-path: path, required unless another service of the test provides it\n" in out
     assert "  message: message, required\n" in dodo("list", "--services", "continuous-signal")[1]
+
+
+def test_a_service_s_command_works_outside_the_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert dodo("list", "--services", "integrator")[1].splitlines()[-1].startswith("standalone: python -m services.")
+    monkeypatch.chdir(tmp_path)
+    line = dodo("list", "--services", "integrator")[1].splitlines()[-1].removeprefix("standalone: ")
+    variable, python, *words = shlex.split(line)
+    assert python == "python"
+    environment = dict([variable.split("=", 1)])
+    done = subprocess.run(
+        [sys.executable, *words, "--help"], capture_output=True, text=True, env=environment, check=True
+    )
+    assert "python -m services.integrator" in done.stdout
 
 
 def test_only_the_tests_that_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,15 +19,25 @@ def test_every_command_has_help_with_examples(command: str, capsys: pytest.Captu
     assert (about.load().__doc__ or "").startswith(f"dodo {command}: {about.summary}.")
 
 
+def loaded(*words: str) -> set[str]:
+    """The modules that a command loads, in a process of its own."""
+    code = f"import io, sys; from dodo_dsl.cli.main import main; main({list(words)}, io.StringIO(), io.StringIO()); "
+    code += "print(list(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(ast.literal_eval(done.stdout.splitlines()[-1]))
+
+
 def test_help_loads_no_command() -> None:
     """What every command needs is loaded, and nothing of what one of them does."""
-    shown = "import sys; from dodo_dsl.cli.main import main; main(['--help'], sys.stdout, sys.stderr); "
-    shown += "print([name for name in sys.modules if name.startswith('dodo_dsl.') or name in ('numpy', 'jinja2')])"
-    done = subprocess.run([sys.executable, "-c", shown], capture_output=True, text=True, check=True)
-    loaded = set(ast.literal_eval(done.stdout.splitlines()[-1]))
-    assert loaded <= {
+    found = {name for name in loaded("--help") if name.startswith("dodo_dsl.") or name in ("numpy", "jinja2")}
+    assert found <= {
         f"dodo_dsl.{name}" for name in ("cli", "cli.arguments", "cli.errors", "cli.exits", "cli.main", "terminal")
     }
+
+
+def test_a_list_loads_nothing_of_plans() -> None:
+    parts = ("dodo_dsl.plan", "dodo_dsl.emit", "dodo_dsl.run", "dodo_dsl.report", "jinja2", "numpy")
+    assert [name for name in loaded("list", "--services") if name.startswith(parts)] == []
 
 
 @pytest.mark.parametrize("words", [[], ["lst"], ["run", "--jobs"], ["rec", "info"]])

@@ -19,9 +19,9 @@ from services.dynamic_model.model import Vehicle
 from services.integrator.model import BodyPose as Attitude
 from services.integrator.model import Integrator, Twist
 from services.integrator.rotation import quaternion
-from services.virtual_camera.camera import CameraPose
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import load_scene
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 MAPS = ROOT / "tests_registry" / "maps"

@@ -1,8 +1,10 @@
 """What drives say: rates with intervals, influences and reasons."""
 
+from dataclasses import replace
+
 import pytest
 
-from dodo_dsl.search.findings import find, interval, kind_of
+from dodo_dsl.search.findings import find, interval, is_alike, kind_of
 from dodo_dsl.search.store import Drive
 from tests.search.test_space import space
 
@@ -53,3 +55,18 @@ def test_nothing_judged() -> None:
 
 def test_reasons_differ_by_words_only() -> None:
     assert kind_of("hit left at (-1.25, 3) after 7 s") == "hit left at (#, #) after # s"
+
+
+def test_the_same_failed_checks_make_drives_alike() -> None:
+    """The reason decides only where no check failed, as of a crash."""
+    left, right = (drive(1, "1 m", "a", "failed", -0.1, f"hit wall {side} after 2 s") for side in ("left", "right"))
+    assert not is_alike(left, right)
+    left, right = (replace(one, checks="to-goal,wall-margin") for one in (left, right))
+    assert is_alike(left, right)
+    assert not is_alike(left, replace(right, outcome="passed"))
+    assert not is_alike(left, replace(left, checks="to-goal"))
+    assert is_alike(left, replace(left, checks="")), "of a version that did not keep them"
+    assert not is_alike(left, replace(right, checks=""))
+    crash = drive(2, "1 m", "a", "failed", -1.0, "'steering' ended with exit code 1 after 3 s")
+    assert is_alike(crash, replace(crash, reason="'steering' ended with exit code 1 after 4 s"))
+    assert not is_alike(crash, left) and not is_alike(left, crash)

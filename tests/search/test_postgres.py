@@ -13,7 +13,7 @@ from dodo_dsl.search.postgres import AddressProblem, StorageProblem, opened
 from dodo_dsl.search.store import Drive, OtherSearch
 from tests.search.database import Database, served
 
-DRIVE = Drive(3, {"x": "1 m", "m": "ä"}, "failed", -0.1, "hit wall")
+DRIVE = Drive(3, {"x": "1 m", "m": "ä"}, "failed", -0.1, "hit wall", "wall-margin")
 PARTS = ("name", "test", "key")
 
 
@@ -39,6 +39,17 @@ def test_drives_stay(address: str) -> None:
         assert store.known([{"x": "2 m"}, {"m": "ä", "x": "1 m"}]) == [None, DRIVE]
     with opened(address, "other", "test", "other key") as store:
         assert store.get(DRIVE.values) is None
+
+
+@pytest.mark.slow
+def test_tables_of_an_earlier_version_go_on(address: str, database: Database) -> None:
+    with opened(address, *PARTS) as store:
+        store.add(DRIVE)
+    database.sql("alter table dodo_drive drop column checks")
+    with opened(address, *PARTS) as store:
+        assert store.get(DRIVE.values) == replace(DRIVE, checks="")
+        store.add(other := replace(DRIVE, values={"x": "2 m"}))
+        assert store.get(other.values) == other
 
 
 @pytest.mark.slow

@@ -41,6 +41,12 @@ def test_the_point_of_values_has_these_values(point: tuple[float, ...]) -> None:
     assert texts(ONE.values(ONE.point(values))) == values
 
 
+@given(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)))
+def test_a_point_is_snapped_to_its_values(point: tuple[float, ...]) -> None:
+    values = texts(ONE.values(point))
+    assert ONE.snapped(point) == (tuple(values.values()), ONE.point(values))
+
+
 def test_bare_numbers_are_numbers_of_the_spec() -> None:
     assert ONE.values((0.5, 0.5, 0.5))["n"].value == 2
     assert space("{e: {from: 0.3, to: 2, nominal: 1}}").values((0.25,))["e"].value == 0.725

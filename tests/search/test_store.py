@@ -2,6 +2,7 @@
 
 import contextlib
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,17 @@ def test_the_first_drive_at_some_values_stays(tmp_path: Path) -> None:
         store.add(DRIVE)
         store.add(Drive(4, DRIVE.values, "passed", 1.0, ""))
         assert store.get(DRIVE.values) == DRIVE
+
+
+def test_a_file_of_an_earlier_version_goes_on(tmp_path: Path) -> None:
+    with opened(tmp_path, "key") as store:
+        store.add(replace(DRIVE, checks="wall-margin"))
+    with contextlib.closing(sqlite3.connect(tmp_path / FILE_NAME)) as file, file:
+        file.execute("alter table drives drop column checks")
+    with opened(tmp_path, "key") as store:
+        assert store.get(DRIVE.values) == DRIVE
+        store.add(other := Drive(4, {"x": "2 m", "m": "ä"}, "failed", -0.1, "hit wall", "wall-margin"))
+        assert store.get(other.values) == other
 
 
 def test_another_study_is_refused(tmp_path: Path) -> None:

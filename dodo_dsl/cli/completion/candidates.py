@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment.rig import EMULATED_RIGS
 from dodo_dsl.spec.registry import SUFFIX, locate
 
 
@@ -32,7 +33,7 @@ def services(**_: Any) -> list[str]:
 
 
 def rigs(**_: Any) -> list[str]:
-    return sorted({*_deployment().rigs, "emulated"})
+    return sorted({*_deployment().rigs, *EMULATED_RIGS})
 
 
 def _deployment() -> Deployment:

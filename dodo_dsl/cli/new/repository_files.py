@@ -12,6 +12,8 @@ _SCHEMAS = ".dodo"
 _PROCESSES = {"python": "python, steering.py", "cpp": "build/steering"}
 LANGUAGES = tuple(_PROCESSES)
 """Of the application that ``dodo new --application`` writes."""
+PIPELINES = ("application", "deployment", "run")
+"""The templates for GitLab, each of them a component in its folder."""
 _SPEC_SCHEMA = "dodo.schema.json"
 
 
@@ -29,6 +31,11 @@ def schema_of_specs(root: Path) -> Path:
 def missing_schemas(root: Path) -> list[New]:
     """The schemas for editors, as far as the repository lacks them."""
     return [] if schema_of_specs(root).is_file() else [file for file in _schemas(root) if not file.path.exists()]
+
+
+def pipeline_template(name: str) -> bytes:
+    """The text of one of ``PIPELINES``."""
+    return (package_data.templates() / name / "template.yml").read_bytes()
 
 
 def _schemas(root: Path) -> list[New]:
@@ -57,13 +64,12 @@ def deployment_files(root: Path, *, images: bool = False) -> list[New]:
     With ``images`` the pipeline builds them, as the application has to be built.
     """
     application = compose_file(root) or COMPOSE_FILES[0]
-    pipelines = sorted((package_data.templates() / "gitlab").iterdir())
     return [
         dodo_yml(root, application),
         New(root / application, filled("deployment/docker-compose.yml")),
         New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
         New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", images=images)),
-        *(New(root / ".gitlab" / "dodo" / path.name, path.read_bytes()) for path in pipelines),
+        *(New(root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml", pipeline_template(name)) for name in PIPELINES),
         *_schemas(root),
         New(root / ".gitignore", filled("deployment/gitignore", builds=images)),
     ]

@@ -9,22 +9,22 @@ from dodo_dsl.terminal import json_text, printable
 VERSION = 1
 METHOD = (
     "score: mean over the tests, of each the mean over its runs, 0 for one that failed; "
-    "interval: 95 % by Student's t from repeated runs; failed tests rank below everything"
+    "interval: 95 % by Student's t from repeated or sampled runs; failed tests rank below everything"
 )
-_HEAD = ("rank", "team", "score", "95 % interval", "failed", "no answer", "runs")
+HEAD = ("rank", "team", "score", "95 % interval", "failed", "no answer", "runs")
 
 
 def as_text(ranking: Sequence[Ranked]) -> str:
     """A table, and how it is made."""
-    rows = [_HEAD, *(_cells(each) for each in ranking)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
+    rows = [HEAD, *(cells(each) for each in ranking)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
     lines = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
     return "\n".join([*lines, "", METHOD]) + "\n"
 
 
 def as_markdown(ranking: Sequence[Ranked]) -> str:
     """The same table for a page."""
-    rows = [_HEAD, ("---",) * len(_HEAD), *(tuple(map(_escaped, _cells(each))) for each in ranking)]
+    rows = [HEAD, ("---",) * len(HEAD), *(tuple(map(_escaped, cells(each))) for each in ranking)]
     return "\n".join([*(f"| {' | '.join(row)} |" for row in rows), "", METHOD]) + "\n"
 
 
@@ -56,7 +56,8 @@ def _document(ranked: Ranked) -> dict[str, Any]:
     }
 
 
-def _cells(ranked: Ranked) -> tuple[str, ...]:
+def cells(ranked: Ranked) -> tuple[str, ...]:
+    """What a table says of a team, under HEAD."""
     team = ranked.team
     interval = "single runs" if team.interval is None else f"{team.interval[0]:.3f} to {team.interval[1]:.3f}"
     tests = team.tests.values()

@@ -1,4 +1,4 @@
-"""Scores of teams from their results, with intervals from repeated runs."""
+"""Scores of teams from their results, with intervals from repeated or sampled runs."""
 
 import math
 import re
@@ -13,6 +13,7 @@ from dodo_dsl.spec.goals import Goal
 LEVEL = 0.95
 """Of the intervals."""
 _REPETITION = re.compile(r"(?:\[(?:run|report)=\d+\])+\Z")
+_SAMPLE = re.compile(r"(\[|,)sample=\d+,.*\]\Z")
 _DIGITS = 12
 
 
@@ -59,8 +60,8 @@ class Ranked:
 
 
 def test_name(outcome: Outcome) -> str:
-    """The instance's name, without the number of a repeated run."""
-    return _REPETITION.sub("", outcome.name)
+    """The instance's name, without the number of a repeated run or the sample of its ranges."""
+    return _SAMPLE.sub(lambda found: "]" if found[1] == "," else "", _REPETITION.sub("", outcome.name))
 
 
 def run_score(outcome: Outcome) -> float:

@@ -21,10 +21,10 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
     if options.action == "export":
         from dodo_dsl.cli.rec import datasets
 
-        options.file = _only_one(options) if not datasets.is_data_set(options) else options.files[0]
         if datasets.is_data_set(options):
             datasets.run(options, stdout, stderr)
             return
+        options.file = _only_one(options)
     path: Path = options.file
     with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
         recording = Recording(path, progress)

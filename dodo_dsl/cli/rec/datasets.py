@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
     files: Sequence[Path] = options.files
     if len(files) > 1 and options.output is None:
         raise NothingSelected("name the folder of the data set with -o")
-    folder: Path = options.output or options.file.with_suffix("")
+    folder: Path = options.output or files[0].with_suffix("")
     if folder.exists() and not folder.is_dir():
         raise NothingSelected(f"'{folder}' is not a folder; name one with -o")
     parts = split(files, options.validation, options.seed)
@@ -53,7 +53,7 @@ def _opened(path: Path, options: argparse.Namespace, stderr: TextIO) -> Iterator
         recording = Recording(path, progress)
     with recording:
         _, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
-        yield Job(options, recording, messages, stderr, stderr)
+        yield Job(options, recording, messages, stdout=stderr, stderr=stderr)
 
 
 def _no_progress(_: int) -> None:

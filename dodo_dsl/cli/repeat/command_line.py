@@ -22,6 +22,8 @@ def _flags(options: argparse.Namespace) -> Iterator[str]:
             yield f"{value:g}" if isinstance(value, float) else str(value)
     if options.repeat != 1:
         yield from ("--repeat", str(options.repeat))
+    if options.samples:
+        yield from ("--samples", str(options.samples))
     if options.retry_errors:
         yield from ("--retry-errors", str(options.retry_errors))
     if options.fail_fast:

@@ -27,7 +27,7 @@ def origin(options: argparse.Namespace, deployment: Deployment) -> Origin:
     """Of the options of ``dodo run``."""
     files = [] if options.compiled else [*(options.application or deployment.application)]
     application = {"application": files[0].resolve().parent} if files else {}
-    return Origin(command_line(options), {**application, "tests": (options.compiled or deployment.root).resolve()})
+    return Origin(command_line(options), {**application, "tests": (options.compiled or [deployment.root])[0].resolve()})
 
 
 @contextlib.contextmanager

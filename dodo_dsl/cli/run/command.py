@@ -46,6 +46,7 @@ EXAMPLES = """examples:
   dodo run 'sil-*' -j 4                        by pattern, four at a time
   dodo run --application ../app/docker-compose.yml --level sil
   dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
+  dodo run sil-closed-straight --samples 16    at 16 values of its ranges, the same ones for each --seed
   dodo run sil-closed-straight --watch         again whenever spec, map or application are saved
   dodo run -q                                  only what did not pass, and the counts
   dodo run --compiled generated/sil-closed-straight --report dodo-report
@@ -76,10 +77,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=seed, metavar="N", help="replaces the specs' seed")
     parser.add_argument("--repeat", type=positive, default=1, metavar="N", help="run every test N times")
+    parser.add_argument("--samples", type=positive, metavar="N",
+                        help="run each test with 'vary' at N values of its ranges")  # fmt: skip
     parser.add_argument("--fail-fast", action="store_true", help="start no further test after one that did not pass")
     parser.add_argument("--retry-errors", type=positive, nargs="?", const=1, default=0, metavar="N",
                         help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
-    parser.add_argument("--compiled", type=Path, metavar="DIR/SLUG", help="folder of a compiled test")
+    parser.add_argument("--compiled", type=Path, action="append", default=[], metavar="DIR/SLUG",
+                        help="folder of a compiled test; repeatable")  # fmt: skip
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
     parser.add_argument("--watch", action="store_true",
                         help="run again, in lockstep, what a saved file affects, and show the change")  # fmt: skip
@@ -166,7 +170,7 @@ def _backends(
         from dodo_dsl.run.docker.containers import Containers
         from dodo_dsl.run.mixed.backends import Mixed
 
-        if options.compiled and options.isolation not in (None, plans[0].isolation):
+        if options.compiled and any(options.isolation not in (None, plan.isolation) for plan in plans):
             raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
         containers = Containers(subnets(deployment.subnets), roots)
         return containers if backend == "docker" else Mixed(containers, (load.descriptor,), roots, load.take)
@@ -181,7 +185,7 @@ def _backends(
 
 def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:
     """The folders that the tests come from: the deployment's, and those of the command line."""
-    named = [options.compiled] if options.compiled else [Path(word) for word in options.test if Path(word).exists()]
+    named = options.compiled or [Path(word) for word in options.test if Path(word).exists()]
     return [deployment.root, *named]
 
 

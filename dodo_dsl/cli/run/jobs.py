@@ -3,6 +3,7 @@
 import argparse
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
@@ -16,6 +17,7 @@ from dodo_dsl.emit.output_folder import PLAN_FILE, write
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
+from dodo_dsl.plan.pools import named
 from dodo_dsl.plan.runs import runs
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.rigs.attendance import is_real
@@ -26,18 +28,28 @@ from dodo_dsl.spec.settings import Settings
 def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
     """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
     settings = Settings(options.clock, options.isolation, options.seed, options.wall_timeout, options.repeat)
+    tests: dict[str, str] = {}
     if options.compiled:
-        if options.test or options.level or options.application:
-            raise UsageError("--compiled runs a test as it was compiled: TEST, --level and --application do not apply")
-        plans, deployment = [load_compiled(options.compiled, settings)], _deployment(stdout)
-        folders = {plans[0].slug: options.compiled.resolve()}
+        if options.test or options.level or options.application or options.samples:
+            raise UsageError(
+                "--compiled runs a test as it was compiled: TEST, --level, --samples and --application do not apply"
+            )
+        plans, deployment = [load_compiled(folder, settings) for folder in options.compiled], _deployment(stdout)
+        folders = {plan.slug: path.resolve() for plan, path in zip(plans, options.compiled, strict=True)}
+        if len(folders) < len(plans):
+            raise UsageError("--compiled names two tests of one name, or one of them twice")
     else:
-        plans, deployment = compile_tests(options, settings, folder, stdout)
+        plans, deployment, tests = compile_tests(options, settings, folder, stdout, options.samples)
         folders = {plan.slug: folder / plan.slug for plan in plans}
-    report = _usable(options.report, [p.slug for p in plans])
-    return [
-        Job(run.plan, folders[run.test], report / run.plan.slug, run.test) for run in runs(plans, settings.repeat)
-    ], deployment
+    report = _usable(options.report, [named(p).slug for p in plans])
+    families = {plan.slug: tests.get(plan.slug, named(plan).slug) for plan in plans}
+    found: dict[str, Job] = {}
+    for run in runs(plans, settings.repeat):
+        plan = named(run.plan)
+        job = Job(plan, folders[run.test], report / plan.slug, families[run.test])
+        first = found.get(plan.slug)
+        found[plan.slug] = replace(first, others=(*first.others, job)) if first else job
+    return list(found.values()), deployment
 
 
 def load_compiled(folder: Path, settings: Settings) -> Plan:
@@ -94,9 +106,12 @@ def _kept_clock(names: Sequence[str]) -> str:
 
 
 def compile_tests(
-    options: argparse.Namespace, settings: Settings, folder: Path, stdout: TextIO
-) -> tuple[list[Plan], Deployment]:
-    """The Plans of the tests that ``options`` select, compiled into ``folder``; raises UsageError."""
+    options: argparse.Namespace, settings: Settings, folder: Path, stdout: TextIO, samples: int | None = None
+) -> tuple[list[Plan], Deployment, dict[str, str]]:
+    """The Plans of the tests that ``options`` select, compiled into ``folder``; raises UsageError.
+
+    With ``samples`` those of tests with ranges at so many of their values, and the slug of each one's test by its own.
+    """
     checked = selection.select(options.test, options.level, options.application, settings)
     stdout.write(selection.left_out(checked))
     if not checked.specs:
@@ -106,6 +121,11 @@ def compile_tests(
     if not checked.ok:
         write_diagnostics(stdout, checked.diagnostics)
         raise UsageError("the tests above cannot be compiled")
+    tests: dict[str, str] = {}
+    if samples:
+        from dodo_dsl.cli.run.samples import sample
+
+        checked, tests = sample(checked, samples)
     try:
         made = plan(checked, folder)
     except NoApplication:
@@ -115,4 +135,4 @@ def compile_tests(
     if has_errors(problems):
         raise UsageError("the tests above cannot be compiled")
     write(made.compiled, made.pipeline, folder)
-    return list(made.compiled.suite.plans), checked.deployment
+    return list(made.compiled.suite.plans), checked.deployment, tests

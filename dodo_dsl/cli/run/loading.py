@@ -8,7 +8,7 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 
 _WITHOUT = {"-h", "--help", "docker", "--backend=docker", "host", "--isolation=host"}
 """Words of commands that hardly need one; a test of such a name only begins later."""

@@ -1,9 +1,10 @@
 """The course of a search: generation after generation driven, until all are done or time is over."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from dodo_dsl.cli.search.drives import Drives
+from dodo_dsl.cli.search.drives import Drives, repeated
+from dodo_dsl.search.findings import is_alike
 from dodo_dsl.search.itinerary import FIRST, Candidate, Itinerary, key
 from dodo_dsl.search.space import nominal, texts
 from dodo_dsl.search.store import Drive, Store
@@ -14,7 +15,8 @@ from dodo_dsl.spec.instances.vary import Values
 class Course:
     """Follows an itinerary; ``done`` are the candidates that were driven, in their order.
 
-    ``until_failure`` is whether it ends after the few drives of which one has failed.
+    ``until_failure`` is whether it ends after the few drives of which one has failed, and fails again. A drive that
+    failed and did not when it was repeated has no outcome: its application may have got no processor.
     """
 
     itinerary: Itinerary
@@ -32,6 +34,8 @@ class Course:
                 batch = generation[begin : begin + size]
                 try:
                     await drives.drive([one.values for one in batch], 1 + len(self.done))
+                    if self.until_failure:
+                        await self._repeat_failures(drives, batch)
                 finally:
                     self._take(batch, margins)
                 if any(key(one.values) not in margins for one in batch) or self.ended_early:
@@ -42,8 +46,27 @@ class Course:
         """Whether a failure ended it."""
         return self.until_failure and bool(self.failed())
 
+    async def _repeat_failures(self, drives: Drives, batch: Sequence[Candidate]) -> None:
+        for number, one in enumerate(batch, 1 + len(self.done)):
+            if (drive := self._drive(one.values)) and drive.outcome == "failed":
+                await drives.drive([one.values], number, 2)
+
+    def _drive(self, values: Values) -> Drive | None:
+        """The drive at some values, in error where it failed once and not again."""
+        drive = self.store.get(texts(values))
+        if drive is None or drive.outcome != "failed":
+            return drive
+        again = self.store.get(repeated(values, 2))
+        if again is None or is_alike(drive, again):
+            return drive
+        return replace(drive, outcome="error", margin=None, reason=f"failed once and not again: {drive.reason}")
+
     def _take(self, batch: Sequence[Candidate], margins: dict[tuple[str, ...], float | None]) -> None:
-        """What is known of the candidates, up to the first that was not driven."""
+        """What is known of the candidates, up to the first that was not driven.
+
+        Margins are those of their first drives, whatever is repeated later, so that each search at the same values
+        takes the same way.
+        """
         for one in batch:
             drive = self.store.get(texts(one.values))
             if drive is None:
@@ -53,7 +76,7 @@ class Course:
 
     def failed(self) -> list[tuple[Values, Drive]]:
         """The drives that failed, with their values."""
-        drives = ((one.values, self.store.get(texts(one.values))) for one in self.done)
+        drives = ((one.values, self._drive(one.values)) for one in self.done)
         return [(values, drive) for values, drive in drives if drive and drive.outcome == "failed"]
 
     def known(self, swept: bool) -> list[Drive]:
@@ -63,5 +86,5 @@ class Course:
     def _known(self, swept: bool) -> Iterator[Drive]:
         chosen = {key(one.values): one.values for one in self.done if one.swept is swept}
         for values in chosen.values():
-            if drive := self.store.get(texts(values)):
+            if drive := self._drive(values):
                 yield drive

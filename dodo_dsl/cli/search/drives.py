@@ -15,7 +15,7 @@ from dodo_dsl.cli.run.uninterrupted import stop_like_interrupt
 from dodo_dsl.cli.search.progress import SearchProgress
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.emit.output_folder import write
-from dodo_dsl.margins import worst_margin
+from dodo_dsl.margins import failed_checks, worst_margin
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job, Say
@@ -49,6 +49,8 @@ class Kept:
         self._backends = backends
         self.name = backends.name
         self._is_prepared = False
+        self.opened = 0
+        """How many attempts at tests began."""
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
         if not self._is_prepared:
@@ -62,6 +64,7 @@ class Kept:
         self._backends.close()
 
     def open(self, job: Job, say: Say, keep: bool) -> AbstractAsyncContextManager[Backend]:
+        self.opened += 1
         return self._backends.open(job, say, keep)
 
 
@@ -111,7 +114,7 @@ class Drives:
                 continue
             self._counted.add(point)
             if drive:
-                self.progress.count(drive)
+                self.progress.count(drive, repeat)
             else:
                 missing[number] = values
         is_long = self.deadline is None and not self.store.is_shared
@@ -154,13 +157,13 @@ class Drives:
             number = by_slug[outcome.slug]
             margin = worst_margin(outcome)
             point = repeated(candidates[number], repeat)
-            drive = Drive(number, point, outcome.outcome, margin, outcome.reason)
+            drive = Drive(number, point, outcome.outcome, margin, outcome.reason, ",".join(failed_checks(outcome)))
             self.store.add(drive)
             if outcome.outcome == "passed":
                 shutil.rmtree(jobs[number].report, ignore_errors=True)
             return drive
 
-        self.progress.take = take
+        self.progress.take, self.progress.repeat = take, repeat
         await runner.run(list(jobs.values()))
         end_like_interrupt()
         shutil.rmtree(folder, ignore_errors=True)

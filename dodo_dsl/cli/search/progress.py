@@ -14,7 +14,8 @@ from dodo_dsl.terminal import printable, unescaped
 class SearchProgress:
     """Shows each drive in a line, or in one that moves on a terminal; ``take`` makes a drive of each outcome.
 
-    ``total`` drives are wanted; without it the search ends by time, at ``deadline`` of the monotonic clock.
+    ``total`` drives are wanted; without it the search ends by time, at ``deadline`` of the monotonic clock. ``repeat``
+    is 1 while drives are the first ones at their values.
     """
 
     def __init__(self, stream: TextIO, total: int | None, deadline: float | None) -> None:
@@ -24,6 +25,7 @@ class SearchProgress:
         self._worst: float | None = None
         self._status = _status(stream) if stream.isatty() else None
         self.take: Callable[[Outcome], Drive | None] = lambda _: None
+        self.repeat = 1
 
     def __enter__(self) -> Self:
         return self
@@ -53,13 +55,15 @@ class SearchProgress:
         drive = self.take(outcome)
         if drive is not None:
             self._driven += 1
-            self.count(drive)
+            self.count(drive, self.repeat)
             self._show(drive)
 
-    def count(self, drive: Drive) -> None:
-        """Counts a drive, also one of an earlier command."""
+    def count(self, drive: Drive, repeat: int = 1) -> None:
+        """Counts a drive, also one of an earlier command; one that repeats another is no further failure."""
+        if repeat > 1:
+            self._total = self._total and self._total + 1
         self._done += 1
-        self._failed += drive.outcome == "failed"
+        self._failed += drive.outcome == "failed" and repeat == 1
         if drive.margin is not None:
             self._worst = drive.margin if self._worst is None else min(self._worst, drive.margin)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.cli.search.drives import Drives, repeated
-from dodo_dsl.search.findings import Failure, Shrunk, kind_of
+from dodo_dsl.search.findings import Failure, Shrunk, is_alike, kind_of
 from dodo_dsl.search.regression import name_of, text_of
 from dodo_dsl.search.shrink import changed, nearest, shrink
 from dodo_dsl.search.space import Space, texts
@@ -16,7 +16,8 @@ from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.spec.registry import SUFFIX
 
 _REPEATS = 3
-MOST_KINDS = 5
+MOST_KINDS, MOST_TRIED = 5, 3
+"""Kinds of failures that are shrunk, and drives of a kind that are repeated to find one that fails again."""
 FOLDER, TESTS = "shrinking", "failures"
 
 
@@ -38,18 +39,33 @@ class Shrinker:
             of_kind = {
                 drive.number: (values, drive) for values, drive in failed if kind_of(drive.reason) == failure.kind
             }
-            first = nearest(self.space, [drive for _, drive in of_kind.values()])
-            values = await self._shrunk(of_kind[first.number][0], failure.kind)
-            self.found.append(await self._confirmed(values, failure.kind))
+            first = await self._first(of_kind)
+            if first is None:
+                continue
+            values = await self._shrunk(of_kind[first.number][0], first)
+            if texts(values) not in [one.values for one in self.found]:
+                self.found.append(await self._confirmed(values))
         shutil.rmtree(self.drives.report / FOLDER, ignore_errors=True)
 
-    async def _shrunk(self, values: Values, kind: str) -> Values:
+    async def _first(self, failed: dict[int, tuple[Values, Drive]]) -> Drive | None:
+        """The drive nearest to the nominal values that fails again; None where none of the MOST_TRIED nearest does."""
+        left = {number: drive for number, (_, drive) in failed.items()}
+        for _ in range(min(MOST_TRIED, len(left))):
+            drive = nearest(self.space, list(left.values()))
+            values = failed[drive.number][0]
+            await self._drive([values], 2)
+            if self._fails(values, drive, 2):
+                return drive
+            del left[drive.number]
+        return None
+
+    async def _shrunk(self, values: Values, first: Drive) -> Values:
         steps = shrink(self.space, values)
         try:
             asked = next(steps)
             while True:
                 await self._drive(asked)
-                asked = steps.send([self._fails(one, kind) for one in asked])
+                asked = steps.send([self._fails(one, first) for one in asked])
         except StopIteration as end:
             shrunk: Values = end.value
             return shrunk
@@ -58,19 +74,19 @@ class Shrinker:
         await self.drives.drive(candidates, self.number, repeat)
         self.number += len(candidates)
 
-    def _fails(self, values: Values, kind: str, repeat: int = 1) -> bool:
+    def _fails(self, values: Values, like: Drive, repeat: int = 1) -> bool:
         drive = self.drives.store.get(repeated(values, repeat))
-        return drive is not None and drive.outcome == "failed" and kind_of(drive.reason) == kind
+        return drive is not None and is_alike(like, drive)
 
-    async def _confirmed(self, values: Values, kind: str) -> Shrunk:
+    async def _confirmed(self, values: Values) -> Shrunk:
         for repeat in range(2, _REPEATS + 1):
             await self._drive([values], repeat)
-        failed = sum(self._fails(values, kind, repeat) for repeat in range(1, _REPEATS + 1))
         drive = self.drives.store.get(texts(values))
         assert drive is not None, "it was driven"
+        failed = sum(self._fails(values, drive, repeat) for repeat in range(1, _REPEATS + 1))
         names = changed(self.space, values)
         spec = self._write(values, names, drive.reason) if failed == _REPEATS else ""
-        return Shrunk(kind, drive.reason, texts(values), tuple(names), failed, _REPEATS, spec)
+        return Shrunk(kind_of(drive.reason), drive.reason, texts(values), tuple(names), failed, _REPEATS, spec)
 
     def _write(self, values: Values, names: Sequence[str], reason: str) -> str:
         """The name of the test that is written."""

@@ -52,7 +52,7 @@ def _rate(findings: Findings) -> Iterator[str]:
         share = f"{findings.proposed_failed} of {findings.proposed}"
         yield f"{share} further drives failed, where failures were expected: they do not count in this rate"
     if findings.errors:
-        yield f"{findings.errors} left out, as they ended in error twice:"
+        yield f"{findings.errors} left out, which ended in error twice, or failed once and not again:"
         yield from (printable(f"  {group.drives} x: {group.kind}") for group in findings.left_out)
 
 

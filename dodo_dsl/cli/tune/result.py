@@ -24,6 +24,10 @@ def document(course: TuneCourse) -> dict[str, Any]:
             {"values": texts(one.values), "margin": one.margin, "best": margin}
             for one, margin in zip(course.done, bests, strict=True)
         ],
+        "finals": {
+            "scenarios": [one.name for one in course.study.deciding],
+            "values": [{"values": texts(one.values), "margin": one.margin} for one in course.finals],
+        },
         "held_out": {
             "scenarios": [one.name for one in held_out],
             "default": [course.margin(first.values, [one]) for one in held_out],
@@ -43,6 +47,10 @@ def table(course: TuneCourse) -> Iterator[str]:
     for one in course.study.space.ranges:
         rows.append((one.name, first.values[one.name].text, best.values[one.name].text, one.text))
     rows.append((f"{'mean' if course.mean else 'worst'} margin", f"{first.margin:.3f}", f"{best.margin:.3f}", ""))
+    if course.finals:
+        chosen = max(one.margin for one in course.finals)
+        said = f"chosen among the best {len(course.finals)} with {len(course.study.deciding)} more samples"
+        rows.append(("of the finals", "", f"{chosen:.3f}", said))
     if held_out:
         before, after = (_shown(course.margin(one.values, held_out)) for one in (first, best))
         rows.append(("held out", before, after, f"{len(held_out)} samples that did not guide the tuning"))

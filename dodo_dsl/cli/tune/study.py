@@ -41,13 +41,22 @@ class Scenario:
 
 @dataclass(frozen=True)
 class TuneStudy:
-    """``key`` names what all drives have in common; ``held_out`` are scenarios that do not guide the tuning."""
+    """``key`` names what all drives have in common.
+
+    ``scenarios`` guide the tuning, ``deciding`` ones choose among the best of it, and ``held_out`` judge the choice.
+    """
 
     checked: Checked
     space: Space
     scenarios: tuple[Scenario, ...]
+    deciding: tuple[Scenario, ...]
     held_out: tuple[Scenario, ...]
     key: str
+
+    @property
+    def rigs(self) -> list[str]:
+        """Names of the rigs that it drives."""
+        return sorted({one.spec.rig for one in self.scenarios if one.spec.rig})
 
 
 def tune_study(options: argparse.Namespace, work: Path, stdout: TextIO) -> TuneStudy:
@@ -70,16 +79,15 @@ def tune_study(options: argparse.Namespace, work: Path, stdout: TextIO) -> TuneS
     told += sorted(f"{file.target} {hashlib.sha256(file.source.read_bytes()).hexdigest()}" for file in files)
     told += [text for n, one in enumerate(checked.specs) if one.ranges for text in digests(checked, one, work / str(n))]
     key = hashlib.sha256(json.dumps(told).encode()).hexdigest()
-    used, held_out = _scenarios(checked.tests, options.samples, options.seed)
-    return TuneStudy(checked, space, used, held_out, key)
+    return TuneStudy(checked, space, *_scenarios(checked.tests, options.samples, options.seed), key)
 
 
 def _refuse(space: Space, tests: Sequence[ResolvedTest], samples: int) -> None:
     if not space.ranges:
         raise UsageError("the application has no parameters to tune: write them under 'x-dodo: {tune: ...}'")
     for spec in (test.spec for test in tests):
-        if spec.clock != "lockstep":
-            raise UsageError(f"{spec.title} runs on hardware, which does not wait; tuning needs lockstep")
+        if spec.clock != "lockstep" and not spec.rig:
+            raise UsageError(f"{spec.title} is in real time and on no rig; tuning needs lockstep or a rig")
         if both := [one.name for one in space.ranges if one.name in spec.variables]:
             raise UsageError(f"{spec.title} sets '{both[0]}' itself, so it cannot be tuned there")
     if samples and not any(test.spec.ranges for test in tests):
@@ -88,18 +96,28 @@ def _refuse(space: Space, tests: Sequence[ResolvedTest], samples: int) -> None:
 
 def _scenarios(
     tests: Sequence[ResolvedTest], samples: int, seed: int
-) -> tuple[tuple[Scenario, ...], tuple[Scenario, ...]]:
-    """Each test at its nominal values and at samples of its ranges, and as many other samples."""
-    used: dict[str, Scenario] = {}
-    held_out: dict[str, Scenario] = {}
+) -> tuple[tuple[Scenario, ...], tuple[Scenario, ...], tuple[Scenario, ...]]:
+    """Each test at its nominal values and at samples of its ranges; then as many other samples to decide, and to judge.
+
+    No scenario is in two of them.
+    """
+    guiding: list[Scenario] = []
+    deciding: list[Scenario] = []
+    held_out: list[Scenario] = []
     for test in tests:
         points = _points(test, samples, seed)
-        for values in itertools.chain([vary.nominal(test.spec.ranges)], itertools.islice(points, samples)):
-            one = Scenario(test.spec, values)
-            used[one.name] = one
-        held_out |= {one.name: one for one in (Scenario(test.spec, values) for values in points)}
-    return tuple(used.values()), tuple(one for name, one in held_out.items() if name not in used)
+        guiding += [Scenario(test.spec, vary.nominal(test.spec.ranges)), *_next(test, points, samples)]
+        held_out += _next(test, points, samples)
+        deciding += _next(test, points, samples)
+    used = {one.name: one for one in guiding}
+    judging = {one.name: one for one in held_out if one.name not in used}
+    others = {one.name: one for one in deciding if one.name not in used and one.name not in judging}
+    return tuple(used.values()), tuple(others.values()), tuple(judging.values())
+
+
+def _next(test: ResolvedTest, points: Iterator[Values], number: int) -> list[Scenario]:
+    return [Scenario(test.spec, values) for values in itertools.islice(points, number)]
 
 
 def _points(test: ResolvedTest, samples: int, seed: int) -> Iterator[Values]:
-    return sweep(space_of(test), 2 * samples, seed) if samples and test.spec.ranges else iter(())
+    return sweep(space_of(test), 3 * samples, seed) if samples and test.spec.ranges else iter(())

@@ -1,6 +1,7 @@
 """Drives of tunings: tests with candidates' values as variables of the application, those of the store only once."""
 
 import itertools
+import math
 import re
 import shutil
 import time
@@ -18,6 +19,7 @@ from dodo_dsl.emit.output_folder import write
 from dodo_dsl.margins import worst_margin
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.backends import Job
+from dodo_dsl.run.rigs.attendance import RigSession
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.search.space import texts
@@ -29,6 +31,8 @@ _SCENARIO = "#scenario"
 """No name of a variable."""
 _ROUND = 4
 """Drives a core in a round."""
+_DISTANCE, _FASTEST, _TO_START = ("distance", "m"), 1.0, 2.4
+"""The check of how far a vehicle drove, the highest speed of a rig, in m/s, and the way across its table, in m."""
 _NUMBERED = re.compile(r"--run-([0-9]{1,9})$")
 
 Pair = tuple[Values, Scenario]
@@ -39,9 +43,16 @@ def point_of(candidate: Values, scenario: Scenario) -> dict[str, str]:
     return {**texts(candidate), _SCENARIO: scenario.name}
 
 
+class RigFailure(Exception):
+    """A test on a rig ended in error, which says nothing of the values; one sentence."""
+
+
 @dataclass
 class Trials:
-    """Drives scenarios with any values. ``work`` takes compiled tests, ``report`` what drives that did not pass say."""
+    """Drives scenarios with any values. ``work`` takes compiled tests, ``report`` what drives that did not pass say.
+
+    On rigs it drives one after the other, at most ``metres`` of way.
+    """
 
     checked: compiler.Checked
     store: Store
@@ -51,6 +62,10 @@ class Trials:
     work: Path
     report: Path
     deadline: float | None = None
+    metres: float = math.inf
+    way: float = 0.0
+    """What rigs drove at most, in m."""
+    session: RigSession = field(default_factory=RigSession)
     _number: int = 0
     """Of the next drive; those of an earlier call that did not pass, or that was killed, keep theirs."""
     _counted: set[str] = field(default_factory=set)
@@ -62,10 +77,10 @@ class Trials:
 
     @property
     def is_over(self) -> bool:
-        return self.deadline is not None and time.monotonic() >= self.deadline
+        return self.way >= self.metres or (self.deadline is not None and time.monotonic() >= self.deadline)
 
     async def drive(self, candidates: Sequence[Values], scenarios: Sequence[Scenario]) -> None:
-        """Drives each candidate in all scenarios, as far as time suffices. Raises Interrupted."""
+        """Drives each candidate in all scenarios, as far as time and way suffice. Raises Interrupted and RigFailure."""
         missing: list[Pair] = []
         for candidate, scenario in itertools.product(candidates, scenarios):
             point = point_of(candidate, scenario)
@@ -76,6 +91,8 @@ class Trials:
                 missing.append((candidate, scenario))
             self._counted.add(name)
         size = max(1, int(self.order.capacity)) * (_ROUND if self.deadline is None else 1)
+        if any(scenario.spec.rig for scenario in scenarios):
+            size = 1
         for batch in _batches(missing, size):
             if self.is_over:
                 break
@@ -89,10 +106,19 @@ class Trials:
         by_slug = {job.plan.slug: number for number, job in jobs.items()}
         runner = Runner(self.progress, self.backends, self.order, Policy(retries=RETRIES))
 
+        failures: list[str] = []
+        before = self.backends.opened
+
         def take(outcome: Outcome) -> Drive | None:
             if runner.interrupted:
                 return None
             number = by_slug[outcome.slug]
+            if rig := jobs[number].plan.rig:
+                self.way += (self.backends.opened - before) * _way(outcome)
+                if outcome.outcome == "error":
+                    failures.append(outcome.reason)
+                    return None
+                self.session.fit.add(rig)
             point = point_of(*numbered[number])
             drive = Drive(number, point, outcome.outcome, worst_margin(outcome), outcome.reason)
             self.store.add(drive)
@@ -106,6 +132,8 @@ class Trials:
         shutil.rmtree(folder, ignore_errors=True)
         if runner.interrupted:
             raise Interrupted
+        if failures:
+            raise RigFailure(failures[0])
 
     def _jobs(self, numbered: dict[int, Pair], folder: Path) -> dict[int, Job]:
         tests = {}
@@ -121,6 +149,13 @@ class Trials:
         slugs = {number: test.spec.slug for number, test in tests.items()}
         titles = {number: scenario.spec.slug for number, (_, scenario) in numbered.items()}
         return {n: Job(plans[slug], folder / slug, self.report / slug, titles[n]) for n, slug in slugs.items()}
+
+
+def _way(outcome: Outcome) -> float:
+    """What a rig drove at most in a test and to its start, in m; by the time where no check says it."""
+    said = [check["value"] for check in outcome.checks if (check["name"], check["unit"]) == _DISTANCE]
+    driven = [float(value) for value in said if value is not None]
+    return _TO_START + (max(driven) if driven else _FASTEST * (outcome.execution_s or 0.0))
 
 
 def _batches(pairs: Sequence[Pair], size: int) -> list[Sequence[Pair]]:

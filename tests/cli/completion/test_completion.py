@@ -48,7 +48,7 @@ def test_a_line_goes_on(line: str, words: list[str]) -> None:
 
 def test_names_of_services_rigs_and_instances() -> None:
     assert {"integrator", "virtual-camera"} <= set(candidates.services())
-    assert candidates.rigs() == ["emulated", "kiwi"]
+    assert candidates.rigs() == ["emulated", "emulated-circle", "kiwi"]
     assert {"sil-perception[light=1]", "sil-perception[light=1,"} <= set(candidates.tests("sil-perception[li"))
     both = ["sil-perception[light=1,clutter=0]", "sil-perception[light=1,clutter=60]"]
     assert candidates.tests("sil-perception[light=1,clu") == both

@@ -61,3 +61,14 @@ def test_what_cannot_be_compared_is_refused(teams: Path) -> None:
     assert code == 2 and "the goals of test 't' differ between the results of 'blue' and 'green'" in text
     Path("green", "results.json").write_text(results.to_json([]))
     assert ranked("green") == (2, "dodo rank: the results of team 'green' have no test\n")
+
+
+def test_a_page_has_the_table_and_a_bar_for_each_team(teams: Path) -> None:
+    code, page = ranked("blue", "red", "<b>=green", "--format", "html")
+    assert code == 0
+    assert page.count("<svg") == 3
+    assert "&lt;b&gt;" in page
+    assert "<b>" not in page
+    assert ">0.425, 1 of 2 failed<" in page
+    assert "0.186 to 1.000" in page
+    assert "script" not in page

@@ -55,6 +55,12 @@ def test_repeated_runs_are_of_one_test() -> None:
     assert ranked.team.interval is None
 
 
+def test_runs_at_samples_of_the_ranges_are_of_one_test() -> None:
+    names = ("t[sample=1,light=0.7]", "t[sample=2,light=1.1][run=2]", "u[x=1,sample=1,of=[a]]", "u[x=1,sample=2,of=b]")
+    (ranked,) = rank({"a": [run(10.0, name=name) for name in names]})
+    assert {name: len(test.scores) for name, test in ranked.team.tests.items()} == {"t": 2, "u[x=1]": 2}
+
+
 def test_runs_of_joined_reports_are_of_one_test() -> None:
     names = ("t", "t[report=2]", "t[run=2][report=2]")
     (ranked,) = rank({"a": [run(10.0, name=name) for name in names]})

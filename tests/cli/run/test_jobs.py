@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import shutil
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import parser
 from dodo_dsl.cli.run.jobs import prepare
+from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.backends import Job
 from dodo_dsl.spec.deployment.deployment import Deployment
@@ -48,6 +50,39 @@ def test_a_changed_clock_replaces_what_was_wrong_in_the_first(folder: Path) -> N
 def test_a_changed_isolation_is_checked_and_built(folder: Path) -> None:
     jobs, _ = prepared(folder, "--isolation", "host")
     assert (jobs[0].plan.isolation, jobs[0].plan.subnet) == ("host", "")
+
+
+def test_any_rig_of_a_pool_is_one_job(folder: Path) -> None:
+    """The compiled folders are those of the instances; name, report and history are the test's."""
+    text = "level: hil\nrig: {any: static}\n"
+    examples.write(text, folder)
+    path = folder / "dodo.yml"
+    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
+    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+    jobs, _ = prepared(folder, "--repeat", "2")
+    assert [(job.plan.slug, job.report.name, job.test, job.plan.rig) for job in jobs] == [
+        ("example", "example", "example", "a"),
+        ("example--run-2", "example--run-2", "example", "a"),
+    ]
+    for job in jobs:
+        (other,) = job.others
+        assert (other.plan.rig, other.plan.slug, other.report) == ("b", job.plan.slug, job.report)
+        assert [one.folder.name for one in (job, other)] == ["example--rig-a", "example--rig-b"]
+
+
+def test_samples_on_any_rig_of_a_pool_are_a_job_each(folder: Path) -> None:
+    vary = "vary: {wait: {from: 40 s, to: 50 s, nominal: 40 s}}\n"
+    track = "evaluation:\n  track: {uses: collision, with: {goal: finish, max-time: '${vary.wait}'}}\n"
+    examples.write(f"level: hil\nrig: {{any: static}}\n{vary}{track}", folder)
+    path = folder / "dodo.yml"
+    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
+    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+    jobs, _ = prepared(folder, "--samples", "2")
+    assert [(job.plan.slug, job.test, job.plan.rig, [other.plan.rig for other in job.others]) for job in jobs] == [
+        ("example--sample-1", "example", "a", ["b"]),
+        ("example--sample-2", "example", "a", ["b"]),
+    ]
+    assert [job.plan.name.startswith("example[sample=") and "rig" not in job.plan.name for job in jobs] == [True, True]
 
 
 def test_seed_and_wall_timeout_are_in_the_compiled_test_too(folder: Path) -> None:
@@ -99,6 +134,16 @@ def test_a_compiled_test_takes_seed_wall_timeout_and_repetitions(folder: Path, c
     assert [job.plan.slug for job in jobs] == ["example", "example--run-2"]
 
 
+def test_several_compiled_tests_run_together(folder: Path, compiled: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    shutil.copytree(compiled, other)
+    (other / "test.json").write_text((other / "test.json").read_text().replace('"slug": "example"', '"slug": "other"'))
+    jobs, _ = run_compiled(folder, compiled, "--compiled", str(other))
+    assert [(job.plan.slug, job.folder) for job in jobs] == [("example", compiled), ("other", other)]
+    with pytest.raises(UsageError, match="one of them twice"):
+        run_compiled(folder, compiled, "--compiled", str(compiled))
+
+
 def test_a_compiled_test_keeps_its_clock(folder: Path, compiled: Path) -> None:
     with pytest.raises(UsageError, match="compiled for clock lockstep"):
         run_compiled(folder, compiled, "--clock", "realtime")
@@ -110,3 +155,37 @@ def test_git_ignores_a_new_report_folder_but_no_other(folder: Path) -> None:
     (folder / "report/.gitignore").unlink()
     prepared(folder)
     assert not (folder / "report/.gitignore").exists()
+
+
+VARIED = """\
+seed: 5
+matrix: {side: [1, 2]}
+vary: {start: {from: -2 cm, to: 2 cm, nominal: 0 cm}}
+action:
+  vehicle: {uses: dynamic-model}
+  pose: {uses: integrator, with: {freq: 100 Hz, x: "${vary.start}", y: "${matrix.side} m"}}
+"""
+
+
+def test_samples_of_a_test_are_the_same_for_one_seed_and_within_its_ranges(folder: Path) -> None:
+    examples.write(VARIED, folder)
+    jobs, _ = prepared(folder, "--samples", "3")
+    assert [job.plan.slug for job in jobs] == [
+        f"example--side-{side}--sample-{number}" for side in (1, 2) for number in (1, 2, 3)
+    ]
+    assert [job.test for job in jobs] == ["example--side-1"] * 3 + ["example--side-2"] * 3
+    starts = [{f.name: f.value for s in job.plan.services for f in s.flags if s.name == "pose"}["x"] for job in jobs]
+    assert starts[:3] == starts[3:]
+    assert len(set(starts)) == 3
+    assert all(-0.02 <= float(start) <= 0.02 for start in starts)
+    shown = [job.plan.name.partition("start=")[2].removesuffix(" cm]") for job in jobs]
+    assert [float(one) / 100 for one in shown] == pytest.approx([float(start) for start in starts])
+    compiled = [from_json((job.folder / PLAN_FILE).read_text()).name for job in jobs]
+    assert compiled == [job.plan.name for job in jobs]
+    again, _ = prepared(folder, "--samples", "3", "--seed", "6")
+    assert {job.plan.name for job in again}.isdisjoint(job.plan.name for job in jobs)
+
+
+def test_samples_need_a_range(folder: Path) -> None:
+    with pytest.raises(UsageError, match="none of these has 'vary'"):
+        prepared(folder, "--samples", "3")

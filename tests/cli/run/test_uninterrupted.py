@@ -41,13 +41,19 @@ def test_a_stream_without_a_descriptor_may_break_too() -> None:
 
 
 def test_signals_wait_until_results_are_written() -> None:
+    """Also where these tests run in a shell's background, whose programs begin with Ctrl-C ignored."""
+
     def interrupted() -> None:
         os.kill(os.getpid(), signal.SIGINT)
 
-    with undisturbed():
-        interrupted()
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with undisturbed():
+            interrupted()
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_other_signals_stop_a_run_as_an_interrupt_does() -> None:

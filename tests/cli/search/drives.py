@@ -30,7 +30,13 @@ def start_of(plan: Plan) -> float:
     return float(next(flag.value for flag in pose.flags if flag.name == "x"))
 
 
-def stages(plan: Plan) -> dict[str, Events]:
+def wall_of(plan: Plan) -> str:
+    """The wall that a drive hits; which one says nothing of its cause."""
+    camera = next(service for service in plan.services if service.name == "camera")
+    return "left" if float(next(flag.value for flag in camera.flags if flag.name == "clutter")) > 0 else "right"
+
+
+def stages(plan: Plan, limit: float = LIMIT) -> dict[str, Events]:
     start = start_of(plan)
     ready = {
         layer: [(0.0, Ready(service.name)) for service in plan.layer(layer)]
@@ -38,7 +44,7 @@ def stages(plan: Plan) -> dict[str, Events]:
     }
     if start < BROKEN:
         return {**ready, "begin": [(0.0, Exited("track", 1))]}
-    ok = start <= LIMIT
-    check = with_margin({"name": "start", "value": start, "limit": {"max": LIMIT}, "unit": "m", "ok": ok})
-    reason = "it drove" if ok else f"hit wall right after {start:.3f} m"
+    ok = start <= limit
+    check = with_margin({"name": "start", "value": start, "limit": {"max": limit}, "unit": "m", "ok": ok})
+    reason = "it drove" if ok else f"hit wall {wall_of(plan)} after {start:.3f} m"
     return {**ready, "begin": [(0.0, VerdictEvent("track", ok, reason, (check,))), (0.0, Exited("track", 0))]}

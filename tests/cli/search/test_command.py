@@ -35,13 +35,17 @@ class Search:
     ends_at: int | None = None
     driven: list[str] = field(default_factory=list)
     report: str = ""
+    once: float | None = None
+    """Drives that begin further to the right fail, too, but only the first time, and not while a failure is shrunk."""
+    runs: int = 0
 
     def backend(self, plan: Plan, attempt: int) -> ScriptedBackend:
         self.driven.append(plan.slug)
         Path(self.report, "search", "example", "drives", plan.slug).mkdir(parents=True, exist_ok=True)
         if len(self.driven) == self.ends_at:
             os.kill(os.getpid(), signal.SIGINT)
-        return ScriptedBackend(plan, stages(plan))
+        is_first = self.driven.count(plan.slug) == 1 and int(plan.slug.rpartition("-")[2]) <= self.runs
+        return ScriptedBackend(plan, stages(plan, self.once if is_first and self.once is not None else LIMIT))
 
     def __call__(self, *words: str, report: str = "report") -> tuple[int, str]:
         self.driven.clear()
@@ -86,7 +90,7 @@ def test_the_result_is_that_of_the_values_driven(search: Search) -> None:
     ]
     assert found["worst"]["margin"] < 0
     (failure,) = found["failures"]
-    assert failure["kind"] == "hit wall right after # m"
+    assert failure["kind"] == "hit wall left after # m"
     assert f"{found['failed']} of {found['judged']} drives failed" in out
     drives = {path.name for path in Path("report/search/example/drives").iterdir()}
     assert len(drives) == found["failed"] + found["errors"]
@@ -124,6 +128,23 @@ def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) 
     assert first > drives - 8 and not result("whole")["ended_early"]
     search("example", "--runs", "64", *sweep)
     assert {**result(), "shrunk": []} == {**result("whole"), "shrunk": []}, "it goes on from there"
+
+
+@pytest.mark.parametrize("words", [[], ["--until-failure"]], ids=["all", "first"])
+def test_a_failure_that_does_not_repeat_is_none(search: Search, words: list[str]) -> None:
+    """It ends no search, is shrunk no further, and does not count in the rate."""
+    search.once, search.runs = 0.02, 24
+    words = ["--runs", "24", *words]
+    _, out = search("example", *words)
+    found = result()
+    (shrunk,) = found["shrunk"]
+    assert shrunk["failed"] == 3 and float(shrunk["values"]["start"].removesuffix(" cm")) > 100 * LIMIT
+    (once,) = (one for one in found["left_out"] if one["kind"].startswith("failed once and not again: hit wall"))
+    assert once["drives"] >= 1 and "left out, which ended in error twice, or failed once and not again:" in out
+    assert found["ended_early"] is ("--until-failure" in words)
+    before = found
+    search("example", *words)
+    assert (result(), search.driven) == (before, [])
 
 
 def test_what_is_saved_replaces_no_other_test(search: Search) -> None:
@@ -189,7 +210,7 @@ def test_further_drives_fail_more_often_than_the_sweep(search: Search) -> None:
     found = result()
     assert found["judged"] + found["errors"] + found["proposed"] >= 48
     assert found["proposed_failed"] / found["proposed"] > 1.5 * found["rate"] > 0
-    assert found["failures"][0]["drives"] == found["failed"] + found["proposed_failed"]
+    assert sum(one["drives"] for one in found["failures"]) == found["failed"] + found["proposed_failed"]
 
 
 def test_more_runs_continue_the_sweep(search: Search) -> None:

@@ -3,7 +3,9 @@
 import asyncio
 import json
 import os
+import shutil
 import signal
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import StringIO
@@ -38,7 +40,16 @@ services:
       tune: {KP: {from: 0.2, to: 3, default: 0.3}, SPEED: {from: 0.1, to: 1, default: 0.5}}
     x-dodo-process: [python, driver.py]
 """
+RIG = """\
+level: hil
+rig: emulated
+environment: {camera: {uses: camera, with: {map-path: ../maps/plain}}}
+action: {vehicle: {uses: dynamic-model}, pose: {uses: gantry}}
+# docker-compose.yml
+""" + SPEC.partition("# docker-compose.yml\n")[2]
 BEST = 1.7
+WAY = 2.5
+"""m from the start to the end of each drive."""
 CRASHES = 2.8
 
 
@@ -49,7 +60,7 @@ def kp_of(plan: Plan) -> float:
 
 def stages(plan: Plan) -> dict[str, Events]:
     pose = next(service for service in plan.services if service.name == "pose")
-    start = float(next(flag.value for flag in pose.flags if flag.name == "x"))
+    start = float(next((flag.value for flag in pose.flags if flag.name == "x"), 0.0))
     ready = {
         layer: [(0.0, Ready(service.name)) for service in plan.layer(layer)]
         for layer in ("environment", "action", "evaluation")
@@ -59,7 +70,16 @@ def stages(plan: Plan) -> dict[str, Events]:
     distance = abs(kp_of(plan) - BEST) + 2 * abs(start)
     ok = distance <= 1.6
     check = with_margin({"name": "far", "value": distance, "limit": {"max": 1.6}, "unit": "m", "ok": ok})
-    return {**ready, "begin": [(0.0, VerdictEvent("track", ok, "it drove", (check,))), (0.0, Exited("track", 0))]}
+    way = with_margin({"name": "distance", "value": WAY, "limit": {}, "unit": "m", "ok": True})
+    other = {"name": "distance", "value": 0.01, "limit": {}, "unit": "rad", "ok": True}  # of continuous-signal
+    checks = (check, with_margin(other), way)
+    return {
+        **ready,
+        "begin": [
+            (0.0, VerdictEvent("track", ok, "it drove", checks)),
+            (0.0, Exited("track", 0)),
+        ],
+    }
 
 
 @dataclass
@@ -149,9 +169,23 @@ def test_samples_held_out_are_others(tune: Tune) -> None:
     found = result()
     held_out = found["held_out"]
     assert (len(found["scenarios"]), len(held_out["scenarios"])) == (3, 2)
+    finals = found["finals"]
+    assert len(finals["scenarios"]) == 2
     assert not set(found["scenarios"]) & set(held_out["scenarios"])
+    assert not set(finals["scenarios"]) & {*found["scenarios"], *held_out["scenarios"]}
+    assert len(finals["values"]) == 5
+    assert found["best"]["values"] == max(finals["values"], key=lambda one: one["margin"])["values"]
+    assert "chosen among the best 5 with 2 more samples" in out
     assert min(held_out["best"]) > min(held_out["default"])
     assert "2 samples that did not guide the tuning" in out
+
+
+def test_an_application_elsewhere_is_tuned(tune: Tune, tmp_path_factory: pytest.TempPathFactory) -> None:
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    shutil.copy("docker-compose.yml", elsewhere)
+    (elsewhere / "driver.py").touch()
+    code, out = tune("example", "--runs", "1", "--application", str(elsewhere / "docker-compose.yml"))
+    assert (code, len(tune.driven)) == (0, 2), out
 
 
 def test_the_mean_counts_more_than_the_worst(tune: Tune) -> None:
@@ -178,3 +212,23 @@ def test_what_cannot_be_tuned(tune: Tune, old: str, new: str, words: tuple[str, 
     code, out = tune(*words)
     assert (code, tune.driven) == (2, [])
     assert said in out
+
+
+def test_a_rig_drives_no_further_than_it_may(tune: Tune) -> None:
+    examples.write(RIG, Path())
+    code, out = tune("example", "--runs", "9", "--metres", "18")
+    assert (code, len(tune.driven)) == (0, 4), "2.5 m a drive, 2.4 m to its start; what began is ended"
+    assert "on rig emulated: at most 30 min, and 18 m of way" in out
+    assert len(result()["progress"]) == 4
+    assert (tune("example", "--runs", "6")[0], len(tune.driven)) == (0, 3), "it goes on"
+
+
+def test_a_rig_that_fails_is_no_fault_of_the_values(tune: Tune, monkeypatch: pytest.MonkeyPatch) -> None:
+    examples.write(RIG, Path())
+    monkeypatch.setattr(sys.modules[__name__], "CRASHES", 1.5)
+    code, out = tune("example", "--runs", "6")
+    assert (code, "the rig failed: " in out, "goes on from here" in out) == (3, True, True)
+    assert all(float(one["values"]["KP"]) <= 1.5 for one in result()["progress"])
+    monkeypatch.setattr(sys.modules[__name__], "CRASHES", 9.0)
+    assert tune("example", "--runs", "6")[0] == 0
+    assert -1.0 not in [one["margin"] for one in result()["progress"]]

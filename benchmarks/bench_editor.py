@@ -1,0 +1,180 @@
+"""How soon ``dodo lsp`` answers an editor, in a repository with 100 tests, beside yaml-language-server.
+
+The tests are copies of the shipped ones, with their matrices and with what they extend. A client of the protocol opens
+one, makes a mistake and mends it again, text by text: a key is answered when the problems are shown, or shown to be
+gone. The peer is what editors otherwise check a test with: it knows the schema alone, and one file at a time, where
+``dodo lsp`` checks wiring, maps and all other tests, too. Both wait a moment for the next key, 0.05 and 0.2 s, which is
+part of the figures, as an editor's user waits for it, too. The keys "after a pause" come when all tests are being
+planned together, which begins half a second after a key.
+"""
+
+import shutil
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
+
+import numpy as np
+
+from benchmarks.ledger.budget import Budget
+from benchmarks.ledger.row import Goal, Row, cost_row, report
+from tests.lsp.editor import ROOT, Editor, Message, editor
+
+PEER = shutil.which("yaml-language-server")
+NO_PEER = "yaml-language-server is not installed (npm install -g yaml-language-server)"
+TESTS, ROUNDS, KEYS, REQUESTS, PAUSES = 100, 5, 10, 4, 2
+PAUSE_S = 0.8
+GOAL = Goal(0.2, of="value")
+OPENED = "sil-closed-straight-1"
+MISTAKE = ("timeout: 60 s", "timeot: 60 s")
+PLACES = {"completion": "freq: 100 Hz", "hover": "freq: 10 Hz", "definition": "../maps/straight"}
+"""Requests, and the text of the test behind whose second letter they ask."""
+KEY, LATE, AFTER_PAUSE = "problems after a key", "problems after a key, 95 %", "problems after a key, after a pause"
+
+
+def write_registry(folder: Path) -> Path:
+    """A repository with so many specs; the result is the one to open."""
+    shutil.copytree(ROOT / "tests_registry", folder / "tests")
+    shutil.copytree(ROOT / "examples" / "kiwi", folder / "kiwi")
+    shutil.copytree(ROOT / "schemas", folder / "schemas")
+    shipped = sorted((ROOT / "tests_registry").glob("*/*.dodo.yml"))
+    for index in range(TESTS - len(shipped)):
+        spec, number = shipped[index % len(shipped)], 1 + index // len(shipped)
+        old, name = spec.parent.name, f"{spec.parent.name}-{number}"
+        path = folder / "tests" / name / f"{name}.dodo.yml"
+        path.parent.mkdir()
+        path.write_text(spec.read_text().replace(f"name: {old}\n", f"name: {name}\n"))
+    (folder / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\n")
+    assert len(list((folder / "tests").glob("*/*.dodo.yml"))) == TESTS
+    return folder / "tests" / OPENED / f"{OPENED}.dodo.yml"
+
+
+class Session:
+    """An open test in an editor; ``texts`` are it with a mistake and without."""
+
+    def __init__(self, one: Editor, path: Path) -> None:
+        self.editor, self.path = one, path
+        text = path.read_text()
+        self.texts = (text.replace(*MISTAKE), text)
+        assert self.texts[0] != text
+        self.places = {method: self._place(word) for method, word in PLACES.items()}
+        document = {"uri": path.as_uri(), "languageId": "yaml", "version": 0, "text": text}
+        one.send(method="textDocument/didOpen", params={"textDocument": document})
+        self.key()
+        self.key()  # what is loaded once is loaded now
+
+    def _place(self, word: str) -> tuple[int, int]:
+        before = self.texts[1].partition(word)[0] + word[:2]
+        return before.count("\n"), len(before.rpartition("\n")[2])
+
+    def key(self) -> float:
+        """Seconds until the mistake is shown, or until it is gone, in turns."""
+        is_wrong = self.texts[0] != getattr(self, "shown", None)
+        self.shown = self.texts[0] if is_wrong else self.texts[1]
+
+        def answers(message: Message) -> bool:
+            params = message.get("params") or {}
+            about = message.get("method") == "textDocument/publishDiagnostics" and params["uri"] == self.path.as_uri()
+            return about and bool(params["diagnostics"]) == is_wrong
+
+        begin = time.perf_counter()
+        self.editor.type(self.path, self.shown)
+        self.editor.until(answers)
+        return time.perf_counter() - begin
+
+    def key_after_a_pause(self) -> float:
+        """As ``key``, for a mistake: only a test without errors is planned."""
+        assert self.shown == self.texts[1]
+        time.sleep(PAUSE_S)
+        found = self.key()
+        self.key()
+        return found
+
+    def ask(self, method: str) -> float:
+        begin = time.perf_counter()
+        assert self.editor.at(f"textDocument/{method}", self.path, *self.places[method])
+        return time.perf_counter() - begin
+
+
+@contextmanager
+def peer(folder: Path, path: Path) -> Iterator[Session]:
+    """The YAML language server, with DoDo's schema, which the first line of the test names."""
+    assert PEER
+    with editor(folder, command=(PEER, "--stdio")) as one:
+        settings = {"yaml": {"validate": True, "hover": True, "completion": True, "schemaStore": {"enable": False}}}
+        one.send(method="workspace/didChangeConfiguration", params={"settings": settings})
+        yield Session(one, path)
+
+
+Times = dict[str, list[float]]
+
+
+def measure(session: Session, times: Times, has_definitions: bool) -> None:
+    """One round: some keys, some of them after pauses, and some requests."""
+
+    def note(name: str, call: Callable[[], float], number: int) -> None:
+        times.setdefault(name, []).extend(call() for _ in range(number))
+
+    note(KEY, session.key, KEYS)
+    note(AFTER_PAUSE, session.key_after_a_pause, PAUSES)
+    for method in PLACES:
+        if has_definitions or method != "definition":
+            note(method, lambda method=method: session.ask(method), REQUESTS)  # type: ignore[misc]
+
+
+def late(values: Sequence[float]) -> list[float]:
+    return [float(np.percentile(values, 95))]
+
+
+def rows(ours: Times, theirs: Times) -> list[Row]:
+    """A row for each kind of wait; every value of ours has one of the peer's, where it has an answer at all."""
+    made = []
+    for name in (KEY, LATE, AFTER_PAUSE, *PLACES):
+        pair = [late(times.get(KEY, ())) if name == LATE else times.get(name, []) for times in (ours, theirs) if times]
+        beside = ("yaml-language-server", pair[1]) if len(pair) == 2 and pair[1] else ()
+        note = "" if theirs and beside else "the peer has no such answer" if theirs else NO_PEER
+        made.append(
+            cost_row(f"editor, {name}", "s", pair[0], *beside, goal=None if name in PLACES else GOAL, note=note)
+        )
+    return made
+
+
+def compare(folder: Path) -> None:
+    path, budget = write_registry(folder), Budget.given()
+    ours: Times = {}
+    theirs: Times = {}
+    with editor(folder) as one:
+        session = Session(one, path)
+        if PEER is None:
+            sessions = [(session, ours, True)]
+            _rounds(budget, sessions, ours, theirs)
+            return
+        with peer(folder, path) as other:
+            _rounds(budget, [(session, ours, True), (other, theirs, False)], ours, theirs)
+
+
+def _rounds(budget: Budget, sessions: Sequence[tuple[Session, Times, bool]], ours: Times, theirs: Times) -> None:
+    for number in budget.rounds(ROUNDS):
+        for session, times, has_definitions in sessions if number % 2 else reversed(sessions):
+            measure(session, times, has_definitions)
+        report(*rows(ours, theirs))
+    for name in (KEY, AFTER_PAUSE, *PLACES):
+        for whose, times in (("ours", ours), ("peer", theirs)):
+            if values := times.get(name):
+                middle, end = statistics.median(values) * 1000, late(values)[0] * 1000
+                print(f"{name:36s} {whose}: {middle:6.0f} ms, 95 % {end:6.0f} ms, of {len(values)}")
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as name:
+        compare(Path(name).resolve())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
