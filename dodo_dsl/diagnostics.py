@@ -5,6 +5,7 @@ import functools
 import hashlib
 import os
 import re
+import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -150,9 +151,24 @@ def pieces(diagnostic: Diagnostic) -> Iterator[Piece]:
     yield f"{diagnostic.severity}[{diagnostic.rule}]", diagnostic.severity
     yield f": {printable(diagnostic.message)}\n", ""
     yield from _code_frame(span)
-    if diagnostic.hint:
+    for hint in filter(None, (diagnostic.hint, _deceptive(diagnostic.message))):
         yield "  hint: ", "hint"
-        yield f"{printable(diagnostic.hint)}\n", ""
+        yield f"{printable(hint)}\n", ""
+
+
+def _deceptive(message: str) -> str:
+    """What a value has that looks like another character, as word processors and web pages write it."""
+    if message.isascii():
+        return ""
+    for character in message:
+        name = f"{unicodedata.name(character, 'unnamed').lower()} (U+{ord(character):04X})"
+        if unicodedata.category(character) in ("Zs", "Cf") and character != " " and name not in message:
+            return f"it contains a {name}, which looks like a space or nothing: write it anew"
+        if unicodedata.category(character) in ("Pi", "Pf"):
+            return (
+                f"'{character}' is a typographic quotation mark, which belongs to the text in YAML: write \" or nothing"
+            )
+    return ""
 
 
 def format_text(diagnostics: Sequence[Diagnostic]) -> str:

@@ -91,14 +91,14 @@ def plain(node: Node) -> Any:
 
 def walk(node: Node) -> Iterator[Node]:
     """The node and everything below it."""
-    yield node
-    children: Iterator[Node] = iter(())
-    if isinstance(node, Mapping):
-        children = (entry.value for entry in node.entries.values())
-    elif isinstance(node, Sequence):
-        children = iter(node.items)
-    for child in children:
-        yield from walk(child)
+    waiting = [node]
+    while waiting:
+        one = waiting.pop()
+        yield one
+        if isinstance(one, Mapping):
+            waiting.extend([entry.value for entry in one.entries.values()][::-1])
+        elif isinstance(one, Sequence):
+            waiting.extend(one.items[::-1])
 
 
 def resolve(text: str) -> Plain:
@@ -153,18 +153,18 @@ class _Builder:
             raise _Stop(span, "too-large", f"{MAX_PROBLEMS} problems found, the rest of the file is not read")
 
     def feed(self, event: Any) -> None:
-        if isinstance(event, yaml.DocumentStartEvent):
+        if isinstance(event, yaml.ScalarEvent):  # most events are
+            self._scalar(event)
+        elif isinstance(event, yaml.CollectionStartEvent):
+            self._open(event)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            self._close()
+        elif isinstance(event, yaml.AliasEvent):
+            self._alias(event)
+        elif isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
                 raise _Stop(self.span(event), "yaml-syntax", "a second YAML document, expected one per file")
-        elif isinstance(event, yaml.ScalarEvent):
-            self._scalar(event)
-        elif isinstance(event, yaml.AliasEvent):
-            self._alias(event)
-        elif isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
-            self._open(event)
-        elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
-            self._close()
 
     def _grow(self, span: Span, weight: int) -> None:
         self.count += weight

@@ -9,11 +9,13 @@ from dodo_dsl.lsp import schema_keys
 from dodo_dsl.lsp.hover import parameter_text, service_text
 from dodo_dsl.lsp.incomplete import Cursor, cursor
 from dodo_dsl.lsp.scene import USES, WITH, Scene
+from dodo_dsl.lsp.tree import Steps
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.deployment.rig import EMULATED
+from dodo_dsl.spec.deployment.rig import EMULATED_RIGS
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import LAYERS
+from dodo_dsl.spec.pool import ANY
 from dodo_dsl.spec.schema.editor_schema import is_offered, written
 
 _KEY, _SERVICE, _VALUE, _UNIT = (
@@ -65,9 +67,8 @@ def _offers(scene: Scene, at: Cursor) -> Iterator[Offer]:
             yield from _values(scene, at, parameter)
     elif layered and at.steps[2:] == (USES,):
         yield from _services(scene, str(at.steps[0]))
-    elif at.steps == ("rig",) and not at.is_key:
-        rigs = scene.deployment.rigs if scene.deployment else {}
-        yield from ((name, _VALUE, "rig", "") for name in (EMULATED, *rigs))
+    elif at.steps[:1] == ("rig",) and not at.is_key:
+        yield from _rigs(scene, at.steps[1:])
     else:
         yield from _by_schema(scene, at)
 
@@ -81,6 +82,16 @@ def _by_schema(scene: Scene, at: Cursor) -> Iterator[Offer]:
                 yield name, _KEY, "", about.get("description", "")
     else:
         yield from ((value, _VALUE, "", "") for value in schema_keys.values(part))
+
+
+def _rigs(scene: Scene, below: Steps) -> Iterator[Offer]:
+    """Rigs by name; those of a pool (``below`` is what stands within ``rig``) in a list, or its kind."""
+    rigs = scene.deployment.rigs if scene.deployment else {}
+    if below == (ANY,):
+        kinds = dict.fromkeys(rig.kind for rig in rigs.values())
+        yield from ((kind, _VALUE, "kind of rigs", "") for kind in kinds)
+    else:
+        yield from ((name, _VALUE, "rig", "") for name in (*(() if below else EMULATED_RIGS), *rigs))
 
 
 def _services(scene: Scene, layer: str) -> Iterator[Offer]:

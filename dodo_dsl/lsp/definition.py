@@ -35,7 +35,7 @@ def _spans(scene: Scene, place: Place) -> Iterator[Span]:
             yield from _begin(path_of(scene.path.parent, place.text))
     elif steps == (extends.KEY,):
         yield from _begin(path_of(scene.path.parent, place.text))
-    elif steps == ("rig",):
+    elif steps[:1] == ("rig",):
         rig = scene.deployment.rig(place.text) if scene.deployment else None
         if rig and Path(rig.node.span.file).is_file():
             yield rig.node.span

@@ -1,6 +1,6 @@
 """The tests around the open files: which belong together, and what is wrong with them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,10 @@ from dodo_dsl.spec.registry import SUFFIX
 _OUTPUT = "generated"
 
 
+class _Outdated(Exception):
+    """The texts have changed since."""
+
+
 @dataclass(frozen=True)
 class Project:
     """The tests of one ``dodo.yml``, or one test outside all; ``folder`` is where it was looked for."""
@@ -23,11 +27,22 @@ class Project:
     folder: Path
     checked: Checked
 
-    def planned(self) -> list[Diagnostic]:
-        """What only shows where all tests are planned together; nothing while there are errors, or no application."""
+    def planned(self, is_outdated: Callable[[], bool] = lambda: False) -> list[Diagnostic]:
+        """What only shows where all tests are planned together; nothing while there are errors, or no application.
+
+        As soon as it ``is_outdated`` it ends, with nothing: many tests take seconds, and the next check would wait.
+        """
         if not self.checked.ok or self.checked.application is None or not self.checked.specs:
             return []
-        return list(plan(self.checked, self.folder / _OUTPUT).problems)
+
+        def before_each() -> None:
+            if is_outdated():
+                raise _Outdated
+
+        try:
+            return list(plan(self.checked, self.folder / _OUTPUT, before_each=before_each).problems)
+        except _Outdated:
+            return []
 
 
 def is_ours(path: Path) -> bool:

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,7 @@ class DodoServer(LanguageServer):
         self._timer: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
         self._stale = asyncio.Event()
+        self._changes = 0
         self._published: set[str] = set()
         self._found: Mapping[Path, Sequence[Diagnostic]] = {}
 
@@ -71,6 +72,7 @@ class DodoServer(LanguageServer):
 
     def changed(self, *, elsewhere: bool = False) -> None:
         """Begins a check soon; ``elsewhere`` where other files than tests may have changed."""
+        self._changes += 1
         if elsewhere:
             self._checker.forget()
         if self._timer:
@@ -93,17 +95,17 @@ class DodoServer(LanguageServer):
                 self.say(f"the check failed: {type(error).__name__}: {error}")
 
     async def _check_once(self) -> None:
-        """Checks each test, and plans all tests together if nothing changes for a while."""
+        """Checks each test, and plans all tests together if nothing changes for a while, and until something does."""
+        changes = self._changes
         documents = opened(self.workspace)
         self.projects = await asyncio.to_thread(self._checker.check, {p: d.text for p, d in documents.items()})
         found = [problem for project in self.projects for problem in project.checked.diagnostics]
         self._publish(documents, found)
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._stale.wait(), _IDLE_S)
-        if not self._stale.is_set():
-            planned = await asyncio.to_thread(_planned, self.projects)
-            if planned and not self._stale.is_set():
-                self._publish(documents, [*found, *planned])
+        planned = await asyncio.to_thread(_planned, self.projects, lambda: self._changes != changes)
+        if planned and self._changes == changes:
+            self._publish(documents, [*found, *planned])
 
     def _publish(self, documents: Mapping[Path, Document], found: Iterable[Diagnostic]) -> None:
         """Shows the problems of each file, and clears files and open documents without any."""
@@ -122,8 +124,8 @@ class DodoServer(LanguageServer):
         self._published = {uri for uri, message in messages.items() if message.diagnostics}
 
 
-def _planned(found: Sequence[Project]) -> list[Diagnostic]:
-    return [problem for project in found for problem in project.planned()]
+def _planned(found: Sequence[Project], is_outdated: Callable[[], bool]) -> list[Diagnostic]:
+    return [problem for project in found for problem in project.planned(is_outdated)]
 
 
 def _shown(lines: Lines, diagnostic: Diagnostic) -> ShownDiagnostic:

@@ -19,6 +19,7 @@ _DETECTORS: tuple[Callable[[Failure], Iterator[Slip]], ...] = (
     blocks.dash,
     blocks.list_with_key,
     blocks.list_behind_key,
+    characters.comment,
     brackets.one_too_many,
     blocks.between_levels,
     brackets.unclosed,
@@ -27,6 +28,7 @@ _DETECTORS: tuple[Callable[[Failure], Iterator[Slip]], ...] = (
     brackets.no_value,
     characters.first_character,
     characters.block_text,
+    characters.behind_the_end,
     blocks.unexpected,
 )
 

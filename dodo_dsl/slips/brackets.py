@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dodo_dsl.slips.failure import Failure, Slip, indent
 
 _CLOSING = {"{": "}", "[": "]"}
+_PLACEHOLDER = re.compile(r"\{[\w.-]+\}")
 _LAST_WORD = re.compile(r"(?P<gap>[;\s]+)(?P<key>[\w.-]+)\s*$")
 
 
@@ -53,6 +54,10 @@ def no_comma(failure: Failure) -> Iterator[Slip]:
     elif word:
         message = f"a comma is missing before '{word['key']}'"
         yield Slip(failure.mark[0], word.start("key"), message, "entries within brackets are separated by commas")
+    elif failure.before.endswith("$") and (found := _PLACEHOLDER.match(failure.here)):
+        column, text = failure.mark[1] - 1, f"${found[0]}"
+        message = f"'{text}' within brackets needs quotes, as braces mean something else in YAML"
+        yield Slip(failure.mark[0], column, message, f'write "{text}"')
     elif failure.here.strip():
         message = "a comma is missing, or the text needs quotes"
         yield Slip(*failure.mark, message, "entries within brackets are separated by commas")

@@ -10,6 +10,8 @@ _CONFLICT = re.compile(r"(<{7}|>{7}|\|{7}) |={7}$")
 _BLANKS = "\u00a0\u1680\u2000-\u200b\u202f\u205f\u3000\ufeff"
 _FOREIGN = re.compile(rf"(?:^\s*|:)(?P<blank>[{_BLANKS}])")
 
+_COMMENT = re.compile(r"(?<=\s)(?P<sign>#)")
+
 
 def conflict(failure: Failure) -> Iterator[Slip]:
     for number, line in enumerate(failure.lines):
@@ -39,6 +41,29 @@ def foreign_blank(failure: Failure) -> Iterator[Slip]:
             name = unicodedata.name(blank, "unnamed").lower()
             message = f"this blank is not a space but a {name} (U+{ord(blank):04X})"
             yield Slip(number, found.start("blank"), message, "write a space")
+
+
+def comment(failure: Failure) -> Iterator[Slip]:
+    """A '#' within brackets hides what closes them; the parser notices it in a later line, or at the end."""
+    if "flow" not in failure.context or not failure.begin:
+        return
+    for number in range(max(failure.begin[0] - 1, 0), failure.mark[0] + 1):
+        found = _COMMENT.search(line := failure.line(number))
+        if found and _is_open(line[: found.start("sign")]) and re.search(r"[]}]", line[found.end() :]):
+            message = "'#' behind a blank begins a comment, which hides the closing bracket"
+            yield Slip(number, found.start("sign"), message, "write the text in quotes, or close the bracket before it")
+
+
+def _is_open(text: str) -> bool:
+    """Whether more brackets are opened than closed in it."""
+    return sum(text.count(sign) for sign in "{[") > sum(text.count(sign) for sign in "}]")
+
+
+def behind_the_end(failure: Failure) -> Iterator[Slip]:
+    if "<document start>" in failure.problem:
+        ends = [number for number in range(failure.mark[0]) if failure.line(number).rstrip() == "..."]
+        message = "'...' ends the document, and text stands behind it"
+        yield Slip(ends[-1] if ends else failure.mark[0], 0, message, "remove this line")
 
 
 def first_character(failure: Failure) -> Iterator[Slip]:

@@ -35,6 +35,7 @@ evaluation:
 DEPLOYMENT = """dodo: 1
 registry: [tests]
 application: docker-compose.yml
+rigs: {kiwi: {kind: static, cid: 121}}
 """
 COMPOSE = """services:
   steering:

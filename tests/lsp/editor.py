@@ -7,7 +7,7 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -122,9 +122,10 @@ class Editor:
 
 
 @contextmanager
-def editor(folder: Path, encodings: list[str] | None = None) -> Iterator[Editor]:
+def editor(
+    folder: Path, encodings: list[str] | None = None, command: Sequence[str] = (sys.executable, "-m", "dodo_dsl", "lsp")
+) -> Iterator[Editor]:
     """An editor that has opened a folder, with its server."""
-    command = [sys.executable, "-m", "dodo_dsl", "lsp"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     process = subprocess.Popen(command, cwd=folder, env=environment, **pipes)

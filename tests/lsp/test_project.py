@@ -47,6 +47,9 @@ def test_the_application_counts_as_it_is_shown(repository: Repository) -> None:
     (taken,) = projects.check({repository.spec: SPEC, compose: COMPOSE.replace("steering:", "camera:")})
     assert taken.checked.ok
     assert {d.rule for d in taken.planned()} == {"service-taken"}
+    asked = iter([False, True])
+    assert taken.planned(lambda: next(asked)) == []
+    assert next(asked, None) is None
     (fine,) = projects.check({repository.spec: SPEC, compose: COMPOSE})
     assert fine.checked.ok
     assert fine.planned() == []

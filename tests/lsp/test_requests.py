@@ -82,6 +82,9 @@ def offers(editor: Editor, repository: Repository, written: str) -> dict[str, di
         ("clock: lockstep\n", "clock: lockstep\n|\n", ["seed", "matrix"], ["clock", "level"]),
         ("pose:\n    uses: integrator", "pose:\n    |", ["uses"], ["with", "freq"]),
         ("level: sil\n", "level: hil\nrig: |\n", ["emulated"], []),
+        ("level: sil\n", "level: hil\nrig: {|\n", ["any"], ["emulated"]),
+        ("level: sil\n", "level: hil\nrig: {any: |\n", ["static"], ["kiwi", "emulated"]),
+        ("level: sil\n", "level: hil\nrig: {any: [|\n", ["kiwi"], ["static", "emulated"]),
     ],
 )
 def test_completion_offers_what_may_stand_there(
