@@ -2,25 +2,25 @@
 
 import functools
 import itertools
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dodo_dsl import package_data
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
+from dodo_dsl.check import manifest_messages
+from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.resolve import ResolvedTest, resolve
 from dodo_dsl.check.unchanged import Findings, Surroundings, check_again
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
-from dodo_dsl.emit.output_folder import pipeline_folder
-from dodo_dsl.emit.pipeline import SearchJobs, pipeline_problems
-from dodo_dsl.emit.render import File, render_pipeline
-from dodo_dsl.plan.build import Compiled, build
 from dodo_dsl.source import Reader, Scalar, read
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.deployment.rig import PORT
 from dodo_dsl.spec.instances.matrix import Choice
+from dodo_dsl.spec.instances.pools import on_each
 from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.spec.load import Loaded, load_spec, varied
 from dodo_dsl.spec.manifest import Manifest, load_manifests
@@ -28,8 +28,16 @@ from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location, locate
 from dodo_dsl.spec.settings import Settings, applied
 
+if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it takes as long as the rest
+    from dodo_dsl.emit.job_options import JobOptions
+    from dodo_dsl.emit.pipeline import SearchJobs
+    from dodo_dsl.emit.render import File
+    from dodo_dsl.plan.build import Compiled
+
 UNSATISFIED = ("no-producer", "no-sample")
 """The rules by which a service consumes what nobody produces."""
+RUN, SAMPLE = "run", "sample"
+"""What announces the number of a test at values of its ranges; the report groups samples by the second."""
 _MOST_READ = 256  # files that are kept for the tests that extend them
 
 
@@ -68,8 +76,8 @@ class Checked:
 class Compilation:
     """Everything to be written: Plans with the files they need, and the child pipeline. Empty when there are errors."""
 
-    compiled: Compiled
-    pipeline: File
+    compiled: "Compiled"
+    pipeline: "File"
     problems: tuple[Diagnostic, ...]
 
 
@@ -94,15 +102,17 @@ def load(
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd()), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
+    own = manifest_messages.problems(deployment.services, reader, known_messages(deployment.messages))
     once = functools.lru_cache(maxsize=_MOST_READ)(reader)
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
     loaded = [loader(location, once) for location in locations]
-    found = [*found, *manifest_problems, *(d for _, problems in loaded for d in problems)]
+    found = [*found, *manifest_problems, *own, *(d for _, problems in loaded for d in problems)]
     source = None
     if files := application or deployment.application:
         source, problems = read_application(files, access(deployment), deployment.sandbox, reader)
         found.extend(problems)
-    specs = [applied(spec, settings) for instances, _ in loaded for spec in instances]
+    written = (applied(spec, settings) for instances, _ in loaded for spec in instances)
+    specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     before = Findings(former.around, former.tests, former.by_rules) if former else None
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
     again = check_again(specs, corners, Surroundings(manifests, deployment, source), before)
@@ -113,11 +123,27 @@ def load(
 
 def at_values(checked: Checked, spec: Spec, values: Mapping[str, Values]) -> Checked:
     """The tests that an instance is at other values of its ranges, each under its own name, such as ``run-7``."""
-    names = {name: Choice((*spec.choice.values, ("run", Scalar(spec.span("name"), name, name)))) for name in values}
-    made = {n: varied(spec, values[n], c) if spec.ranges else replace(spec, choice=c) for n, c in names.items()}
-    specs = (applied(one, checked.settings) for one in made.values())
-    tests = tuple(resolve(specs, checked.manifests, checked.deployment, checked.application))
-    return replace(checked, tests=tests, diagnostics=())
+    return replace(checked, tests=_at(checked, spec, RUN, values), diagnostics=())
+
+
+def sampled(checked: Checked, samples: Callable[[ResolvedTest], Iterable[Values]]) -> Checked:
+    """The same tests, but those with ranges at each of their samples, named ``TEST[sample=1,light=0.7]``."""
+    tests: list[ResolvedTest] = []
+    for test in checked.tests:
+        numbered = {str(number): values for number, values in enumerate(samples(test), 1)} if test.spec.ranges else {}
+        tests.extend(_at(checked, test.spec, SAMPLE, numbered) if numbered else [test])
+    return replace(checked, tests=tuple(tests))
+
+
+def _at(checked: Checked, spec: Spec, label: str, values: Mapping[str, Values]) -> tuple[ResolvedTest, ...]:
+    """The tests at values by their numbers, which ``label`` announces; a sample's name shows its values, too."""
+    made = []
+    for number, one in values.items():
+        name = (*spec.choice.values, (label, Scalar(spec.span("name"), number, number)))
+        choice = Choice(name, tuple(one.items()) if label == SAMPLE else ())
+        made.append(varied(spec, one, choice) if spec.ranges else replace(spec, choice=choice))
+    specs = (applied(one, checked.settings) for one in made)
+    return tuple(resolve(specs, checked.manifests, checked.deployment, checked.application))
 
 
 def access(deployment: Deployment) -> Access:
@@ -155,20 +181,36 @@ def _registries_above(paths: Sequence[Path], reader: Reader) -> list[Path]:
     return [folder for file in files if file for folder in load_deployment(file, reader)[0].registry]
 
 
-def plan(checked: Checked, out: Path, searches: Sequence[SearchJobs] = ()) -> Compilation:
+def plan(
+    checked: Checked,
+    out: Path,
+    searches: Sequence["SearchJobs"] = (),
+    options: "JobOptions | None" = None,
+    before_each: Callable[[], None] = lambda: None,
+) -> Compilation:
     """The Plans of tests without errors, for the output folder ``out``; raises NoApplication without one.
 
-    The pipeline has the jobs of ``searches``, too.
+    The pipeline has the jobs of ``searches``, too, and ``options`` hold for all its jobs. What ``before_each`` raises,
+    which is called before each test, ends the planning.
     """
+    from dodo_dsl.emit.job_options import NO_OPTIONS
+    from dodo_dsl.emit.output_folder import pipeline_folder
+    from dodo_dsl.emit.pipeline import pipeline_problems
+    from dodo_dsl.emit.render import render_pipeline
+    from dodo_dsl.plan.build import build
+
     if checked.application is None:
         raise NoApplication
+    deployment, application, settings = checked.deployment, checked.application, checked.settings
     compiled, problems = build(
-        checked.tests, checked.manifests, checked.deployment, checked.application, out.resolve(), checked.settings
+        checked.tests, checked.manifests, deployment, application, out.resolve(), settings, before_each
     )
-    child = render_pipeline(compiled.suite, pipeline_folder(out), searches)
+    before_each()
+    options = options or NO_OPTIONS
+    child = render_pipeline(compiled.suite, pipeline_folder(out), searches, options)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    for problem in pipeline_problems(compiled.suite, child.text, searches):
+    for problem in pipeline_problems(compiled.suite, child.text, searches, options):
         span = replace(problem.span, file=shown.get(problem.span.file, problem.span.file))
         problems.append(replace(problem, span=span))
     return Compilation(compiled, child, tuple(ordered(problems)))

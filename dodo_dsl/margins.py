@@ -40,6 +40,12 @@ def worst_margin(outcome: Outcome) -> float | None:
     return min((share for share in shares if share), default=-1.0 if is_failed else 0.0)
 
 
+def failed_checks(outcome: Outcome) -> tuple[str, ...]:
+    """The names of the checks that failed, but for the time of answers."""
+    names = {check["name"] for check in outcome.checks if not check["ok"]}
+    return tuple(sorted(names - {SLOW_ANSWERS}))
+
+
 def _margin(check: Mapping[str, Any]) -> float | None:
     value, limit = check["value"], check["limit"]
     distances = []

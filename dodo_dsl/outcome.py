@@ -43,6 +43,8 @@ class MachineLoad:
     """Share of the updates of any other of DoDo's services, the one with the largest."""
     lateness_s: float = 0.0
     """How late an update of DoDo's services ended, at worst."""
+    paused_s: float = 0.0
+    """For how long the emulated rig stood still, as it could not keep real time."""
     undecided: bool = False
     """Whether a test that failed is in error, as the machine was too busy."""
 

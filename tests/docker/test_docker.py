@@ -10,6 +10,7 @@ import socket
 import stat
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -143,26 +144,36 @@ def same(theirs: dict[str, dict[str, Any]], ours: dict[str, dict[str, Any]]) -> 
         assert values[0] == pytest.approx(values[1], rel=1e-3)
 
 
-def hurry_emulators() -> None:
-    """What an emulator does for itself elsewhere: a container's control group has no share of real time."""
-    listed = subprocess.run(["pgrep", "-x", "rig-emulator"], capture_output=True, text=True, check=False).stdout
-    for process in listed.split():
-        with contextlib.suppress(OSError):  # only version 1 has such groups
-            Path("/sys/fs/cgroup/cpu/cgroup.procs").write_text(process)
-        wait_for_nobody(int(process))
+def hurry_emulators(until: threading.Event) -> None:
+    """What an emulator does for itself elsewhere: a container's control group has no share of real time.
+
+    Each one and its gantry as soon as they are there, so that it is in time while its axes find their home, too.
+    """
+    begun: set[str] = set()
+    while not until.wait(0.1):
+        listed = subprocess.run(
+            ["pgrep", "-f", r"rig-emulator|services\.gantry"], capture_output=True, text=True, check=False
+        ).stdout
+        for process in set(listed.split()) - begun:
+            with contextlib.suppress(OSError):  # only version 1 has such groups
+                Path("/sys/fs/cgroup/cpu/cgroup.procs").write_text(process)
+            wait_for_nobody(int(process))
+            begun.add(process)
 
 
 def test_the_emulated_rig_in_containers(tmp_path: Path) -> None:
     """A machine that is too busy for the emulated rig gets two more tries."""
     if not (ROOT / "build" / "firmware" / "rig-emulator").exists():
         pytest.skip("the emulated rig is not built: make firmware")
-    report = tmp_path / "report"
-    out = ""
-    with start(tmp_path, "hil-dynamic", "--retry-errors", "2", "--report", str(report)) as process:
-        for line in process.stdout or ():
-            out += line
-            if "waiting for evaluation" in line:
-                hurry_emulators()
+    report, ended = tmp_path / "report", threading.Event()
+    helper = threading.Thread(target=hurry_emulators, args=(ended,))
+    helper.start()
+    try:
+        with start(tmp_path, "hil-dynamic", "--retry-errors", "2", "--report", str(report)) as process:
+            out, _ = process.communicate()
+    finally:
+        ended.set()
+        helper.join()
     assert process.returncode == 0, out
     assert {test["outcome"] for test in results(report).values()} == {"passed"}
     assert (report / "hil-dynamic" / "snapshot.png").read_bytes().startswith(b"\x89PNG")

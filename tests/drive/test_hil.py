@@ -1,11 +1,15 @@
 """The hil tests on the emulated rig: the firmware's binary, the gantry, a camera at the rig's true place."""
 
+import contextlib
 import json
 import math
+import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +24,15 @@ from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from services.gantry.rig_table import ACCELERATION, BOUNDS, MICROSTEP
 from tests.drive.applications import KIWI, ROOT, dodo, kiwi, results
 from tests.drive.rig import Hardware, Pose, on_its_way, running
+from tests.realtime import hurry
 
 LABELLED = """
 dodo: 1
 name: hil-labelled
 extends: ../hil-camera/hil-camera.dodo.yml
 record: {frames: 2 Hz}
+environment:
+  camera: {uses: camera, with: {scene.truth-sender: 9, scene.truth-classes: [cone_yellow=yellow, cone_blue=blue]}}
 evaluation:
   cones: {uses: object-detection, with: {min-frames: 20, max-time: 4 s}}
 """
@@ -39,6 +46,15 @@ def boxes(path: Path) -> dict[int, list[tuple[str, float, float, float, float]]]
     for each in found["annotations"]:
         images[each["image_id"]].append((names[each["category_id"]], *each["bbox"]))
     return images
+
+
+PROJECTED = """
+dodo: 1
+name: hil-projected
+extends: ../hil-perception/hil-perception.dodo.yml
+environment:
+  camera: {uses: camera, with: {scene.truth-sender: 8, scene.truth-min-height: 10 px}}
+"""
 
 
 TRUTH = boxes(ROOT / "tests_registry" / "truths" / "static-rig.json")[1]
@@ -133,6 +149,59 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
     assert re.search(r"turns of 50 ms, \d+ without an answer; jitter median .* ms; position after median .* ms", log)
 
 
+def emulators(folder: Path) -> list[int]:
+    """Ids of the processes of the emulator in a folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            if path.read_bytes().startswith(bytes(folder / "rig-emulator")):
+                found.append(int(path.parent.name))
+    return found
+
+
+def test_an_emulated_rig_that_is_held_up_for_a_moment_drives_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It stands still meanwhile, and the result says for how long."""
+    firmware = tmp_path / "firmware"
+    shutil.copytree(ROOT / "build" / "firmware", firmware)
+    monkeypatch.setenv("DODO_FIRMWARE", str(firmware))
+    words = [sys.executable, "-m", "dodo_dsl", "run", "hil-dynamic", "--report", tmp_path / "report"]
+    with subprocess.Popen(words, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+        hurry(process.pid)
+        assert process.stdout is not None
+        output = []
+        for line in process.stdout:
+            output.append(line)
+            if line.endswith("  running\n"):
+                time.sleep(0.5)
+                (emulator,) = emulators(firmware)
+                os.kill(emulator, signal.SIGSTOP)
+                time.sleep(0.12)
+                os.kill(emulator, signal.SIGCONT)
+    assert process.returncode == 0, "".join(output)
+    (test,) = results(tmp_path / "report").values()
+    assert 0.1 < test["machine"]["paused_s"] <= 0.25
+    assert "the emulated rig stood still for 0." in (tmp_path / "report" / "index.html").read_text()
+
+
+def test_two_laps_on_the_rig_that_turns_without_end(tmp_path: Path) -> None:
+    """Two turns of the yaw, past its index, after which it still knows its heading; each lap is half of the way."""
+    test = run(tmp_path, "hil-closed-oval", code=0)
+    checks = {check["name"]: check["value"] for check in test["checks"]}
+    assert (test["outcome"], checks["gates"]) == ("passed", 3)
+    assert checks["distance"] == pytest.approx(2 * (2 * math.pi * 0.6 + 0.9), rel=0.1)
+    recording = tmp_path / "hil-closed-oval" / "test.rec"
+    measured, true = poses(recording, MEASURED), poses(recording, TRUE)
+    same_at_rest(measured[0], true[0])
+    turned = np.unwrap(true[:, 3])
+    assert turned[-1] - turned[0] == pytest.approx(4 * math.pi, abs=0.7)
+    assert np.abs(np.diff(turned)).max() < 0.1, "it never turned back around"
+    seen = np.interp(measured[:, 0], true[:, 0], turned)
+    assert np.abs(np.unwrap(measured[:, 3]) - seen).max() < 0.05
+    assert np.abs(true[:, 1]).max() < 0.95 and np.abs(true[:, 2]).max() < 0.7
+
+
 def test_the_rig_itself_saw_no_limit_passed_and_knows_where_it_stands(tmp_path: Path, rig: Hardware) -> None:
     with running(tmp_path, rig, "network") as run:
         before = on_its_way(run)
@@ -195,15 +264,59 @@ def test_the_static_rig_sees_its_board_and_its_recording_is_a_labelled_data_set(
     run(tmp_path / "report", str(spec), "--application", str(KIWI / "docker-compose.yml"), code=0)
     shows_its_board(tmp_path / "report")
     recording = tmp_path / "report" / "hil-labelled" / "test.rec"
-    dodo("rec", "export", str(recording), "--coco", "-o", str(tmp_path / "set"), code=0)
-    images = boxes(tmp_path / "set" / "annotations.json")
+    for sender in ("0", "9"):
+        folder = tmp_path / "set" / sender
+        dodo("rec", "export", str(recording), "--coco", "-o", str(folder), "--labels", sender, code=0)
+        is_labelled(folder, 10 if sender == "0" else 1)
+    truth = str(tmp_path / "tests" / "truths" / "static-rig.json")
+    dodo("rec", "export", str(recording), "--coco", "-o", str(tmp_path / "true"), "--truth", truth, code=0)
+    assert all(found == TRUTH for found in boxes(tmp_path / "true" / "annotations.json").values())
+
+
+def is_labelled(folder: Path, within: float) -> None:
+    """Every picture of a set has a box at each cone, to within some pixels."""
+    images = boxes(folder / "annotations.json")
     assert len(images) >= 5
-    assert len(list((tmp_path / "set" / "images").glob("*.png"))) == len(images)
+    assert len(list((folder / "images").glob("*.png"))) == len(images)
     for found in images.values():
         assert sorted(label for label, *_ in found) == sorted(label for label, *_ in TRUTH)
         for label, *true in TRUTH:
             nearest = min((box for name, *box in found if name == label), key=lambda box: math.dist(box[:2], true[:2]))
-            assert nearest == pytest.approx(true, abs=10), (label, true)
-    truth = str(tmp_path / "tests" / "truths" / "static-rig.json")
-    dodo("rec", "export", str(recording), "--coco", "-o", str(tmp_path / "true"), "--truth", truth, code=0)
-    assert all(found == TRUTH for found in boxes(tmp_path / "true" / "annotations.json").values())
+            assert nearest == pytest.approx(true, abs=within), (label, true)
+
+
+def sent_boxes(recording: Path, sender: int) -> dict[tuple[int, int], tuple[float, float, float, float]]:
+    """Left, top, right and bottom as shares of the picture, by sample time and number of the model."""
+    messages, found = MessageSet.standard(), {}
+    for envelope in read_envelopes(recording):
+        kind = messages.id("opendlv.logic.perception.DetectionBoundingBox")
+        if (envelope.data_type, envelope.sender_stamp) == (kind, sender):
+            box: Any = messages.decode(envelope.data_type, envelope.payload)
+            edges = (box.x, box.y, box.x + box.width, box.y + box.height)
+            found[envelope.sample_time, box.detectionId] = edges
+    return found
+
+
+def overlap(one: tuple[float, ...], other: tuple[float, ...]) -> float:
+    """Intersection over union."""
+    (left, top), (right, bottom) = map(max, one[:2], other[:2]), map(min, one[2:], other[2:])
+    common = max(right - left, 0.0) * max(bottom - top, 0.0)
+    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (one, other)]
+    return common / (sum(areas) - common)
+
+
+def test_the_truth_that_moves_is_where_the_renderer_drew_it(tmp_path: Path) -> None:
+    """Projected by the measured position, while the emulated camera draws from the rig's own.
+
+    Whether the application keeps up on a busy machine says nothing of it.
+    """
+    spec = registry_with(tmp_path, "hil-projected", PROJECTED, "maps", "targets", "hil-perception")
+    test = run(tmp_path / "report", str(spec), "--application", str(KIWI / "docker-compose.yml"), code=(0, 3))
+    assert test["outcome"] == "passed" or test["machine"]["undecided"], test["reason"]
+    recording = tmp_path / "report" / "hil-projected" / "test.rec"
+    drawn, projected = (sent_boxes(recording, sender) for sender in (8, 9))
+    both = sorted(drawn.keys() & projected.keys())
+    overlaps = np.array([overlap(drawn[key], projected[key]) for key in both])
+    assert len(both) > 300 and len(both) > 0.9 * len(projected)
+    assert np.median(overlaps) > 0.85, "it moves; a picture that comes late has another time than its pose"
+    assert overlaps[-20:].min() > 0.97, "it stands at last"

@@ -1,6 +1,8 @@
 """Rigs that a repository, a job or a number would move unasked."""
 
+import contextlib
 import json
+import math
 import os
 import pwd
 import subprocess
@@ -21,6 +23,7 @@ from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run import leases
 from dodo_dsl.run.rigs import devices, permission, quarantine
 from dodo_dsl.run.rigs.devices import identity, key
+from dodo_dsl.run.rigs.motion import motion_of
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import device_leases
 from dodo_dsl.spec.deployment import machine as operator
@@ -250,6 +253,58 @@ def test_limits_can_only_be_tighter(
     code, output = dodo("rig", *words)
     assert (said in output) if said else ("limits." not in output), output
     assert not said or code == 2
+
+
+def test_the_yaw_of_a_circle_has_no_limit_whatever_its_flag_says() -> None:
+    """An operator who limits the yaw permits no rig that turns without end."""
+    flags = {"range-x": "1", "range-yaw": "170", "limits": "x=0.9,yaw=2.967"}
+    assert motion_of(flags).limits["yaw"] == 170 and motion_of(flags).limits["x"] == 1
+    assert motion_of({**flags, "kind": "circle"}).limits["yaw"] == math.inf
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        ({"max-acceleration": "0.2", "limits": "acceleration=0.2"}, ""),
+        ({"max-acceleration": "0.5", "limits": "acceleration=0.2"}, "limits.acceleration is 0.5 m/s2, and"),
+        ({"max-acceleration": "0.2", "limits": "acceleration=0.3"}, "limits.acceleration is 0.3 m/s2, and"),
+        ({"max-acceleration": "0.2", "limits": "acceleration=much"}, "limits.acceleration is not set, and"),
+        ({"max-acceleration": "0.2"}, "limits.acceleration is not set, and"),
+    ],
+)
+def test_what_the_memory_is_given_is_compared_too(
+    repository: Path, rules: Callable[..., None], flags: dict[str, str], said: str
+) -> None:
+    rules(rigs=permitted(repository, acceleration="0.2 m/s2"))
+    with pytest.raises(RigProblem, match=said) if said else contextlib.nullcontext():
+        permission.refuse_forbidden(["/dev/null"], motion_of(flags), [repository])
+
+
+@pytest.mark.parametrize(
+    ("axes", "limits", "constants", "said"),
+    [
+        ({}, {"x": "1 m"}, {}, ""),
+        ({}, {"x": "1 m"}, {"x": {"steps": "3500 steps/m"}}, "limits.x is 1.05422 m by the operator's constants"),
+        ({"x": {"steps": "3500 steps/m"}}, {"x": "1 m"}, {"x": {"steps": "3500 steps/m"}}, ""),
+        ({"x": {"steps": "3200 steps/m"}}, {"x": "1 m"}, {}, "limits.x is 1.0375 m by the operator's constants"),
+        ({}, {"yaw": "90 deg"}, {"yaw": {"offset": "80 steps"}}, "limits.yaw is 95.4545 deg by the operator's"),
+        ({"y": {"steps": "3200 steps/m"}}, {"speed": "0.5 m/s"}, {}, "limits.speed is 0.51875 m/s by the operator's"),
+    ],
+)
+def test_constants_of_a_repository_take_a_rig_no_farther(
+    repository: Path,
+    rules: Callable[..., None],
+    axes: dict[str, object],
+    limits: dict[str, str],
+    constants: dict[str, object],
+    said: str,
+) -> None:
+    about = {"kind": "dynamic", "cid": 121, "serial": "/dev/null", "limits": limits, "axes": constants}
+    (repository / "dodo.yml").write_text(json.dumps({"dodo": 1, "rigs": {"fake": about}}))
+    ours = permitted(repository, **limits)
+    rules(rigs={"ours": {**ours["ours"], "axes": axes}})  # type: ignore[dict-item]
+    code, output = dodo("rig", "calibrate", "fake")
+    assert (said in output and code == 2) if said else "limits." not in output, output
 
 
 def test_places_come_from_the_operator_and_not_from_variables(

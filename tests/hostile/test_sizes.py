@@ -41,10 +41,10 @@ from services.camera.files import FileCamera
 from services.rec_recorder import traffic
 from services.rec_recorder.model import RecordingFile
 from services.rec_recorder.traffic import FloodError, Traffic
-from services.virtual_camera.draw import scene
+from services.scene.draw import scene
+from services.scene.map.meshes import load_obj
+from services.scene.map.textures import load_picture
 from services.virtual_camera.image.overlays import load_with_alpha
-from services.virtual_camera.map.meshes import load_obj
-from services.virtual_camera.map.textures import load_picture
 from tests.drive.applications import results
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
 from tests.run.helpers import Bench

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import CameraPose
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import load_scene
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
 
 MAPS = package_data.registry() / "maps"
 OPEN = ["left-curve", "rig-straight", "straight"]
 TRACKS = [*OPEN, "kiwi-track"]
-NAMES = sorted([*TRACKS, "static-rig"])
-STARTS = {"rig-straight": (-0.75, 0.0, 0.0)}
+NAMES = sorted([*TRACKS, "rig-oval", "static-rig"])
+STARTS = {"rig-straight": (-0.75, 0.0, 0.0), "rig-oval": (-0.2, -0.6, 0.0)}
 """Where a car starts: x, y (m) and heading (rad)."""
 
 
@@ -110,6 +110,18 @@ def test_the_track_of_the_rig_fits_its_workspace_with_room_to_brake():
     ((finish, *_),) = obstacle("rig-straight", "finish")
     assert x > -0.9 + 0.1
     assert finish - 0.18 + 0.52**2 / (2 * 0.5) < 0.95
+
+
+def test_the_oval_of_the_rig_fits_its_workspace_with_room_to_brake():
+    """By the middle of the lane, in which the vehicle's centre is, with 10 cm to each side."""
+    rows = [np.array(obstacle("rig-oval", side))[:, :2] for side in ("left", "right")]
+    (inner_low, inner_high), (outer_low, outer_high) = ((row.min(axis=0), row.max(axis=0)) for row in rows)
+    low, high = (inner_low + outer_low) / 2, (inner_high + outer_high) / 2
+    assert (low >= np.array([-0.9, -0.7]) + 0.099).all()
+    assert (high <= np.array([0.95, 0.7]) - 0.099).all()
+    ((x, y, *_),) = obstacle("rig-oval", "far")
+    assert (x, y) == pytest.approx((0.025, 0.35)), "half a lap from the finish and 0.225 m"
+    assert obstacle("rig-oval", "finish")
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from dodo_dsl import package_data
-from services.virtual_camera.camera import CameraPose
-from services.virtual_camera.draw.render import Renderer
-from services.virtual_camera.draw.scene import load_scene
+from services.scene.camera import CameraPose
+from services.scene.draw.render import Renderer
+from services.scene.draw.scene import load_scene
 
 REGISTRY = package_data.registry()
 KIWI = package_data.root() / "examples" / "kiwi"

@@ -94,3 +94,10 @@ def test_what_may_be_written(use: object, schema: dict[str, Any]) -> None:
 def test_what_an_editor_underlines(use: object, said: str, schema: dict[str, Any]) -> None:
     (problem,) = problems(schema, use)
     assert said in problem
+
+
+def test_a_test_that_extends_another_one_may_leave_out_what_a_service_uses(schema: dict[str, Any]) -> None:
+    own = {"dodo": 1, "name": "t", "evaluation": {"track": {"with": {"max-time": "9 s"}}}}
+    validator = Draft202012Validator(schema)
+    assert [error.message for error in validator.iter_errors({**own, "extends": "../a.dodo.yml"})] == []
+    assert "'uses' is a required property" in [error.message for error in validator.iter_errors(own)]

@@ -122,6 +122,15 @@ class SharedMemory:
         except OSError as error:
             raise self._failed(error) from None
 
+    @property
+    def is_there(self) -> bool:
+        """Whether it still exists: one that cannot be locked may only be held for long by another program."""
+        try:
+            self.readers_waiting()
+        except SharedMemoryError:
+            return False
+        return True
+
     def close(self) -> None:
         """Let go; the creator wakes all that wait and removes everything."""
         if self._closed:

@@ -2,15 +2,14 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
 class OdvdError(ValueError):
     """A specification that cannot be used; the text begins with ``file:line:column``."""
 
 
-@dataclass(frozen=True)
-class TextPlace:
+class TextPlace(NamedTuple):
     """A place in a file; line and column count from 1."""
 
     file: str
@@ -32,8 +31,7 @@ _TOKEN = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class Token:
+class Token(NamedTuple):
     kind: str
     text: str
     place: TextPlace
@@ -45,13 +43,13 @@ class Token:
 def tokens(text: str, file: str) -> Iterator[Token]:
     position, line, line_start = 0, 1, 0
     while position < len(text):
-        place = TextPlace(file, line, position - line_start + 1)
         match = _TOKEN.match(text, position)
         if match is None:
+            place = TextPlace(file, line, position - line_start + 1)
             raise OdvdError(f"{place}: '{text[position]}' is not allowed here")
         kind = match.lastgroup or ""
         if kind != "space":
-            yield Token(kind, match[kind], place)
+            yield Token(kind, match[kind], TextPlace(file, line, position - line_start + 1))
         if newlines := match[0].count("\n"):
             line += newlines
             line_start = match.start() + match[0].rindex("\n") + 1
