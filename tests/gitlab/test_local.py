@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import pytest
 
 from dodo_dsl import package_data
+from tests.images.conftest import base_image, built  # noqa: F401
 from tests.report.joined.gitlab_api import serving
 
 pytestmark = pytest.mark.slow
@@ -86,7 +87,10 @@ def artifact(folder: Path, job: str, name: str) -> Path:
     return folder / ".gitlab-ci-local/artifacts" / job / name
 
 
+@pytest.mark.engine
+@pytest.mark.usefixtures("built")
 def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> None:
+    """The parent has built an image, so the child's tests run in containers."""
     written = repository / ".gitlab/dodo/deployment.gitlab-ci.yml"
     assert written.read_bytes() == (package_data.templates() / "deployment/template.yml").read_bytes()
     with serving(repository / ".gitlab-ci-local/artifacts") as api:
