@@ -61,8 +61,8 @@ def motion_of(words: Mapping[str, str], manual: bool = False) -> Motion:
     limits = {}
     for name, flag in LIMIT_FLAGS.items():
         own = 0.0 if manual and name not in RANGES else math.inf
-        limits[name] = max(float(words[flag]) if flag in words else own, kept.get(name, math.inf))
-    constants = {name: float(words[name]) for name in BUILT_IN if name in words}
+        limits[name] = max(_number(words[flag]) if flag in words else own, kept.get(name, math.inf))
+    constants = {name: _number(words[name]) for name in BUILT_IN if name in words}
     return Motion(limits | ({"yaw": math.inf} if circle else {}), constants, circle)
 
 
@@ -71,8 +71,14 @@ def _kept(text: str) -> dict[str, float]:
     found = {}
     for word in text.split(","):
         name, _, number = word.partition("=")
-        try:
-            found[name] = math.degrees(float(number)) if name == "yaw" else float(number)
-        except ValueError:
-            continue
+        found[name] = math.degrees(_number(number)) if name == "yaw" else _number(number)
     return found
+
+
+def _number(text: str) -> float:
+    """A number of a compiled file, which anyone may have changed; what is none, such as "nan", bounds nothing."""
+    try:
+        value = float(text)
+    except ValueError:
+        return math.inf
+    return value if math.isfinite(value) else math.inf
