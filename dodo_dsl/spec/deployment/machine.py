@@ -13,19 +13,12 @@ from pathlib import Path
 from dodo_dsl.diagnostics import format_text
 from dodo_dsl.source import Mapping, parse, plain
 from dodo_dsl.spec import quantity
+from dodo_dsl.spec.deployment.rig import LIMIT_UNITS
 from dodo_dsl.spec.schema.validation import validate
 
 FILE = Path("/etc/dodo/rigs.yml")
-UNITS = {
-    "x": "m",
-    "y": "m",
-    "yaw": "deg",
-    "speed": "m/s",
-    "yaw-rate": "rad/s",
-    "acceleration": "m/s2",
-    "yaw-acceleration": "rad/s2",
-}
-"""Of the limits."""
+UNITS = {**LIMIT_UNITS, "yaw": "deg"}
+"""Of the limits; an operator reads degrees."""
 DENSITIES = {"x": "steps/m", "y": "steps/m", "yaw": "steps/deg"}
 """The units of an axis' steps."""
 

@@ -1,10 +1,13 @@
 """The firmware's constants as commands know them: those of its table, which services have, too."""
 
+import math
+
 import pytest
 
 from dodo_dsl.cli.rig import measure_command
 from dodo_dsl.run.rigs import motion
-from services.gantry import rig_table
+from dodo_dsl.spec.deployment.rig import LIMIT_UNITS
+from services.gantry import memory, rig_table
 from services.gantry.conversion import FARTHEST_OFFSET
 
 
@@ -18,3 +21,19 @@ def test_constants_are_those_of_the_firmware() -> None:
 def test_offsets_that_are_measured_are_those_that_the_gantry_takes() -> None:
     middles = rig_table.OFFSETS["yaw"], rig_table.CIRCLE_OFFSET
     assert tuple((m - FARTHEST_OFFSET, m + FARTHEST_OFFSET) for m in middles) == measure_command.OFFSETS
+
+
+def test_limits_have_the_names_and_units_of_the_gantry() -> None:
+    assert list(LIMIT_UNITS.items()) == list(memory.UNITS.items())
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "fast", ""])
+def test_what_is_no_number_bounds_nothing(value: str) -> None:
+    """A compiled file is only a file; the operator's limits refuse what is unlimited."""
+    kept = f"speed={value}"
+    assert motion.motion_of({"max-speed": value, "limits": "speed=0.2"}).limits["speed"] == math.inf
+    assert motion.motion_of({"max-speed": "0.2", "limits": kept}).limits["speed"] == math.inf
+    longer = motion.motion_of({"range-x": "0.5", "limits": "x=0.5", "steps-x": value})
+    assert longer.by({})["x"] == math.inf
+    whole = motion.motion_of({"max-speed": "0.2", "limits": "speed=0.2"})
+    assert whole.limits["speed"] == 0.2
