@@ -1,5 +1,6 @@
 """Builds the firmware and what tests it, once; BENCH names another build of the core's test program instead."""
 
+import contextlib
 import os
 import shutil
 from collections.abc import Iterator
@@ -25,6 +26,16 @@ def bench_program() -> Path:
     return BUILT / "bench"
 
 
+@contextlib.contextmanager
+def in_the_middle(program: Path) -> Iterator[Bench]:
+    """A core that is calibrated, stands in the middle and looks forward."""
+    with Bench(program, CLOSE) as bench:
+        bench.calibrate()
+        bench.go(0, 0, 0)
+        bench.extremes()
+        yield bench
+
+
 @pytest.fixture(scope="session")
 def circle_program(bench_program: Path) -> Path:
     """The core of a rig that turns without end."""
@@ -34,10 +45,7 @@ def circle_program(bench_program: Path) -> Path:
 @pytest.fixture
 def circle(circle_program: Path) -> Iterator[Bench]:
     """The same, calibrated and in the middle, looking forward."""
-    with Bench(circle_program, CLOSE) as bench:
-        bench.calibrate()
-        bench.go(0, 0, 0)
-        bench.extremes()
+    with in_the_middle(circle_program) as bench:
         yield bench
 
 
@@ -59,10 +67,7 @@ def fresh(bench_program: Path) -> Iterator[Bench]:
 @pytest.fixture
 def bench(bench_program: Path) -> Iterator[Bench]:
     """The core, calibrated and in the middle."""
-    with Bench(bench_program, CLOSE) as bench:
-        bench.calibrate()
-        bench.go(0, 0, 0)
-        bench.extremes()
+    with in_the_middle(bench_program) as bench:
         yield bench
 
 
