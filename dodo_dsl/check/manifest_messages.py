@@ -14,7 +14,7 @@ _NAME = re.compile(r"[\w.]+")
 def problems(folders: tuple[Path, ...], reader: Reader, known: Collection[str]) -> Iterator[Diagnostic]:
     """The messages that are not ``known`` in ``<folder>/<service>/service.yml``; a placeholder is for the test to name.
 
-    What else is wrong with these files is told as they are loaded.
+    Loading these files reports whatever else is wrong with them.
     """
     for folder in folders:
         for path in sorted(folder.glob("*/service.yml")):

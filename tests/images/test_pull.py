@@ -147,7 +147,7 @@ def test_rigs_without_tests(tmp_path: Path, words: tuple[str, ...], said: str) -
 def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a registry of its own."""
     if not shutil.which("docker-registry") or not engine_answers():
-        pytest.skip("no docker-registry, or no Docker engine")
+        pytest.skip("no docker-registry (scripts/install-test-tools), or no Docker engine (scripts/start-engine)")
     folder = tmp_path_factory.mktemp("registry")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
