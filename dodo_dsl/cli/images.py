@@ -10,13 +10,14 @@ from dodo_dsl.cli import image_pull, selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
-from dodo_dsl.images.names import PLATFORM, Image, choose, known, of_platforms, tagged
+from dodo_dsl.images.names import DODO, PLATFORM, Image, choose, known, of_platforms, tagged
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
 EXAMPLES = """examples:
   dodo images build                                   all images, named as in dodo.yml
   dodo images build collision virtual-camera          two images
+  dodo images build dodo                              DoDo itself with all that it runs, for jobs of a pipeline
   dodo images build --offline-wheels                  if a build cannot reach the package index
   dodo images build --platform linux/arm64            for a Raspberry Pi, on another machine with QEMU
   dodo images push --prefix registry.example.org/dodo
@@ -31,6 +32,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     build = _action(actions, "build", "build images from the installed DoDo")
     build.add_argument("--base-image", metavar="I", help="base image with Python (default: a python:*-slim)")
+    build.add_argument(
+        "--docker-image", metavar="I",
+        help="image that 'dodo' has the docker command and its plugins from (default: a docker:*-cli)"
+    )  # fmt: skip
     build.add_argument(
         "--offline-wheels", action="store_true", help="download packages on this machine, not in the build"
     )
@@ -52,7 +57,7 @@ def _action(
         help="machines that the images are for, such as linux/arm64 (default: the engine's); several of them have the "
         "tags T-amd64 and T-arm64, and 'push' makes T a list of these"
     )  # fmt: skip
-    action.add_argument("name", nargs="*", metavar="NAME", help="services, sandbox, base or vision (default: all)")
+    action.add_argument("name", nargs="*", metavar="NAME", help="services, sandbox, base, vision or dodo (default: all but dodo)")
     action.add_argument(
         "--prefix", metavar="P", help="prefix of the images' names (default: images.prefix of dodo.yml, or dodo)"
     )
@@ -99,13 +104,14 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
 def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> None:
     """Builds images of one platform."""
     packages = None
+    whole = any(image.name == DODO for image in images)
     if options.offline_wheels:
-        packages = _packages(options.base_image or build_context.default_base_image(), images[0].platform, stdout)
+        packages = _packages(options.base_image or build_context.default_base_image(), images[0].platform, whole, stdout)
     with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
         folder = Path(name) / "dodo-images"
         folder.mkdir()
-        build_context.assemble(folder, packages)
-        build_context.define(folder, images, options.base_image, options.source)
+        build_context.assemble(folder, packages, whole=whole)
+        build_context.define(folder, images, options.source, options.base_image, options.docker_image)
         progress = "auto" if stdout.isatty() else "plain"
         words = ("buildx", "bake", "--file", build_context.DEFINITION, "--progress", progress)
         code, output = docker_command.show(words, stdout, folder)
@@ -117,11 +123,11 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
         stdout.write(f"built {image.reference:<{width}}  {docker_command.size(image.reference) / 1e6:.0f} MB\n")
 
 
-def _packages(base_image: str, platform: str, stdout: TextIO) -> Path:
+def _packages(base_image: str, platform: str, whole: bool, stdout: TextIO) -> Path:
     python = wheels.python_of(base_image, platform)
     stdout.write(f"downloading packages for Python {python.tag} on {python.machine} with pip\n")
     stdout.flush()
-    return wheels.provide(python, wheels.cache_folder())
+    return wheels.provide(python, wheels.cache_folder(), whole=whole)
 
 
 def _require_built(images: list[Image]) -> None:

@@ -14,12 +14,16 @@ LOCK = "locks/base.txt"
 """Versions of all packages, with the hashes of their wheels."""
 REQUIREMENTS = "services/requirements"
 _DOCKERFILE = "services/Dockerfile"
+_DATA = ("schemas", "templates", "tests_registry")
+"""What DoDo has beside its package and the services."""
 _FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf", "gantry-circle.elf")
 """The emulated rig, if ``make firmware`` has built it: part of the gantry's image."""
 
 
-def assemble(folder: Path, wheels: Path | None) -> None:
+def assemble(folder: Path, wheels: Path | None, *, whole: bool = False) -> None:
     """Copies sources, versions and wheels into an empty folder, with their dates.
+
+    The sources are those of services, or the ``whole`` of DoDo with its data.
 
     The engine identifies a context by its folder's name and transfers only files whose date has changed.
     """
@@ -28,8 +32,13 @@ def assemble(folder: Path, wheels: Path | None) -> None:
     (folder / LOCK).parent.mkdir()
     shutil.copy2(root / LOCK, folder / LOCK)
     shutil.copytree(root / "services", folder / "services", ignore=no_bytecode)
-    shutil.copytree(package / "opendlv", folder / "dodo_dsl" / "opendlv", ignore=no_bytecode)
-    shutil.copy2(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")
+    if whole:
+        for name in _DATA:
+            shutil.copytree(root / name, folder / name, ignore=no_bytecode)
+        shutil.copytree(package, folder / "dodo_dsl", ignore=shutil.ignore_patterns("__pycache__", "_data"))
+    else:
+        shutil.copytree(package / "opendlv", folder / "dodo_dsl" / "opendlv", ignore=no_bytecode)
+        shutil.copy2(package / "__init__.py", folder / "dodo_dsl" / "__init__.py")
     if all((root / _FIRMWARE / name).is_file() for name in _RIG):
         (folder / "rig").mkdir()
         for name in _RIG:
@@ -46,11 +55,12 @@ def _link(source: str, target: str) -> None:
         shutil.copy2(source, target)
 
 
-def define(folder: Path, images: Sequence[Image], base_image: str | None, source: str) -> None:
-    """Writes the targets of ``docker buildx bake``, one per image; the default base image is the Dockerfile's."""
-    arguments = {"VERSION": __version__, "SOURCE": source}
-    if base_image:
-        arguments["BASE_IMAGE"] = base_image
+def define(
+    folder: Path, images: Sequence[Image], source: str, base_image: str | None = None, docker_image: str | None = None
+) -> None:
+    """Writes the targets of ``docker buildx bake``, one per image; the default images are the Dockerfile's."""
+    named = {"BASE_IMAGE": base_image, "DOCKER_IMAGE": docker_image}
+    arguments = {"VERSION": __version__, "SOURCE": source} | {name: value for name, value in named.items() if value}
     targets = {
         image.name: {
             "context": ".",

@@ -10,7 +10,8 @@ from dodo_dsl.spec.manifest import Manifest
 SANDBOX = "sandbox"
 SHARED = ("base", "vision")
 """Stages that applications may use as base images."""
-
+DODO = "dodo"
+"""DoDo itself, for a pipeline's jobs: no test needs it, so it is built and pushed only where it is named."""
 
 PLATFORM = re.compile(r"linux/[a-z0-9]+(/v[0-9]+)?")
 """Such as linux/arm64, as Docker writes it."""
@@ -52,9 +53,10 @@ def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:
 
 
 def choose(words: Sequence[str], names: Sequence[str], prefix: str, tag: str) -> list[Image]:
-    """The images with these names, all without any; raises NoSuchImage."""
+    """The images with these names, those of tests without any; raises NoSuchImage."""
+    all_names = (*names, DODO)
     for word in words:
-        if word not in names:
-            hint = did_you_mean(word, names) or f"known: {', '.join(sorted(names))}"
+        if word not in all_names:
+            hint = did_you_mean(word, all_names) or f"known: {', '.join(sorted(all_names))}"
             raise NoSuchImage(f"there is no image '{word}'; {hint}")
-    return [Image(name, f"{prefix}/{name}:{tag}") for name in names if name in words or not words]
+    return [Image(name, f"{prefix}/{name}:{tag}") for name in all_names if name in words or (not words and name != DODO)]

@@ -61,13 +61,16 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dodo" / "wheels"
 
 
-def provide(python: Python, cache: Path) -> Path:
+def provide(python: Python, cache: Path, *, whole: bool = False) -> Path:
     """A folder with a wheel for each requirement and nothing else, all with locked hashes; raises WheelsError.
 
-    It is named after its requirements, and appears only when it is complete.
+    It is named after its requirements, and appears only when it is complete. The requirements are those of services,
+    or the ``whole`` of the lock.
     """
-    requirements = sorted((package_data.root() / REQUIREMENTS).glob("*.txt"))
-    locked = [_locked(file) for file in requirements]
+    if whole:
+        locked = [(package_data.root() / LOCK).read_text(encoding="utf-8")]
+    else:
+        locked = [_locked(file) for file in sorted((package_data.root() / REQUIREMENTS).glob("*.txt"))]
     digest = hashlib.sha256(repr(python).encode())
     for text in locked:
         digest.update(text.encode())

@@ -1,6 +1,7 @@
 """The build context holds what the Dockerfile copies, from this checkout, and its definition names the images."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from dodo_dsl import __version__, package_data
 from dodo_dsl.images import build_context
 from dodo_dsl.images.names import Image
-from tests.images.dockerfile import ROOT
+from tests.images.dockerfile import ROOT, stages
 
 
 def files(folder: Path) -> set[str]:
@@ -22,6 +23,13 @@ def test_context_has_the_bus_and_the_services_and_no_more(tmp_path: Path) -> Non
     assert {"services/base/process.py", "services/collision/service.yml", "services/Dockerfile.dockerignore"} <= found
     assert not [name for name in found if "__pycache__" in name or name.startswith(("dodo_dsl/cli", "wheels", "tests"))]
     assert (tmp_path / "services/base/loop.py").stat().st_mtime == (ROOT / "services/base/loop.py").stat().st_mtime
+
+
+def test_the_whole_of_dodo_has_what_its_stage_copies(tmp_path: Path) -> None:
+    build_context.assemble(tmp_path, None, whole=True)
+    copied = re.findall(r"^COPY (\w+) \w+$", stages()["dodo-code"].text, re.MULTILINE)
+    assert sorted(copied) == sorted(path.name for path in tmp_path.iterdir() if path.name != "rig")
+    assert {"dodo_dsl/cli/main.py", "schemas/dodo.schema.json", "dodo_dsl/opendlv/odvd/messages.odvd"} <= files(tmp_path)
 
 
 def test_the_emulated_rigs_come_along_where_both_builds_of_the_firmware_are(
@@ -53,7 +61,7 @@ def test_wheels_come_along(tmp_path: Path) -> None:
 
 def test_definition_names_targets_tags_and_arguments(tmp_path: Path) -> None:
     images = [Image("base", "here/base:1"), Image("collision", "here/collision:1")]
-    build_context.define(tmp_path, images, "debian-with-python", "https://git.example.org/dodo")
+    build_context.define(tmp_path, images, "https://git.example.org/dodo", "debian-with-python")
     definition = json.loads((tmp_path / build_context.DEFINITION).read_text())
     assert definition["group"]["default"]["targets"] == ["base", "collision"]
     target = definition["target"]["collision"]
@@ -66,7 +74,7 @@ def test_definition_names_targets_tags_and_arguments(tmp_path: Path) -> None:
 
 
 def test_without_a_base_image_the_dockerfile_decides(tmp_path: Path) -> None:
-    build_context.define(tmp_path, [Image("base", "here/base:1")], None, "")
+    build_context.define(tmp_path, [Image("base", "here/base:1")], "")
     definition = json.loads((tmp_path / build_context.DEFINITION).read_text())
     assert "BASE_IMAGE" not in definition["target"]["base"]["args"]
     assert build_context.default_base_image().startswith("python:3.")

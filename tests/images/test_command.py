@@ -51,6 +51,7 @@ def test_names_are_those_of_the_manifests() -> None:
         "registry.example.org/dodo/collision:2",
     )
     assert [image.name for image in choose([], names, "dodo", "1")] == list(names)
+    assert [image.reference for image in choose(["dodo"], names, "here", "1")] == ["here/dodo:1"]
     with pytest.raises(NoSuchImage, match="known: base, beacon"):
         choose(["zzz"], names, "dodo", "1")
 

@@ -52,7 +52,8 @@ def application_files(root: Path, language: str) -> list[New]:
     """A small application that drives, and how it starts."""
     folder = f"application/{language}"
     values = {"base": f"dodo/vision:{__version__}"}
-    sources = sorted(path.name for path in (package_data.templates() / "new" / folder).iterdir())
+    templates = (package_data.templates() / "new" / folder).iterdir()
+    sources = sorted(path.name for path in templates if path.is_file())  # an installed one has __pycache__ beside them
     compose = filled("application/docker-compose.yml", process=_PROCESSES[language])
     files = [New(root / name, filled(f"{folder}/{name}", **values)) for name in sources]
     return [*files, New(root / COMPOSE_FILES[0], compose)]
