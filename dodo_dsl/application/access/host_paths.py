@@ -13,7 +13,7 @@ _FOLDERS = ("/opt", "/srv", "/mnt", "/media", "/data", "/tmp")
 _TO_READ = ("/usr/share", "/usr/local", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
             "/run/udev", "/sys")  # fmt: skip
 _TMP = "/tmp"
-"""An application may mount it even where its repository lies there: a test has its own."""
+"""What is named there may be mounted, even where the repository lies in it: nobody keeps repositories there."""
 _DEVICES = ("/dev", "/sys")
 _HOMES = re.compile(r"/(?:home/[^/]+|root|Users/[^/]+)(?:/|$)")
 _OF_X11 = ".Xauthority"
@@ -55,7 +55,7 @@ class HostPaths:
         if "$" in text or self.is_own(text):
             return "", ""
         path = _real(self.whole(text))
-        is_tmp = path == _TMP and text.startswith("/")
+        is_tmp = text.startswith("/") and _below(path, [Path(_TMP)])
         if not is_tmp and any(_below(str(root), [Path(path)]) for root in self.roots):
             return f"'{text}' holds the whole repository and more", _INSIDE
         if not text.startswith(("/", "~")):
