@@ -16,7 +16,7 @@ PARTS := realtime-tests engine-tests fast-tests slow-tests first second
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test dev style types quick-tests $(PARTS) tools lint bench firmware format goldens schema site clean
+.PHONY: help demo check test dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware format goldens schema site clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
@@ -65,6 +65,10 @@ slow-tests:
 tools:
 	@scripts/install-test-tools
 
+# Compiles the tests once, which each of the parts that run side by side would do for itself
+compiled-tests: dev
+	@.venv/bin/pytest --quiet --collect-only >/dev/null
+
 lint:
 	@$(MAKE) --no-print-directory -j 2 style types
 
@@ -72,7 +76,7 @@ check:
 	@$(MAKE) --no-print-directory -j 3 style types quick-tests
 
 test:
-	@$(MAKE) --no-print-directory -j 3 style types tools
+	@$(MAKE) --no-print-directory -j 4 style types tools compiled-tests
 	@status=0; rm -f $(JUNIT)/*.xml; for part in first second; do \
 		$(MAKE) --no-print-directory -j 3 --keep-going --output-sync=target $$part || status=$$?; done; \
 		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status

@@ -23,9 +23,26 @@ for variable in ("NO_COLOR", "FORCE_COLOR"):  # tests say themselves when there 
 REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"
 
+PLACES = {
+    "engine": ("docker", "gitlab", "images", "run/docker"),
+    "realtime": ("cli/rig", "drive", "firmware", "hostile", "run/rigs", "services"),
+}
+"""Where tests with these marks are, so that `pytest -m engine` loads no others: that takes as long as some of the tests."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-goldens", action="store_true", help="write expected output instead of comparing")
+
+
+def is_at(path: Path, mark: str) -> bool:
+    """Whether a test file or a folder of tests may hold tests with a mark."""
+    place = path.relative_to(Path(__file__).parent)
+    return any(place.is_relative_to(one) or Path(one).is_relative_to(place) for one in PLACES[mark])
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    mark = config.getoption("markexpr")
+    return True if mark in PLACES and not is_at(collection_path, mark) else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -43,6 +60,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             )
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
+        for mark in PLACES:
+            if item.get_closest_marker(mark) and not is_at(item.path, mark):
+                raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', but is not in {', '.join(PLACES[mark])}")
 
 
 @pytest.fixture(autouse=True, scope="session")
