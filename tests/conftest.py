@@ -27,7 +27,7 @@ PLACES = {
     "engine": ("docker", "gitlab", "images", "run/docker"),
     "realtime": ("cli/rig", "drive", "firmware", "hostile", "run/rigs", "services"),
 }
-"""Where tests with these marks are, so that `pytest -m engine` loads no others: that takes as long as some of the tests."""
+"""Where tests with these marks are, so that `pytest -m engine` loads no others, which takes seconds."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -60,9 +60,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             )
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
-        for mark in PLACES:
+        for mark, places in PLACES.items():
             if item.get_closest_marker(mark) and not is_at(item.path, mark):
-                raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', but is not in {', '.join(PLACES[mark])}")
+                raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', but is not in {', '.join(places)}")
 
 
 @pytest.fixture(autouse=True, scope="session")

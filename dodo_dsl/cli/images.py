@@ -57,7 +57,9 @@ def _action(
         help="machines that the images are for, such as linux/arm64 (default: the engine's); several of them have the "
         "tags T-amd64 and T-arm64, and 'push' makes T a list of these"
     )  # fmt: skip
-    action.add_argument("name", nargs="*", metavar="NAME", help="services, sandbox, base, vision or dodo (default: all but dodo)")
+    action.add_argument(
+        "name", nargs="*", metavar="NAME", help="services, sandbox, base, vision or dodo (default: all but dodo)"
+    )
     action.add_argument(
         "--prefix", metavar="P", help="prefix of the images' names (default: images.prefix of dodo.yml, or dodo)"
     )
@@ -106,7 +108,8 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
     packages = None
     whole = any(image.name == DODO for image in images)
     if options.offline_wheels:
-        packages = _packages(options.base_image or build_context.default_base_image(), images[0].platform, whole, stdout)
+        base = options.base_image or build_context.default_base_image()
+        packages = _packages(base, images[0].platform, whole, stdout)
     with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
         folder = Path(name) / "dodo-images"
         folder.mkdir()

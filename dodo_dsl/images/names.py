@@ -59,4 +59,4 @@ def choose(words: Sequence[str], names: Sequence[str], prefix: str, tag: str) ->
         if word not in all_names:
             hint = did_you_mean(word, all_names) or f"known: {', '.join(sorted(all_names))}"
             raise NoSuchImage(f"there is no image '{word}'; {hint}")
-    return [Image(name, f"{prefix}/{name}:{tag}") for name in all_names if name in words or (not words and name != DODO)]
+    return [Image(name, f"{prefix}/{name}:{tag}") for name in all_names if name in (words or names)]

@@ -29,7 +29,7 @@ def test_the_whole_of_dodo_has_what_its_stage_copies(tmp_path: Path) -> None:
     build_context.assemble(tmp_path, None, whole=True)
     copied = re.findall(r"^COPY (\w+) \w+$", stages()["dodo-code"].text, re.MULTILINE)
     assert sorted(copied) == sorted(path.name for path in tmp_path.iterdir() if path.name != "rig")
-    assert {"dodo_dsl/cli/main.py", "schemas/dodo.schema.json", "dodo_dsl/opendlv/odvd/messages.odvd"} <= files(tmp_path)
+    assert {"dodo_dsl/cli/main.py", "schemas/dodo.schema.json", "templates/report/suite.css"} <= files(tmp_path)
 
 
 def test_the_emulated_rigs_come_along_where_both_builds_of_the_firmware_are(
