@@ -1,12 +1,14 @@
 """Bills of materials: what an image, or the Python that runs DoDo, is made of, as CycloneDX 1.6 JSON.
 
-Packages name themselves: Python's by their metadata, Debian's by dpkg. The same contents give the same text.
+Packages name themselves and their licences: Python's by their metadata, Debian's by dpkg and their file `copyright`,
+where it has the form that programs read (DEP 5), else by the common licences that it refers to. The same contents give
+the same text.
 """
 
 import json
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
@@ -14,7 +16,14 @@ from dodo_dsl import __version__
 from dodo_dsl.images import docker_command
 
 _QUESTION = r"""
-import importlib.metadata, json, shutil, subprocess
+import importlib.metadata, json, re, shutil, subprocess
+def of_debian(package):
+    try:
+        text = open(f"/usr/share/doc/{package}/copyright", errors="replace").read()
+    except OSError:
+        return []
+    names = re.findall(r"^License:[ \t]*(\S.*?)[ \t]*$", text, re.M) if text.startswith("Format:") else []
+    return sorted(set(names or [n.rstrip(".") for n in re.findall(r"/usr/share/common-licenses/([\w.+-]+)", text)]))
 def licence(m):
     return m.get("License-Expression") or next((c.rpartition(" :: ")[2] for c in m.get_all("Classifier") or ()
                                                 if c.startswith("License ::")), "")
@@ -22,7 +31,8 @@ python = [(d.metadata["Name"], d.version, licence(d.metadata)) for d in importli
 words = ["dpkg-query", "--show", "--showformat", "${Package}\t${Version}\t${Architecture}\n"]
 said = subprocess.run(words, capture_output=True, text=True).stdout if shutil.which(words[0]) else ""
 about = dict(line.rstrip().replace('"', "").split("=", 1) for line in open("/etc/os-release") if "=" in line)
-print(json.dumps({"python": python, "debian": [line.split("\t") for line in said.splitlines()],
+debian = [line.split("\t") for line in said.splitlines()]
+print(json.dumps({"python": python, "debian": [[*row, of_debian(row[0])] for row in debian],
                   "system": [about.get("ID", "linux"), about.get("VERSION_ID", "")]}))
 """
 
@@ -72,18 +82,18 @@ def _bill(subject: Mapping[str, Any], told: Mapping[str, Any], *, with_debian: b
 
 
 def _python(name: str, version: str, licence: str) -> dict[str, Any]:
-    licences = {"licenses": [{"license": {"name": licence}}]} if licence else {}
-    return {
-        **_component(name, version, f"pkg:pypi/{quote(name.lower().replace('_', '-'))}@{quote(version)}"),
-        **licences,
-    }
+    url = f"pkg:pypi/{quote(name.lower().replace('_', '-'))}@{quote(version)}"
+    return _component(name, version, url, [licence] if licence else [])
 
 
-def _debian(name: str, version: str, architecture: str, system: str, release: str) -> dict[str, Any]:
+def _debian(
+    name: str, version: str, architecture: str, licences: Sequence[str], system: str, release: str
+) -> dict[str, Any]:
     distribution = f"{system}-{release}" if release else system
     more = f"?arch={quote(architecture)}&distro={quote(distribution)}"
-    return _component(name, version, f"pkg:deb/{quote(system)}/{quote(name)}@{quote(version)}{more}")
+    return _component(name, version, f"pkg:deb/{quote(system)}/{quote(name)}@{quote(version)}{more}", licences)
 
 
-def _component(name: str, version: str, url: str) -> dict[str, Any]:
-    return {"type": "library", "bom-ref": url, "name": name, "version": version, "purl": url}
+def _component(name: str, version: str, url: str, licences: Sequence[str]) -> dict[str, Any]:
+    told = {"licenses": [{"license": {"name": one}} for one in licences]} if licences else {}
+    return {"type": "library", "bom-ref": url, "name": name, "version": version, "purl": url, **told}

@@ -17,7 +17,7 @@ _PURL = re.compile(r"pkg:(pypi|deb/[a-z]+)/[A-Za-z0-9.%+-]+@[A-Za-z0-9.%~+-]+(\?
 _DIGEST = "ab" * 32
 TOLD = {
     "python": [["PyYAML", "6.0.3", "MIT License"], ["sysv_ipc", "1.2.0", ""]],
-    "debian": [["bash", "5.2.15-2+b7", "amd64"], ["dash", "1:0.5", "amd64"]],
+    "debian": [["bash", "5.2.15-2+b7", "amd64", ["GFDL-1.3", "GPL-3"]], ["dash", "1:0.5", "amd64", []]],
     "system": ["debian", "12"],
 }
 
@@ -68,7 +68,9 @@ def test_an_image_names_pythons_packages_and_debians(tmp_path: Path, monkeypatch
         "pkg:pypi/pyyaml@6.0.3",
         "pkg:pypi/sysv-ipc@1.2.0",
     ]
-    assert bill["components"][2]["licenses"] == [{"license": {"name": "MIT License"}}]
+    licences = [component.get("licenses") for component in bill["components"]]
+    assert licences[0] == [{"license": {"name": "GFDL-1.3"}}, {"license": {"name": "GPL-3"}}]
+    assert licences[1:] == [None, [{"license": {"name": "MIT License"}}], None]
 
 
 def test_an_image_that_says_nothing_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,3 +110,7 @@ def test_an_image_that_was_built(built: dict[str, str]) -> None:
     found = {component["purl"].partition("@")[0] for component in bill["components"]}
     assert {"pkg:pypi/pyserial", "pkg:pypi/protobuf", "pkg:deb/debian/libc6"} <= found
     assert "pkg:pypi/numpy" not in found
+    unlicensed = [
+        row["name"] for row in bill["components"] if row["purl"].startswith("pkg:deb") and "licenses" not in row
+    ]
+    assert len(unlicensed) < 0.1 * len(found), unlicensed
