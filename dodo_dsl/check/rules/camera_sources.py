@@ -1,4 +1,7 @@
-"""``camera-source``: what a rig's computer can take pictures from, and in which sizes."""
+"""``camera-source``: what a rig's computer can take pictures from, and in which sizes.
+
+``camera-size``: a camera's optics, as they were measured, are those of pictures of one size.
+"""
 
 from collections.abc import Iterator
 from pathlib import PurePath
@@ -6,15 +9,19 @@ from pathlib import PurePath
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.spec.arguments import Argument, ResolvedService
-from dodo_dsl.spec.deployment.rig import CAMERA_SOURCE, EMULATED, RPICAM
+from dodo_dsl.spec.deployment.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
 
 _NAMES = (RPICAM, "file", EMULATED)
 _ALIGNED = 64
 """Rows of other widths are padded in the pipe of ``rpicam-vid``."""
 
 
+_OPTICS = "camera.intrinsics"
+
+
 def check(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
+        yield from _size(context.rig, service)
         for argument in service.arguments.values():
             if argument.parameter.rig == CAMERA_SOURCE and argument.text:
                 yield from _problems(context, service, argument)
@@ -32,6 +39,21 @@ def _problems(context: RuleContext, service: ResolvedService, argument: Argument
         message = f"rpicam-vid gives pictures whose width is a multiple of {_ALIGNED}, not {width}"
         hint = f"write a width of {max(int(width) // _ALIGNED, 1) * _ALIGNED}"
         yield Diagnostic(span, "camera-source", message, hint)
+
+
+def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
+    """A service that takes optics from the rig and works on pictures of another size."""
+    taken = (a.parameter for a in service.arguments.values() if (a.parameter.rig or "").startswith(_OPTICS))
+    if rig is None or not any(p.name not in service.use.parameters and rig.entry(p.rig or "") for p in taken):
+        return
+    measured = [rig.text(f"{_OPTICS}.{name}") for name in ("width", "height")]
+    given = [service.texts.get(name, "") for name in ("width", "height")]
+    if all(measured) and all(given) and measured != given:
+        where = service.use.parameters.get("width") or rig.entry(f"{_OPTICS}.width")
+        message = f"the camera of rig '{rig.name}' was measured in pictures of {' x '.join(measured)}, "
+        message += f"and '{service.use.name}' has them of {' x '.join(given)}"
+        hint = f"measure it again at this size with 'dodo rig measure {rig.name} --camera', or take pictures of the measured one"
+        yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)
 
 
 def _span(service: ResolvedService, argument: Argument) -> Span:
