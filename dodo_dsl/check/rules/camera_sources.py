@@ -52,7 +52,7 @@ def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
         where = service.use.parameters.get("width") or rig.entry(f"{_OPTICS}.width")
         message = f"the camera of rig '{rig.name}' was measured in pictures of {' x '.join(measured)}, "
         message += f"and '{service.use.name}' has them of {' x '.join(given)}"
-        hint = f"measure it again at this size with 'dodo rig measure {rig.name} --camera', or take pictures of the measured one"
+        hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take pictures of the measured size"
         yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)
 
 
