@@ -48,7 +48,10 @@ class PlannedService:
 
 @dataclass(frozen=True)
 class ApplicationService:
-    """A service under test; ``process`` starts it without containers, None when only its image can."""
+    """A service under test; ``process`` starts it without containers, None when only its image can.
+
+    ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``.
+    """
 
     name: str
     process: tuple[str, ...] | None = None
@@ -57,6 +60,8 @@ class ApplicationService:
     takes_cid: bool = False
     takes_memory: bool = False
     env_files: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -105,6 +105,7 @@ def _problem(plan: Plan) -> str:
         "variable": all(isinstance(v, str) for v in plan.application.variables.values()),
         "secret": all(isinstance(text, str) for pair in plan.application.secrets.items() for text in pair),
         "access": _is_access(plan.application.access),
+        "message": all(isinstance(m, str) for s in plan.application.services for m in (*s.inputs, *s.outputs)),
         "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
@@ -152,4 +153,5 @@ def _service(raw: dict[str, Any]) -> PlannedService:
 def _application_service(raw: dict[str, Any]) -> ApplicationService:
     process = raw["process"]
     words = {"process": None if process is None else tuple(process), "command": tuple(raw["command"])}
-    return ApplicationService(**{**raw, **words, "env_files": tuple(raw["env_files"])})
+    lists = {key: tuple(raw[key]) for key in ("env_files", "inputs", "outputs")}
+    return ApplicationService(**{**raw, **words, **lists})

@@ -9,6 +9,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run.load.meter import LoadMeter, add_up
+from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
     Backend,
     BackendError,
@@ -27,6 +28,7 @@ from dodo_dsl.run.standing import Standing, standing
 READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
 BEGIN_PATIENCE_S = 2.0
+LISTEN_PATIENCE_S, LISTEN_PERIOD_S = 10.0, 0.02
 
 
 @dataclass
@@ -120,7 +122,19 @@ class Engine:
             self.state.layer_of.update(dict.fromkeys(names, layer))
             self.say(f"waiting for {layer}")
             await self._until_ready({name for name, reports_ready in names.items() if reports_ready})
+        await self._until_listening()
         self.state.setup_s = self._now() - start
+
+    async def _until_listening(self) -> None:
+        """Waits for the application's services that consume messages: what comes before they listen is lost."""
+        waits = {s.name for s in self.plan.application.services if s.inputs}
+        deadline = self._now() + LISTEN_PATIENCE_S
+        while waits and (listeners := await self.backend.listeners()) is not None and (waits := waits - {*listeners}):
+            if self._now() >= deadline:
+                self.state.notes.append(deaf(sorted(waits), LISTEN_PATIENCE_S))
+                return
+            if event := await self._next(self._now() + LISTEN_PERIOD_S):
+                self.state.take(event)
 
     async def _until_ready(self, waits: set[str]) -> None:
         """Waits for services that report when they are ready; the others are ready when they run."""

@@ -134,6 +134,13 @@ def lost_messages(service: PlannedService, messages: int) -> str:
     return f"service '{service.name}' lost {count}, as its receive buffer was full: {meaning}"
 
 
+def deaf(services: Sequence[str], patience_s: float) -> str:
+    """A sentence on services of the application that consume messages, but have no socket for them."""
+    names = " and ".join(f"'{name}'" for name in services)
+    which = f"{names}, which consume{'s' * (len(services) == 1)} messages, had"
+    return f"{which} not joined the bus after {patience_s:g} s: what others sent before is lost"
+
+
 def flooded(plan: Plan, event: Flooded) -> Finding:
     """The end of a test that sends more than its recorder takes; it is the application's where only that can have."""
     names = [service.name for service in plan.services if _may_send(service, event.message)]

@@ -1,6 +1,6 @@
 """What a backend is, and the events that it reports to the engine while a test runs."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -188,6 +188,10 @@ class Backend(Protocol):
         ...
 
     async def next_event(self) -> Event: ...
+
+    async def listeners(self) -> Collection[str] | None:
+        """The services of the application that listen on an OpenDLV bus already; None where that cannot be seen."""
+        ...
 
     async def begin(self) -> None:
         """Announces on the test's bus that everything is ready; may be repeated."""

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.drive.applications import ROOT, dodo, results
+from tests.drive.applications import ROOT, dodo, kiwi, results
 
 pytestmark = pytest.mark.slow
 
@@ -98,6 +98,16 @@ def test_the_first_picture_has_a_patience_of_its_own(tmp_path: Path) -> None:
     nobody = "no reader waited for a picture of 'camera'"
     assert test["reason"] == f"the application did not answer frame 1 within 1 s ({nobody})"
     assert test["sim_s"] == 0.0
+
+
+def test_of_several_programs_the_last_may_join_late(tmp_path: Path) -> None:
+    """What the first one sends before the second one listens would be lost, and no frame answered."""
+    joins = "    with Session(flags.cid) as session:\n        session.hear_only("
+    path = kiwi(tmp_path / "late", ("steering.py", joins, f"    __import__('time').sleep(1)\n{joins}"))
+    awaiting = path.read_text()
+    path.write_text(awaiting.replace("--await-steering", ""))
+    assert path.read_text() != awaiting
+    dodo("run", "sil-closed-straight", "--application", str(path), "--report", str(tmp_path / "report"), code=0)
 
 
 def test_libcluon_in_lockstep(tmp_path: Path) -> None:

@@ -64,6 +64,8 @@ _application_services = st.builds(
     takes_cid=st.booleans(),
     takes_memory=st.booleans(),
     env_files=_words,
+    inputs=_words,
+    outputs=_words,
 )
 _compose: Any = st.recursive(
     st.none() | st.booleans() | st.integers(-(1 << 53), 1 << 53) | _texts,

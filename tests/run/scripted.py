@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import os
 import selectors
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -89,6 +89,8 @@ class ScriptedBackend:
     name: str = "process"
     loads: Callable[[float], Snapshot | None] = lambda _: None
     """What was used at a time of the loop."""
+    listens: Mapping[str, float] | None = None
+    """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
 
     def __post_init__(self) -> None:
         self.cid = self.plan.cid + 1
@@ -107,6 +109,10 @@ class ScriptedBackend:
 
     async def next_event(self) -> Event:
         return await self._events.get()
+
+    async def listeners(self) -> Collection[str] | None:
+        now = asyncio.get_running_loop().time()
+        return None if self.listens is None else {name for name, since in self.listens.items() if since <= now}
 
     async def begin(self) -> None:
         await self._call("begin")

@@ -7,8 +7,15 @@ from dataclasses import replace
 import pytest
 
 from dodo_dsl.outcome import MachineLoad, Outcome
-from dodo_dsl.plan.model import LAYERS, Flag, Plan
-from dodo_dsl.run.engine import BEGIN_PATIENCE_S, LAST_TIME_PATIENCE_S, READY_PATIENCE_S, Engine
+from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Plan
+from dodo_dsl.run.engine import (
+    BEGIN_PATIENCE_S,
+    LAST_TIME_PATIENCE_S,
+    LISTEN_PATIENCE_S,
+    LISTEN_PERIOD_S,
+    READY_PATIENCE_S,
+    Engine,
+)
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import (
     BackendError,
@@ -488,3 +495,31 @@ def test_a_clock_that_stops(kind: str, expected: str, reason: str, has_lines: Ca
     found = outcome(backend)
     assert (found.outcome, found.reason) == (expected, reason)
     assert has_lines(found)
+
+
+def consuming(listens: dict[str, float] | None, stages: dict[str, Events] | None = None) -> ScriptedBackend:
+    """An application of two programs, of which the second consumes messages of the first."""
+    services = (ApplicationService("lane", outputs=("team.Lane",)), ApplicationService("driver", inputs=("team.Lane",)))
+    tested = plan(application=Application(".", services))
+    return ScriptedBackend(tested, stages or drives(), listens=listens)
+
+
+def test_it_begins_when_those_listen_that_consume_messages() -> None:
+    found = outcome(consuming({"driver": 6.0}))
+    assert (found.outcome, found.notes) == ("passed", ())
+    assert found.setup_s == pytest.approx(6.0, abs=LISTEN_PERIOD_S)
+    assert outcome(consuming({"lane": 0.0, "driver": 0.0})).setup_s == 2.0
+    assert outcome(consuming(None)).setup_s == 2.0, "nobody can see them"
+
+
+def test_who_never_listens_is_waited_for_only_so_long() -> None:
+    found = outcome(consuming({"lane": 0.0}))
+    told = "'driver', which consumes messages, had not joined the bus after 10 s: what others sent before is lost"
+    assert (found.outcome, found.notes) == ("passed", (told,))
+    assert found.setup_s == pytest.approx(2.0 + LISTEN_PATIENCE_S, abs=LISTEN_PERIOD_S)
+
+
+def test_who_ends_instead_of_listening_is_not_waited_for() -> None:
+    found = outcome(consuming({}, {**drives(), "application": [(1.0, Exited("driver", 3))]}))
+    ended = "application service 'driver' ended with exit code 3 during set-up, before the test was decided"
+    assert (found.outcome, found.reason) == ("failed", ended)

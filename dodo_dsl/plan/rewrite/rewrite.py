@@ -1,14 +1,14 @@
 """``plan_application``: a test's own copy of the application's compose file."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
-from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, environment, plain, text
+from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, Word, environment, plain, text
 from dodo_dsl.application.test_variables import with_variables
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.plan.rewrite import cid_and_image, container_limits, removals, service_namespaces, variables, volumes
@@ -114,4 +114,10 @@ def _planned(service: ComposeService, cid: int) -> ApplicationService:
         takes_cid=opendlv_flags.takes_cid((*words, *(v for v in variables.values() if v)), variables),
         takes_memory=opendlv_flags.takes_memory(words),
         env_files=tuple(file.path for file in service.env_files),
+        inputs=_names(service.declared.inputs) if service.declared else (),
+        outputs=_names(service.declared.outputs) if service.declared else (),
     )
+
+
+def _names(words: Iterable[Word]) -> tuple[str, ...]:
+    return tuple(name for name, _ in words)

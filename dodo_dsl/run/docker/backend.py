@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +148,10 @@ class DockerBackend:
 
     async def next_event(self) -> Event:
         return await self._events.get()
+
+    async def listeners(self) -> Collection[str] | None:
+        names = {s.name for s in self.plan.application.services}
+        return await asyncio.to_thread(self._processes.listeners, names, self.cid)
 
     async def begin(self) -> None:
         await announce_begin(self.cid, self.plan.seed, self._containers.get(SANDBOX), self._key)

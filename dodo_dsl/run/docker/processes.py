@@ -1,6 +1,6 @@
 """The processes of a test's containers on this machine, and what they have used."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +8,7 @@ from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.snapshot import PROC, Snapshot
 from dodo_dsl.run.load.thread_times import ThreadTimes
+from dodo_dsl.run.services.listeners import listening, members
 
 
 class ContainerProcesses:
@@ -22,22 +23,36 @@ class ContainerProcesses:
     def load(self) -> Snapshot | None:
         """What the services have used so far; None where the engine runs one of them on another machine."""
         if self._services is None:
-            self._services = self._find()
+            self._services = self._pids(self._containers) or {}
         return snapshot.take(self._times, self._services, self._proc) if self._services else None
 
-    def _find(self) -> dict[int, str]:
-        """The first process of each container that runs; none at all where one of them is not found here."""
+    def listeners(self, names: Collection[str], cid: int) -> set[str] | None:
+        """The services among ``names`` that listen on an OpenDLV bus already; None where that cannot be seen.
+
+        Where the kernel does not show this user their sockets, those do whose network has a member of the bus: each
+        container has a network of its own, but on the host.
+        """
+        services = self._pids({name: c for name, c in self._containers.items() if name in names})
+        if not services:
+            return None
+        found = listening(services, self._proc)
+        if found is None:
+            found = {name for pid, name in services.items() if members(cid, self._proc / str(pid)) != 0}
+        return found
+
+    def _pids(self, containers: Mapping[str, Any]) -> dict[int, str] | None:
+        """The first process of each container that runs; None where one of them is not found here."""
         from docker.errors import DockerException
 
         found = {}
-        for name, container in self._containers.items():
+        for name, container in containers.items():
             try:
                 container.reload()
             except (DockerException, OSError):
-                return {}
+                return None
             pid = int(container.attrs["State"].get("Pid") or 0)
             if pid and not is_of(pid, container.id, self._proc):
-                return {}
+                return None
             found[pid] = name
         found.pop(0, None)
         return found

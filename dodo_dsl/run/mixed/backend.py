@@ -1,6 +1,7 @@
 """The mixed backend: the application in containers, DoDo's services as processes that share network and memory."""
 
 import asyncio
+from collections.abc import Collection
 from dataclasses import replace
 
 from dodo_dsl.run.load.snapshot import Snapshot
@@ -30,6 +31,9 @@ class MixedBackend:
 
     async def next_event(self) -> Event:
         return await self._containers.next_event()
+
+    async def listeners(self) -> Collection[str] | None:
+        return await self._containers.listeners()
 
     async def begin(self) -> None:
         await self._processes.begin()

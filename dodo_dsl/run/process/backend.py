@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,7 @@ class ProcessBackend:
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._asked: asyncio.Future[Snapshot | None] | None = None
+        self._listeners: asyncio.Future[list[str] | None] | None = None
         self._sandbox = SandboxClient(
             isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
         )
@@ -79,6 +81,9 @@ class ProcessBackend:
         elif "load" in message:
             if self._asked is not None and not self._asked.done():
                 self._asked.set_result(snapshot.from_json(message["load"]))
+        elif "listeners" in message:
+            if self._listeners is not None and not self._listeners.done():
+                self._listeners.set_result(message["listeners"])
         elif "exited" in message:
             task = asyncio.ensure_future(self._exited(**message))
             task.add_done_callback(lambda t: t.exception())
@@ -161,6 +166,15 @@ class ProcessBackend:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
                 return await asyncio.shield(self._asked)
+        return None
+
+    async def listeners(self) -> Collection[str] | None:
+        """As the sandbox sees them; None when it does not answer."""
+        self._listeners = asyncio.get_running_loop().create_future()
+        self._sandbox.send({"do": "listeners"})
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(LOAD_PATIENCE_S):
+                return await self._listeners
         return None
 
     async def close(self, keep: bool) -> list[str]:

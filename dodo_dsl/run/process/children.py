@@ -8,8 +8,8 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
+from dodo_dsl.run.load.processes import owners, parents
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.confined import memory_watch
 from dodo_dsl.run.process.confined.confined_process import ConfinedProcess
@@ -97,7 +97,7 @@ class Children:
         """Ends those that use more memory than they may."""
         confined = {c.pid: (name, c.memory) for name, c in self._running.items() if isinstance(c, ConfinedProcess)}
         limits = {pid: most for pid, (_, most) in confined.items()}
-        for pid, size in memory_watch.above(limits, dict(_parents())).items():
+        for pid, size in memory_watch.above(limits, dict(parents())).items():
             name, _ = confined[pid]
             if name not in self._used:
                 self._used[name] = size
@@ -155,33 +155,17 @@ def _begin(parent: int, masked: Sequence[str]) -> None:
 
 def _within(bubblewrap: int) -> Iterator[int]:
     """The processes in a sandbox, without bubblewrap's own two: its first process, and the one that it watches."""
-    parents = dict(_parents())
-    for pid in parents:
+    known = dict(parents())
+    for pid in known:
         line = [pid]
-        while line[-1] in parents and line[-1] != bubblewrap:
-            line.append(parents[line[-1]])
+        while line[-1] in known and line[-1] != bubblewrap:
+            line.append(known[line[-1]])
         if line[-1] == bubblewrap and len(line) > 2:
             yield pid
 
 
 def _descendants(owns_namespace: bool) -> Iterator[int]:
-    parents = dict(_parents())
     if owns_namespace:
-        yield from (pid for pid in parents if pid != os.getpid())
+        yield from (pid for pid, _ in parents() if pid != os.getpid())
         return
-    for pid in parents:
-        ancestor = pid
-        while ancestor in parents and ancestor != os.getpid():
-            ancestor = parents[ancestor]
-        if ancestor == os.getpid() and pid != ancestor:
-            yield pid
-
-
-def _parents() -> Iterator[tuple[int, int]]:
-    """The pids of every process that is not a zombie and of its parent."""
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(OSError):
-                fields = (entry / "stat").read_text().rpartition(")")[2].split()
-                if fields[0] != "Z":
-                    yield int(entry.name), int(fields[1])
+    yield from (pid for pid, _ in owners({os.getpid(): ""}) if pid != os.getpid())

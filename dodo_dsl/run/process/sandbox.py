@@ -9,9 +9,10 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
                         {"do": "close"}; {"do": "probe"}; {"do": "send", "cid", "data"}; {"do": "load"};
-                        {"do": "keep"} with the descriptors of outputs and logs
+                        {"do": "listeners"}; {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or {"unstartable": id, "why"};
                         {"exited": id, "code", "used", "failed"}; {"load": snapshot or null};
+                        {"listeners": names of what listens on a bus, or null};
                         {"probe": why an application cannot be confined, or ""}
 """
 
@@ -42,6 +43,7 @@ from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
 from dodo_dsl.run.process.confined.places import Places
 from dodo_dsl.run.process.confined.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.entered import Entered
+from dodo_dsl.run.services.listeners import listening
 
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
@@ -169,9 +171,12 @@ class Sandbox:
 
     def _do_load(self, _descriptors: list[int]) -> None:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
-        is_ours = Path("/proc/self").readlink().name == str(os.getpid())
-        taken = snapshot.take(self.times, {**self.children.names, os.getpid(): ""}) if is_ours else None
+        taken = snapshot.take(self.times, {**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
         self.send(load=snapshot.to_json(taken))
+
+    def _do_listeners(self, _descriptors: list[int]) -> None:
+        found = listening(self.children.names) if _has_own_proc() else None
+        self.send(listeners=None if found is None else sorted(found))
 
     def _do_keep(self, descriptors: list[int]) -> None:
         """Stays when the runner ends, and writes the services' output into their logs in its place."""
@@ -190,6 +195,11 @@ class Sandbox:
 
     def _do_close(self, _descriptors: list[int]) -> None:
         self.ended = True
+
+
+def _has_own_proc() -> bool:
+    """Whether ``/proc`` shows processes by their numbers here."""
+    return Path("/proc/self").readlink().name == str(os.getpid())
 
 
 def _in_namespaces(channel: socket.socket, entered: Entered | None) -> None:

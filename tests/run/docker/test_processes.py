@@ -7,6 +7,7 @@ import pytest
 from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.run.docker import processes
 from dodo_dsl.run.docker.processes import ContainerProcesses
 from dodo_dsl.run.load.snapshot import Times
 from tests.run.load.test_thread_times import Proc
@@ -32,6 +33,18 @@ def proc(tmp_path: Path) -> Proc:
         found.put(pid, 1, {pid: (100, 10)})
         (tmp_path / str(pid) / "cgroup").write_text(f"{group}\n")
     return found
+
+
+def test_which_containers_listen_on_a_bus(proc: Proc, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By their sockets; where those are hidden, by the members of their networks."""
+    (proc.root / "10" / "net").mkdir()
+    (proc.root / "10" / "net" / "igmp").write_text("Idx\tDevice\n2\teth0\n\t\t\t\t830000E1     1 0:00000000\t\t0\n")
+    containers = ContainerProcesses({"app": Container("c0ffee", 10), "camera": Container("beef", 12)}, proc.root)
+    monkeypatch.setattr(processes, "listening", lambda services, _: set(services.values()))
+    assert containers.listeners(["app"], 130) == {"app"}
+    assert containers.listeners(["camera"], 130) is None
+    monkeypatch.setattr(processes, "listening", lambda *_: None)
+    assert (containers.listeners(["app"], 131), containers.listeners(["app"], 130)) == ({"app"}, set())
 
 
 def services(proc: Proc, **containers: Any) -> dict[str, Times] | None:

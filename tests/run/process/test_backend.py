@@ -91,6 +91,22 @@ def test_variables_file_of_an_unknown_user_is_an_error_of_its_test_alone(host: B
     assert (first.outcome, first.reason, second.outcome) == ("error", told, "passed")
 
 
+JOINS = """
+time.sleep(0.5)
+from dodo_dsl.opendlv.bus.session import Session
+session = Session(int(sys.argv[1].removeprefix("--cid=")))
+"""
+
+
+def test_it_begins_when_the_application_has_joined_the_bus(bench: Bench) -> None:
+    plan = bench.plan(application=JOINS + STARTED + WAIT, judge=READY + AFTER_START + PASS)
+    (app,) = plan.application.services
+    consuming = replace(app, inputs=("opendlv.sim.Frame",))
+    (outcome,) = bench.run(replace(plan, application=replace(plan.application, services=(consuming,))))
+    assert (outcome.outcome, outcome.notes) == ("passed", ())
+    assert outcome.setup_s is not None and outcome.setup_s > 0.5
+
+
 STUBBORN = """
 import signal, subprocess
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
