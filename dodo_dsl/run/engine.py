@@ -74,6 +74,7 @@ class Engine:
         finally:
             if self.state.finished is None:
                 self.state.finished = self._now()
+            self.state.keep_tails(self.backend)
             if not keep and self.state.outcome(self.backend).outcome == "passed":
                 self.passed()
             self.say("taking down")

@@ -63,6 +63,7 @@ class RunState:
     time: Time | None = None
     _ended_by: str = ""
     """The service whose end was that of the test."""
+    _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
@@ -185,6 +186,11 @@ class RunState:
         """The application's service whose last lines may explain why there is no answer."""
         return next((s.name for s in self.plan.application.services), "")
 
+    def keep_tails(self, backend: Backend) -> None:
+        """The test is decided: what services write from now on, as they are ended, explains nothing."""
+        names = {*self.layer_of, *self.facts.evaluators, *(finding.service for finding in self.facts.findings)}
+        self._tails = {name: tuple(backend.tail(name)) for name in names}
+
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
@@ -201,7 +207,7 @@ class RunState:
             services=tuple(self._service_rows()),
             checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
-            last_lines=tuple(backend.tail(finding.service)) if finding.result != "passed" else (),
+            last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
             notes=(*self.notes, *losses, *answers.notes),
             machine=considered.load,
             response=self.response,

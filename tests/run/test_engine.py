@@ -523,3 +523,13 @@ def test_who_ends_instead_of_listening_is_not_waited_for() -> None:
     found = outcome(consuming({}, {**drives(), "application": [(1.0, Exited("driver", 3))]}))
     ended = "application service 'driver' ended with exit code 3 during set-up, before the test was decided"
     assert (found.outcome, found.reason) == ("failed", ended)
+
+
+def test_what_is_written_after_the_decision_is_not_quoted() -> None:
+    class Talking(ScriptedBackend):
+        async def close(self, keep: bool) -> list[str]:
+            self.tails = {"track": ["it hit the wall", "ended by SIGTERM"]}
+            return await super().close(keep)
+
+    stages = {**READY, "begin": [(1.0, FAILED), (1.0, ENDED)]}
+    assert outcome(Talking(plan(), stages, tails={"track": ["it hit the wall"]})).last_lines == ("it hit the wall",)
