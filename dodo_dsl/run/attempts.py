@@ -1,12 +1,13 @@
 """The attempts at one test: again after an error, if wanted, with the reports of earlier ones kept."""
 
+import asyncio
 import contextlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.recorder_service import PICTURES_FILE
+from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
@@ -81,6 +82,8 @@ class Attempts:
                 engine = Engine(chosen.plan, backend, say, begun, stands, forget_pictures)
                 outcome, kept = await engine.run(self._keep)
                 self.kept.extend(kept)
+                if engine.state.is_unanswered and not self._keep and (why := await asyncio.to_thread(_silent, job)):
+                    outcome = replace(outcome, reason=f"{outcome.reason}; {why}")
                 if job.plan.pool:
                     outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
@@ -92,6 +95,16 @@ class Attempts:
         if outcome.outcome == "passed" and not self._keep:
             forget_pictures()
         return outcome
+
+
+def _silent(job: Job) -> str:
+    """Which program of the application is to blame that it did not answer; empty where that is not known."""
+    from dodo_dsl.opendlv.odvd.tokens import OdvdError
+    from dodo_dsl.run.recorded.silent_consumers import silent_consumer
+
+    with contextlib.suppress(OSError, OdvdError):
+        return silent_consumer(job.plan, job.folder, job.report / RECORDING)
+    return ""
 
 
 def is_undecided(outcome: Outcome) -> bool:

@@ -60,6 +60,8 @@ class RunState:
     finished: float | None = None
     setup_s: float | None = None
     input_ended: bool = False
+    is_unanswered: bool = False
+    """Whether the clock of a lockstep test gave up as the application did not answer."""
     time: Time | None = None
     _ended_by: str = ""
     """The service whose end was that of the test."""
@@ -144,8 +146,9 @@ class RunState:
     def _take_stop(self, kind: str, reason: str) -> None:
         if kind == "timedout":
             self.time_out()
-        is_silent = kind == "unanswered"
-        self.end("failed" if is_silent else "error", reason, self._first_application() if is_silent else CLOCK)
+        self.is_unanswered = kind == "unanswered"
+        service = self._first_application() if self.is_unanswered else CLOCK
+        self.end("failed" if self.is_unanswered else "error", reason, service)
 
     def _take_exit(self, service: str, code: int, out_of_memory: bool) -> None:
         layer, when = self.layer_of.get(service, "application"), self._when()
