@@ -3,22 +3,28 @@
 import json
 import os
 import re
+from collections.abc import Sequence
 
-from dodo_dsl.search.findings import kind_of
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.spec.model import Spec
 
 _NOT_WORD = re.compile(r"[^a-z0-9]+")
-_MOST_WORDS, _MOST_NAME = 6, 90
+_MOST_NAME, _LEAST_OF_TEST = 60, 20
+"""Characters of a name, as the schema has it, and those of the test's that it keeps at least."""
 
 
-def name_of(spec: Spec, reason: str, taken: set[str]) -> str:
-    """A name that is not ``taken``: the test's and the first words of the reason."""
-    words = [word for word in _NOT_WORD.split(kind_of(reason).lower()) if word][:_MOST_WORDS]
-    base = "-".join([spec.location.stem, *words])[:_MOST_NAME].strip("-")
-    numbered = (f"{base}-{number}" for number in range(2, len(taken) + 3))
-    return base if base not in taken else next(name for name in numbered if name not in taken)
+def name_of(spec: Spec, changed: Sequence[str], taken: set[str]) -> str:
+    """A name that is not ``taken``: the test's and the ranges whose values are not nominal."""
+    names = "-".join(word for name in changed for word in _NOT_WORD.split(name.lower()) if word)
+    end = f"-fails-at-{names or 'nominal'}"
+    for number in range(1, len(taken) + 2):
+        last = end if number == 1 else f"{end[: _MOST_NAME - _LEAST_OF_TEST - len(taken)].rstrip('-')}-{number}"
+        kept = spec.location.stem[: max(_MOST_NAME - len(last), _LEAST_OF_TEST)].rstrip("-")
+        name = f"{kept}{last}"[:_MOST_NAME].rstrip("-")
+        if name not in taken:
+            return name
+    raise AssertionError("there are more names than are taken")
 
 
 def text_of(spec: Spec, name: str, values: Values, reason: str) -> str:

@@ -91,7 +91,7 @@ class Shrinker:
     def _write(self, values: Values, names: Sequence[str], reason: str) -> str:
         """The name of the test that is written."""
         spec = self.drives.spec
-        name = name_of(spec, reason, {one.spec for one in self.found})
+        name = name_of(spec, names, {one.spec for one in self.found})
         text = text_of(spec, name, {one: values[one] for one in names}, reason)
         for folder in filter(None, (self.drives.report / TESTS, self.registry)):
             path = folder / name / f"{name}{SUFFIX}"
