@@ -22,6 +22,7 @@ class SearchProgress:
         self._stream, self._total, self._deadline = stream, total, deadline
         self._start = time.monotonic()
         self._done = self._driven = self._failed = 0
+        self._shrinks = False
         self._worst: float | None = None
         self._status = _status(stream) if stream.isatty() else None
         self.take: Callable[[Outcome], Drive | None] = lambda _: None
@@ -60,7 +61,7 @@ class SearchProgress:
 
     def count(self, drive: Drive, repeat: int = 1) -> None:
         """Counts a drive, also one of an earlier command; one that repeats another is no further failure."""
-        if repeat > 1:
+        if repeat > 1 and not self._shrinks:
             self._total = self._total and self._total + 1
         self._done += 1
         self._failed += drive.outcome == "failed" and repeat == 1
@@ -72,16 +73,24 @@ class SearchProgress:
         self._driven += 1
         self.count(drive)
 
-    def shrink(self, reason: str) -> None:
-        """From now on, drives shrink a failure; how many it takes is not known."""
-        self._total = self._deadline = None
-        self.note(f"shrinking: {reason}")
+    def begin_shrinking(self, failures: int, most: int) -> None:
+        """From now on, ``most`` drives at most shrink failures."""
+        self._done, self._total, self._deadline, self._shrinks = 0, most, None, True
+        time = f", {about(self._left())}" if self._driven else ""
+        self.note(f"shrinking {count(failures, 'failure')}: up to {most} drives{time}; --sweep leaves it out")
+
+    def expect(self, most: int) -> None:
+        """``most`` further drives at most are left."""
+        self._total = self._done + most
 
     def _show(self, drive: Drive) -> None:
-        of = f" of {self._total}" if self._total else ""
-        worst = "" if self._worst is None else f", worst margin {self._worst:.3f}"
+        of = "" if not self._total else f" of up to {self._total}" if self._shrinks else f" of {self._total}"
         left = f", {about(self._left())} to go" if self._total or self._deadline else ""
-        line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}{left}"
+        if self._shrinks:
+            line = f"{self._done}{of} drives of shrinking{left.replace('about', 'up to')}"
+        else:
+            worst = "" if self._worst is None else f", worst margin {self._worst:.3f}"
+            line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}{left}"
         if self._status is not None:
             self._status.update(line)
         else:

@@ -9,7 +9,7 @@ from dodo_dsl import atomic
 from dodo_dsl.cli.search.drives import Drives, repeated
 from dodo_dsl.search.findings import Failure, Shrunk, is_alike, kind_of
 from dodo_dsl.search.regression import name_of, text_of
-from dodo_dsl.search.shrink import changed, nearest, shrink
+from dodo_dsl.search.shrink import changed, most_drives, nearest, shrink
 from dodo_dsl.search.space import Space, texts
 from dodo_dsl.search.store import Drive
 from dodo_dsl.spec.instances.vary import Values
@@ -34,18 +34,30 @@ class Shrinker:
     async def shrink(self, failures: Sequence[Failure], failed: Sequence[tuple[Values, Drive]]) -> None:
         """Shrinks the first failures of ``failed`` drives. Raises Interrupted."""
         self.drives.folder, self.drives.deadline = FOLDER, None
-        for failure in failures[:MOST_KINDS]:
-            self.drives.progress.shrink(failure.worst.reason)
-            of_kind = {
-                drive.number: (values, drive) for values, drive in failed if kind_of(drive.reason) == failure.kind
-            }
-            first = await self._first(of_kind)
-            if first is None:
-                continue
-            values = await self._shrunk(of_kind[first.number][0], first)
-            if texts(values) not in [one.values for one in self.found]:
-                self.found.append(await self._confirmed(values))
+        kinds = [
+            {drive.number: (values, drive) for values, drive in failed if kind_of(drive.reason) == failure.kind}
+            for failure in failures[:MOST_KINDS]
+        ]
+        if kinds:
+            self.drives.progress.begin_shrinking(len(kinds), sum(map(self._most, kinds)))
+        for number, (failure, of_kind) in enumerate(zip(failures, kinds, strict=False), 1):
+            self.drives.progress.note(f"shrinking: {failure.worst.reason}")
+            await self._shrink(of_kind)
+            self.drives.progress.expect(sum(map(self._most, kinds[number:])))
         shutil.rmtree(self.drives.report / FOLDER, ignore_errors=True)
+
+    def _most(self, failed: dict[int, tuple[Values, Drive]]) -> int:
+        """Drives that it takes at most to shrink failures of a kind."""
+        shrinking = max(most_drives(self.space, values) for values, _ in failed.values())
+        return min(MOST_TRIED, len(failed)) + shrinking + _REPEATS - 1
+
+    async def _shrink(self, of_kind: dict[int, tuple[Values, Drive]]) -> None:
+        first = await self._first(of_kind)
+        if first is None:
+            return
+        values = await self._shrunk(of_kind[first.number][0], first)
+        if texts(values) not in [one.values for one in self.found]:
+            self.found.append(await self._confirmed(values))
 
     async def _first(self, failed: dict[int, tuple[Values, Drive]]) -> Drive | None:
         """The drive nearest to the nominal values that fails again; None where none of the MOST_TRIED nearest does."""

@@ -4,6 +4,7 @@ import asyncio
 import importlib.util
 import json
 import os
+import re
 import shutil
 import signal
 from collections.abc import Iterator
@@ -104,6 +105,12 @@ def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
     assert (shrunk["changed"], shrunk["values"]["clutter"]) == (["start"], "0")
     assert (shrunk["failed"], shrunk["repeats"]) == (3, 3)
     assert LIMIT < start < LIMIT + 0.001
+    assert shrunk["spec"] == "example-fails-at-start"
+    announced = re.search(r"^shrinking 2 failures: up to (\d+) drives, about \d+ s; --sweep leaves it out$", out, re.M)
+    counted = re.findall(r"; (\d+) of up to (\d+) drives of shrinking, up to \d+ s to go$", out, re.M)
+    assert announced and counted[0] == ("1", announced[1])
+    assert [int(done) for done, _ in counted] == list(range(1, len(counted) + 1))
+    assert all(int(done) <= int(most) <= int(announced[1]) for done, most in counted)
     assert f"as a test: {shrunk['spec']}" in out
     assert not Path("report/search/example/shrinking").exists()
     assert main(["compile", "--check", shrunk["spec"]], stdout := StringIO(), StringIO()) == 0, stdout.getvalue()
