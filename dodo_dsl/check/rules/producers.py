@@ -6,7 +6,8 @@ message and sender stamp or of one memory, ``application-input`` (the applicatio
 
 from collections.abc import Iterator
 
-from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.context import RuleContext, known_ids
+from dodo_dsl.check.replayed import may_send
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.manifest import Manifest
@@ -21,10 +22,20 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
     for end in wiring.consumed:
         if misspelt and end.port.can_be_required:
             continue  # the misspelt one may be meant
-        if not end.port.optional and not wiring.producers(end.port) and not wiring.application_may_produce(end.port):
+        if not (end.port.optional or wiring.application_may_produce(end.port) or _is_produced(context, end)):
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
     yield from _unsatisfied_application(wiring)
+
+
+def _is_produced(context: RuleContext, end: End) -> bool:
+    """Whether a service of the test produces it; one that plays a recording does as far as that holds it."""
+    producers = context.wiring.producers(end.port)
+    if any(producer.port.name != ANYTHING for producer in producers):
+        return True
+    names = {producer.service for producer in producers}
+    ids = frozenset(known_ids(context.deployment.messages).items())
+    return any(may_send(service, end.port, ids) for service in context.services if service.use.name in names)
 
 
 def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
