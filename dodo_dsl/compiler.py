@@ -45,8 +45,8 @@ _MOST_READ = 256  # files that are kept for the tests that extend them
 class Checked:
     """Tests with everything that was found wrong with them, sorted by place.
 
-    ``by_rules`` has what the rules found, by spec. ``left_out`` names shipped tests that were not asked for by name and
-    that need what the application does not send.
+    ``by_rules`` has what the rules found, by spec. ``unasked`` are the specs of shipped tests that were not asked for by
+    name, ``left_out`` names those that were among them and need what the application does not send.
     """
 
     deployment: Deployment
@@ -57,6 +57,7 @@ class Checked:
     application: ApplicationSource | None = None
     empty: tuple[Path, ...] = ()
     by_rules: Mapping[Path, Sequence[Diagnostic]] = field(default_factory=dict)
+    unasked: frozenset[Path] = frozenset()
     left_out: tuple[str, ...] = ()
 
     @property
@@ -171,6 +172,7 @@ def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Check
         checked,
         tests=tuple(test for test in checked.tests if test.spec.path not in left_out),
         diagnostics=tuple(d for d in checked.diagnostics if d not in gone),
+        unasked=frozenset(shipped - set(named)),
         left_out=tuple(sorted(first[path].location.stem for path in left_out)),
     )
 

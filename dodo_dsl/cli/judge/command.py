@@ -67,7 +67,7 @@ def _plan(options: argparse.Namespace, run: KnownRun | None, out: Path, notes: T
         if options.application:
             raise UsageError("--compiled judges by a test as it was compiled: --application does not apply")
         return load_compiled(options.compiled, Settings()), options.compiled.resolve()
-    words = argparse.Namespace(test=[options.spec], level=[], application=options.application)
+    words = argparse.Namespace(test=[options.spec], level=[], application=options.application, backend=None)
     plans, _, _ = compile_tests(words, Settings(), out, notes)
     plan = _only(plans, run, options.spec)
     return plan, out / plan.slug

@@ -11,6 +11,7 @@ from dodo_dsl import atomic
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
+from dodo_dsl.cli.run.unbuilt import without_unbuilt
 from dodo_dsl.compiler import NoApplication, plan
 from dodo_dsl.diagnostics import has_errors, ordered
 from dodo_dsl.emit.output_folder import PLAN_FILE, write
@@ -114,6 +115,8 @@ def compile_tests(
     """
     checked = selection.select(options.test, options.level, options.application, settings)
     stdout.write(selection.left_out(checked))
+    checked, unbuilt = without_unbuilt(checked, options.backend)
+    stdout.write(unbuilt)
     if not checked.specs:
         raise UsageError("no tests to run")
     if settings.clock:

@@ -49,12 +49,20 @@ def _output(*command: str) -> str:
     return result.stdout.strip() if result.returncode == 0 else ""
 
 
+def emulator_folder() -> Path | None:
+    """Where the emulated rig is built; None where it is not."""
+    return next((p for p in _places() if all((p / name).is_file() for name in ("rig-emulator", "gantry.elf"))), None)
+
+
+def _places() -> tuple[Path, ...]:
+    named = os.environ.get(FIRMWARE)
+    return (Path(named),) if named else EMULATOR_PLACES
+
+
 def emulated_rig() -> Iterator[Capability]:
     """Whether the programs are built that a gantry with ``--serial=emulated`` starts."""
-    named = os.environ.get(FIRMWARE)
-    places = (Path(named),) if named else EMULATOR_PLACES
-    found = next((p for p in places if all((p / name).is_file() for name in ("rig-emulator", "gantry.elf"))), None)
-    if found:
+    places = _places()
+    if found := emulator_folder():
         yield Capability("emulated rig", "ok", f"is built, in {found}")
     else:
         advice = f"hil tests on it need it: make firmware in DoDo's checkout, or set {FIRMWARE} to its folder"
