@@ -1,6 +1,7 @@
 """dodo list: list the tests and services."""
 
 import argparse
+import os
 import shlex
 from pathlib import Path
 from typing import TextIO
@@ -11,7 +12,7 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
-from dodo_dsl.spec.manifest import Parameter
+from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -104,10 +105,18 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
         checks = (f"{check} ({unit})" if unit else check for check, unit in manifest.checks.items())
         lines.append(f"checks: {', '.join(checks)}")
     if manifest.example is not None:
-        found = "" if Path("services", "base").is_dir() else f"PYTHONPATH={shlex.quote(str(package_data.root()))} "
-        lines.append(f"standalone: {found}{shlex.join([*manifest.process, '--cid=128', *manifest.example])}")
+        words = shlex.join([*manifest.process, "--cid=128", *manifest.example])
+        lines.append(f"standalone: {_found_by(manifest)}{words}")
     stdout.writelines(f"{printable(line)}\n" for line in lines)
     return Exit.OK
+
+
+def _found_by(manifest: Manifest) -> str:
+    """The variable by which Python finds a service that is run by hand; empty where it does without."""
+    folders = [] if Path("services", "base").is_dir() else [package_data.root()]
+    if not manifest.folder.is_relative_to(package_data.services()):
+        folders.append(manifest.folder.resolve().parents[1])
+    return f"PYTHONPATH={shlex.quote(os.pathsep.join(map(str, folders)))} " if folders else ""
 
 
 def _bounds(parameter: Parameter) -> str:

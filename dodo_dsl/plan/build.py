@@ -59,6 +59,7 @@ def build(
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
     tree = functools.cache(copies)  # tests share maps and recordings
+    imports = _import_paths(deployment, out / "test")
     limits, hidden = _limits(application, deployment), _hidden(application, deployment)
 
     @functools.cache
@@ -84,7 +85,7 @@ def build(
         return replace(planned, hidden=hidden)
 
     builders = [
-        _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten)
+        _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten, imports)
         for index, (test, cid) in enumerate(zip(ordered, cids, strict=True))
     ]
     plans = []
@@ -114,6 +115,12 @@ def _hidden(application: ApplicationSource, deployment: Deployment) -> tuple[str
     return tuple(sorted(path.relative_to(own).as_posix() for path in found if path != own and path.is_relative_to(own)))
 
 
+def _import_paths(deployment: Deployment, folder: Path) -> tuple[str, ...]:
+    """The folders above those of own services, where their packages are found, relative to a compiled test's."""
+    above = dict.fromkeys(services.resolve().parent for services in deployment.services)
+    return tuple(Path(os.path.relpath(path, folder)).as_posix() for path in above)
+
+
 def _cids(tests: Sequence[ResolvedTest], deployment: Deployment) -> list[int]:
     """A CID for each instance: its rig's, or one of the deployment's range."""
     reserved = [test.rig.cid if test.rig else None for test in tests]
@@ -139,6 +146,7 @@ class _Builder:
         index: int,
         tree: Callable[[Path, Path], list[FileCopy]],
         rewritten: Callable[[int, str, tuple[str, ...], bool, bool, tuple[tuple[str, str], ...]], Application],
+        imports: tuple[str, ...],
     ) -> None:
         self.test = test
         self.spec = test.spec
@@ -151,6 +159,7 @@ class _Builder:
         self.index = index
         self.tree = tree
         self.rewritten = rewritten
+        self.imports = imports
         self.files: set[FileCopy] = set()
         self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
@@ -209,6 +218,7 @@ class _Builder:
             truth=(truth := withheld_truth(self.test)),
             truth_delay_s=truth_delay_s(self.test) if truth else 0.0,
             goals=resolved_goals(self.test).goals,
+            import_paths=self.imports,
             source_map=self.places,
         )
 

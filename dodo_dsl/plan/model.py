@@ -125,6 +125,8 @@ class Plan:
     relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
     ``goals`` score a passed test and never change its outcome.
     ``truth`` are messages by which evaluators judge; in real time they come to the bus ``truth_delay_s`` late.
+    ``import_paths`` are folders that hold Python packages of the deployment's own services, relative to the compiled
+    test's.
     """
 
     name: str
@@ -152,6 +154,7 @@ class Plan:
     truth: tuple[str, ...] = ()
     truth_delay_s: float = 0.0
     goals: tuple[Goal, ...] = ()
+    import_paths: tuple[str, ...] = ()
     source_map: dict[str, Place] = field(default_factory=dict)
 
     @property

@@ -62,7 +62,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         if settings.wall_timeout_s is not None and raw["lockstep"]:
             raw["lockstep"]["wall_timeout_s"] = settings.wall_timeout_s
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
-        raw |= {key: tuple(raw[key]) for key in ("more_tags", "messages", "senders", "truth")}
+        raw |= {key: tuple(raw[key]) for key in ("more_tags", "messages", "senders", "truth", "import_paths")}
         raw["pool"] = Pooled(**raw["pool"]) if raw["pool"] else None
         raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
@@ -91,6 +91,7 @@ def _problem(plan: Plan) -> str:
         "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
         "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in (*plan.senders, *plan.truth)),
+        "import path": all(isinstance(path, str) and "\0" not in path for path in plan.import_paths),
         "truth_delay_s": isinstance(plan.truth_delay_s, int | float) and 0 <= plan.truth_delay_s <= 86_400,
         "goal": all(isinstance(goal.check, str) and is_goal(goal) for goal in plan.goals),
         "service name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),

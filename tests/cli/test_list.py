@@ -1,5 +1,6 @@
 """``dodo list`` shows what there is, whatever is wrong with some of it."""
 
+import os
 import shlex
 import subprocess
 import sys
@@ -59,6 +60,22 @@ def test_a_service_s_command_works_outside_the_checkout(tmp_path: Path, monkeypa
         [sys.executable, *words, "--help"], capture_output=True, text=True, env=environment, check=True
     )
     assert "python -m services.integrator" in done.stdout
+
+
+def test_an_own_service_s_command_works_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "a b/my_services/judge"
+    folder.mkdir(parents=True)
+    (folder.parents[1] / "dodo.yml").write_text("dodo: 1\nservices: [my_services]\n")
+    (folder / "service.yml").write_text(
+        "name: judge\nlayers: [evaluation]\nimage: judge\nprocess: [python, -m, my_services.judge]\n"
+        "description: Judges.\nexample: []\n"
+    )
+    (folder / "__main__.py").write_text("import services.base, sys\nprint(*sys.argv[1:])\n")
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    line = dodo("list", "--services", "judge")[1].splitlines()[-1].removeprefix("standalone: ")
+    done = subprocess.run(line, shell=True, capture_output=True, text=True, cwd=tmp_path, check=True)
+    assert done.stdout == "--cid=128\n"
 
 
 def test_only_the_tests_that_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,6 +105,7 @@ plans = st.builds(
         tuple
     ),
     messages=st.lists(_inside, max_size=2).map(tuple),
+    import_paths=_words,
     source_map=st.dictionaries(
         _texts, st.builds(Place, _texts, st.integers(1, 1 << 20), st.integers(1, 1 << 20)), max_size=2
     ),

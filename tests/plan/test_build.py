@@ -142,3 +142,11 @@ def test_time_to_get_ready(tmp_path: Path) -> None:
     files = f"# dodo.yml\nservices: [own]\n# own/judge/service.yml\n{json.dumps(JUDGE)}\n"
     found = plan(f"evaluation: {{own: {{uses: judge, with: {{wait: 30 s}}}}}}\n{files}", tmp_path)
     assert found.services[-1].setup_s == 60.0
+
+
+def test_where_own_services_are_found(tmp_path: Path) -> None:
+    """Relative to the compiled test, so that the output is the same on any machine."""
+    files = f"# dodo.yml\nservices: [own, deep/more]\n# own/judge/service.yml\n{json.dumps(JUDGE)}\n# deep/more/\n"
+    found = plan(f"evaluation: {{own: {{uses: judge, with: {{wait: 30 s}}}}}}\n{files}", tmp_path)
+    assert found.import_paths == ("../..", "../../deep")
+    assert plan("", tmp_path).import_paths == ()

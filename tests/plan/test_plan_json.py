@@ -41,6 +41,7 @@ WRONG: list[tuple[str, Any, str]] = [
     ("lockstep", {"readers": 0, "wall_timeout_s": 1}, "lockstep"),
     ("messages", ["../x.odvd"], "messages"),
     ("messages", ["/x.odvd"], "messages"),
+    ("import_paths", ["a\0b"], "import path"),
     ("goals", [{"check": "time", "zero": 1, "one": 1, "weight": 1}], "goal"),
     ("goals", [{"check": 3, "zero": 1, "one": 2, "weight": 1}], "goal"),
 ]

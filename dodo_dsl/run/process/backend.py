@@ -13,7 +13,7 @@ from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.application_files import hidden_folders
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.snapshot import Snapshot
-from dodo_dsl.run.process.commands import Command, Commands, changes
+from dodo_dsl.run.process.commands import Command, Commands, changes, import_paths
 from dodo_dsl.run.process.confined.confinement import confinement
 from dodo_dsl.run.process.entered import Entered
 from dodo_dsl.run.process.environment import own_environment
@@ -69,7 +69,8 @@ class ProcessBackend:
 
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
-        entered = Entered.with_own(container, self._folder, self.report) if container else None
+        shown = (self._folder, self.report, *import_paths(self.plan, self._folder))
+        entered = Entered.with_own(container, *shown) if container else None
         await self._sandbox.open(self.slot, self.report, entered)
 
     def _take(self, message: dict[str, Any]) -> None:

@@ -56,9 +56,10 @@ class Commands:
         return self._own(service) if isinstance(service, PlannedService) else self._application(service)
 
     def _own(self, service: PlannedService) -> Command:
+        is_module = bool(own_module(service.process))
         environment = {
             **base_environment(self.plan.application.access.passed),
-            "PYTHONPATH": package_path(),
+            "PYTHONPATH": package_path(() if is_module else import_paths(self.plan, self.folder)),
             "DODO_SERVICE": service.name,
             "DODO_READY_FILE": ready_file(self.slot.name, service.name),
             SLOT_VARIABLE: self.slot.name,
@@ -67,7 +68,6 @@ class Commands:
             KEY_VARIABLE: self.slot.key.hex(),
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
-        is_module = bool(own_module(service.process))
         hidden = tuple(masked(self.plan, service))
         return Command(service.name, service.layer, words, environment, self.folder, service.judge, is_module, hidden)
 
@@ -106,6 +106,11 @@ class Commands:
         environment = {**inherited, **own, SLOT_VARIABLE: self.slot.name}
         hidden = tuple(masked(self.plan, None))
         return Command(service.name, "application", argv, environment, folder, masked=hidden)
+
+
+def import_paths(plan: Plan, folder: Path) -> list[Path]:
+    """The folders of the packages of the deployment's own services; ``folder`` is the compiled test's."""
+    return [(folder / path).resolve() for path in plan.import_paths]
 
 
 def own_modules(plans: Iterable[Plan]) -> set[str]:

@@ -1,5 +1,6 @@
-"""What the process backend makes of an application's service: its words, its variables, and where they come from."""
+"""What the process backend makes of services: their words, their variables, and where they come from."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.read import read_application
-from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.model import Application, Plan, PlannedService
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
@@ -42,7 +43,7 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *passed: str) -> Co
     folder = tmp_path / "generated" / "t"
     application = replace(plan_application(source, 140, "host", folder, ()), access=Access(passed=passed))
     common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox", ())
-    plan = Plan("t", "t", "t.dodo.yml", *common, application)
+    plan = Plan("t", "t", "t.dodo.yml", *common, application, import_paths=("../..",))
     commands = Commands(plan, folder, tmp_path / "report", Slot(150))
     (made,) = [commands.of(service) for service in application.services]
     return made
@@ -72,3 +73,27 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 def test_variables_that_the_deployment_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = command(tmp_path, monkeypatch, "LICENSE_KEY", "UNNAMED")
     assert [made.environment[name] for name in ("LICENSE", "LICENSE_KEY", "UNNAMED", "LEAK")] == ["here"] * 3 + [""]
+
+
+def own_path(process: tuple[str, ...], folder: Path) -> list[str]:
+    """Where a service's Python looks first, in a test with own services in two places."""
+    common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox")
+    service = PlannedService("evaluation", "judge", "judge", "dodo/judge:1", process)
+    plan = Plan(
+        "t", "t", "t.dodo.yml", *common, (service,), Application(".", ()), import_paths=("../..", "../../../more")
+    )
+    made = Commands(plan, folder, folder / "report", Slot(150)).of(service)
+    return made.environment["PYTHONPATH"].split(os.pathsep)
+
+
+def test_own_services_find_their_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", "/users")
+    repository = tmp_path / "repository"
+    places = own_path(("python", "-m", "my_services.judge"), repository / "generated/t")
+    assert places[-3:] == [str(repository), str(tmp_path / "more"), "/users"]
+    assert own_path(("python", "-m", "services.collision"), repository / "generated/t") == [*places[:-3], "/users"]
+
+
+def test_an_application_does_not_find_own_services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", "/users")
+    assert command(tmp_path, monkeypatch).environment["PYTHONPATH"] == "/users"
