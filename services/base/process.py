@@ -13,6 +13,7 @@ from types import FrameType
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.base import crash
 from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, parse
 from services.base.identity.key import take_key
@@ -48,7 +49,7 @@ def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Cl
     level = logging.DEBUG if flags["verbose"] else logging.INFO
     logging.basicConfig(stream=sys.stderr, level=level, format=f"{name}: %(levelname)s: %(message)s")
     with _signals() as stop:
-        return _serve(name, build, flags, clock, stop)
+        return _serve(name, folder, build, flags, clock, stop)
 
 
 class _Stop:
@@ -72,7 +73,7 @@ def _signals() -> Iterator[_Stop]:
             signal.signal(number, handler)
 
 
-def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _Stop) -> int:
+def _serve(name: str, folder: Path, build: Build, flags: Flags, clock: Clock | None, stop: _Stop) -> int:
     role = os.environ.get("DODO_SERVICE") or name
     ready = Path(os.environ.get("DODO_READY_FILE") or f"/tmp/dodo-ready-{role}")
     code = USAGE
@@ -93,12 +94,11 @@ def _serve(name: str, build: Build, flags: Flags, clock: Clock | None, stop: _St
             (service.drive or loop.run)(stop)
             if service.verdict is not None:
                 print(service.verdict.line(flags["cid"]), flush=True)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001  (it is logged)
         if isinstance(error, MemoryTakenError):
             print(json.dumps({"dodo": "taken", "text": str(error)}), flush=True)
         expected = code == USAGE and isinstance(error, ValueError | OSError)
-        text = " ".join(str(error).split())
-        logging.critical("%s", text if expected else f"{type(error).__name__}: {text}", exc_info=bool(flags["verbose"]))
+        crash.tell(error, folder, expected=expected, verbose=bool(flags["verbose"]))
         return code if expected else BROKEN
     return DONE
 

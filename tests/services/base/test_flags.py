@@ -48,7 +48,10 @@ def test_numbers(text: str, value: float) -> None:
         (["--id=1.5"], "--id=1.5 is not a whole number"),
         (["--id=-1"], "--id=-1 is out of range, expected 0 to 4294967295"),
         (["--verbose=maybe"], "--verbose=maybe is not true or false"),
-        (["--role=other"], "--role=other is not one of echo, judge, source, broken, unbuildable"),
+        (
+            ["--role=other"],
+            "--role=other is not one of echo, judge, source, broken, library, field, unjudgeable, unbuildable",
+        ),
         (["--freq=1", "--freq=2"], "--freq is given twice"),
     ],
 )

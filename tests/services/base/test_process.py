@@ -1,5 +1,6 @@
 """The tiny service as a process on a real bus."""
 
+import re
 import shlex
 import subprocess
 import sys
@@ -143,13 +144,40 @@ def test_messages_under_another_stamp_are_noted(start: Start, cid: int) -> None:
     assert service.line() == {"dodo": "note", "text": text}
 
 
-@pytest.mark.parametrize("flags", [[], ["--verbose"]])
-def test_a_model_that_fails(start: Start, ready_file: Path, flags: list[str]) -> None:
-    code, out, err = start("--role=broken", *flags).end()
+FIELD = "opendlv.proxy.GroundSteeringRequest has no field 'steering'; it has groundSteering"
+
+
+@pytest.mark.parametrize(
+    ("role", "text"),
+    [
+        ("broken", "ZeroDivisionError: a model went wrong (base/tiny/__main__.py:LINE, in update)"),
+        (
+            "library",
+            "JSONDecodeError: Expecting value: line 1 column 2 (char 1) (base/tiny/__main__.py:LINE, in update)",
+        ),
+        ("field", f"AttributeError: {FIELD} (base/tiny/__main__.py:LINE, in update)"),
+        ("unjudgeable", "UnjudgeableError: the map has no goal"),
+    ],
+)
+def test_a_model_that_fails(start: Start, ready_file: Path, role: str, text: str) -> None:
+    code, out, err = start(f"--role={role}").end()
     assert (code, out) == (1, '{"dodo": "ready"}\n')
-    assert err.startswith("tiny-service: CRITICAL: ZeroDivisionError: a model went wrong\n")
-    assert ("Traceback" in err) == bool(flags)
+    *steps, last = err.splitlines()
+    assert re.sub(r":\d+, in", ":LINE, in", last) == f"tiny-service: CRITICAL: {text}"
+    if role == "unjudgeable":
+        assert steps == []
+    else:
+        assert steps[0] == "tiny-service: ERROR: Traceback, own code only (most recent call last):"
+        files = {line.split(",")[0].strip() for line in steps[1::2]}
+        assert files == {'File "base/tiny/__main__.py"'}
+        assert steps[-1].strip() in (Path(__file__).parent / "tiny/__main__.py").read_text()
     assert not ready_file.exists()
+
+
+def test_all_of_a_traceback_with_verbose(start: Start) -> None:
+    *steps, last = start("--role=library", "--verbose").end()[2].splitlines()
+    assert last.startswith("tiny-service: CRITICAL: JSONDecodeError: ")
+    assert any("json/decoder.py" in line for line in steps)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,13 @@
 """A service for the tests of the base."""
 
+import json
 import math
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from services.base import Check, Context, Output, Service, Verdict, period_of, run
+from services.base import Check, Context, Output, Service, UnjudgeableError, Verdict, period_of, run
 
 
 class Echo(Service):
@@ -76,9 +77,18 @@ class Source(Service):
 
 
 class Broken(Service):
-    """Fails in its first update."""
+    """Fails in its first update: by an error, one in a library, a wrong field, or one that is a sentence for users."""
+
+    def __init__(self, context: Context) -> None:
+        self.role, self.messages = context.flags["role"], context.messages
 
     def update(self, now: int) -> Iterable[Any]:
+        if self.role == "library":
+            json.loads("[")
+        if self.role == "field":
+            return [self.messages.type("opendlv.proxy.GroundSteeringRequest")().steering]
+        if self.role == "unjudgeable":
+            raise UnjudgeableError("the map has no goal")
         raise ZeroDivisionError("a model\nwent wrong")
 
 
@@ -88,7 +98,7 @@ def build(context: Context) -> Service:
     if context.flags["role"] == "unbuildable":
         raise ValueError("/no/such/map: cannot be read")
     roles: dict[str, Any] = {"echo": Echo, "judge": Judge, "source": Source}
-    service: Service = roles[context.flags["role"]](context) if context.flags["role"] in roles else Broken()
+    service: Service = roles[context.flags["role"]](context) if context.flags["role"] in roles else Broken(context)
     return service
 
 
