@@ -139,4 +139,5 @@ def load_manifests(
                 found.append(Diagnostic(Span(str(path)), "name-taken", message, "choose another name"))
             elif manifest:
                 manifests[manifest.name] = manifest
+                found.extend(manifest_consistency.name_problems(manifest.name, path))
     return manifests, tuple(found)

@@ -1,7 +1,11 @@
-"""``wrong-manifest``: what concerns two places of a manifest, so that its schema cannot express it."""
+"""``wrong-manifest``: what concerns two places of a manifest, so that its schema cannot express it.
+
+``manifest-name``: the service and its folder have the same name.
+"""
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
@@ -42,6 +46,15 @@ def problems(node: Mapping) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, RULE, message, "choose another name")
         if isinstance(entry.value, Mapping):
             yield from _parameter(name, entry.value, types)
+
+
+def name_problems(name: str, path: Path) -> Iterator[Diagnostic]:
+    """A warning where the service of a manifest has another name than its folder; ``my-name`` may be in ``my_name``."""
+    folder = path.parent.name
+    if folder.replace("_", "-") != name.replace("_", "-"):
+        message = f"the service is named '{name}', and its folder '{folder}'"
+        hint = f"tests use the name: 'uses: {name}'; give both the same"
+        yield Diagnostic(Span(str(path)), "manifest-name", message, hint, severity="warning")
 
 
 def _ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:

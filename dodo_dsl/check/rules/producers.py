@@ -4,7 +4,7 @@
 message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces).
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from dodo_dsl.check.context import RuleContext, known_ids
 from dodo_dsl.check.replayed import may_send
@@ -18,10 +18,14 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
     if not context.spec.is_whole or not context.test.is_complete or not fits:
         return  # unknown services and wrong layers come first
     wiring = context.wiring
-    misspelt = any(e.port.name not in context.messages for e in wiring.application_produces if e.port.kind == "message")
+    known = {*context.messages, ANYTHING}
+    misspelt = any(_is_unknown(end, known) for end in wiring.application_produces)
+    own_misspelt = any(_is_unknown(end, known) for end in wiring.produced)
     for end in wiring.consumed:
-        if misspelt and end.port.can_be_required:
+        if (misspelt and end.port.can_be_required) or (own_misspelt and end.port.kind == "message"):
             continue  # the misspelt one may be meant
+        if _is_unknown(end, known):
+            continue  # its name is reported itself
         if not (end.port.optional or wiring.application_may_produce(end.port) or _is_produced(context, end)):
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
@@ -36,6 +40,11 @@ def _is_produced(context: RuleContext, end: End) -> bool:
     names = {producer.service for producer in producers}
     ids = frozenset(known_ids(context.deployment.messages).items())
     return any(may_send(service, end.port, ids) for service in context.services if service.use.name in names)
+
+
+def _is_unknown(end: End, known: Collection[str]) -> bool:
+    """Whether it is a message that nobody knows, which is reported where it is written."""
+    return end.port.kind == "message" and end.port.name not in known
 
 
 def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:

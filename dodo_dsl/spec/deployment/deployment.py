@@ -11,7 +11,7 @@ from pathlib import Path
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Reader, Scalar, Sequence, path_of, plain, read
-from dodo_dsl.spec.deployment import rig
+from dodo_dsl.spec.deployment import rig, service_folders
 from dodo_dsl.spec.deployment.given_limits import sandbox_limits
 from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -106,6 +106,7 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
         sandbox=sandbox_limits(node.entries.get("sandbox")),
     )
     _odvd(node.entries.get("messages"), deployment.messages, problems)
+    problems += service_folders.problems(path.parent, node.get("services"))
     return deployment, [*found, *problems]
 
 

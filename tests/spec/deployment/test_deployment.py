@@ -40,6 +40,8 @@ def test_defaults(tmp_path: Path) -> None:
 def test_everything(tmp_path: Path) -> None:
     (tmp_path / "tests").mkdir()
     (tmp_path / "compose.yml").touch()
+    (tmp_path / "tests/judge").mkdir()
+    (tmp_path / "tests/judge/service.yml").touch()
     (tmp_path / "my.odvd").write_text("message my.Own [id = 3000] { float x [id = 1]; }")
     deployment, problems = loaded(
         tmp_path,
