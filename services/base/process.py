@@ -5,10 +5,11 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError
@@ -24,6 +25,7 @@ from services.base.loop import Loop
 from services.base.manifest import load_manifest
 from services.base.service import Build, Context
 from services.base.usage import help_text
+from services.base.verdict import undeclared_checks
 from services.base.withheld import WithheldTruth
 
 READY = '{"dodo": "ready"}'
@@ -49,7 +51,7 @@ def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Cl
     level = logging.DEBUG if flags["verbose"] else logging.INFO
     logging.basicConfig(stream=sys.stderr, level=level, format=f"{name}: %(levelname)s: %(message)s")
     with _signals() as stop:
-        return _serve(name, folder, build, flags, clock, stop)
+        return _serve(manifest, folder, build, flags, clock, stop)
 
 
 class _Stop:
@@ -73,7 +75,10 @@ def _signals() -> Iterator[_Stop]:
             signal.signal(number, handler)
 
 
-def _serve(name: str, folder: Path, build: Build, flags: Flags, clock: Clock | None, stop: _Stop) -> int:
+def _serve(
+    manifest: Mapping[str, Any], folder: Path, build: Build, flags: Flags, clock: Clock | None, stop: _Stop
+) -> int:
+    name = manifest["name"]
     role = os.environ.get("DODO_SERVICE") or name
     ready = Path(os.environ.get("DODO_READY_FILE") or f"/tmp/dodo-ready-{role}")
     code = USAGE
@@ -93,6 +98,8 @@ def _serve(name: str, folder: Path, build: Build, flags: Flags, clock: Clock | N
             resources.enter_context(_readiness(ready))
             (service.drive or loop.run)(stop)
             if service.verdict is not None:
+                if undeclared := undeclared_checks(service.verdict, manifest.get("checks")):
+                    print(json.dumps({"dodo": "note", "text": undeclared}), flush=True)
                 print(service.verdict.line(flags["cid"]), flush=True)
     except Exception as error:  # noqa: BLE001  (it is logged)
         if isinstance(error, MemoryTakenError):

@@ -91,11 +91,13 @@ def test_a_message_decides(start: Start, cid: int) -> None:
         session.send(DISTANCE(distance=0.5))
         session.send(DISTANCE(distance=1.5))
         session.send(END())
+        text = "check 'range' is not among the 'checks' of its service.yml (distance), so no goal can name it"
+        assert service.line() == {"dodo": "note", "text": text}
         assert service.line() == {
             "dodo": "verdict",
             "outcome": "failed",
             "reason": "too far",
-            "checks": [{"name": "distance", "value": 1.5, "limit": {"max": 1.0}, "unit": "m", "ok": False}],
+            "checks": [{"name": "range", "value": 1.5, "limit": {"max": 1.0}, "unit": "m", "ok": False}],
         }
     assert service.end() == (0, "", "")
 

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from services.base.verdict import Check, Verdict
+from services.base.verdict import Check, Verdict, undeclared_checks
 
 
 def test_the_line() -> None:
@@ -51,3 +51,12 @@ def test_where_nothing_was_heard_the_reason_names_the_bus() -> None:
     assert json.loads(Verdict("failed", "nothing came", silent=True).line(130))["reason"] == (
         "nothing came; the test is on CID 130"
     )
+
+
+def test_checks_that_the_manifest_does_not_declare() -> None:
+    verdict = Verdict("passed", "", tuple(Check(name, 1.0) for name in ("recall", "recall-cone", "largest-step", "x")))
+    where = "the 'checks' of its service.yml (recall, recall-*)"
+    text = f"checks 'largest-step', 'x' are not among {where}, so no goal can name them"
+    assert undeclared_checks(verdict, {"recall": "", "recall-*": ""}) == text
+    assert undeclared_checks(verdict, {"*": ""}) == ""
+    assert undeclared_checks(verdict, None) == ""

@@ -45,9 +45,7 @@ class Judge(Service):
 
     def take(self, message: Any, sample_time: int) -> None:
         if message.distance > 1.0:
-            self.verdict = Verdict(
-                "failed", "too far", (Check("distance", message.distance, {"max": 1.0}, "m", False),)
-            )
+            self.verdict = Verdict("failed", "too far", (Check("range", message.distance, {"max": 1.0}, "m", False),))
 
     def end_of_input(self, now: int) -> None:
         self.context.log.debug("the end has come")
