@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import atomic
-from dodo_dsl.cli import image_pull, selection
+from dodo_dsl.cli import image_pull, own_services, selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
@@ -17,6 +17,7 @@ from dodo_dsl.spec.manifest import load_manifests
 EXAMPLES = """examples:
   dodo images build                                   all images, named as in dodo.yml
   dodo images build collision virtual-camera          two images
+  dodo images build smoothness                        that of an own service, from the Dockerfile beside its manifest
   dodo images build dodo                              DoDo itself with all that it runs, for jobs of a pipeline
   dodo images build --offline-wheels                  if a build cannot reach the package index
   dodo images build --platform linux/arm64            for a Raspberry Pi, on another machine with QEMU
@@ -58,7 +59,10 @@ def _action(
         "tags T-amd64 and T-arm64, and 'push' makes T a list of these"
     )  # fmt: skip
     action.add_argument(
-        "name", nargs="*", metavar="NAME", help="services, sandbox, base, vision or dodo (default: all but dodo)"
+        "name",
+        nargs="*",
+        metavar="NAME",
+        help="services, sandbox, base, geometry, vision or dodo (default: all but dodo)",
     )
     action.add_argument(
         "--prefix", metavar="P", help="prefix of the images' names (default: images.prefix of dodo.yml, or dodo)"
@@ -80,7 +84,8 @@ def _platforms(text: str) -> list[str]:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.action == "pull":
         return image_pull.pull(options, stdout)
-    images = _chosen(options, selection.checked_deployment())
+    deployment = selection.checked_deployment()
+    images = _chosen(options, deployment)
     if options.action == "sbom" and options.no_images:
         images = []
     else:
@@ -90,8 +95,15 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.action == "push":
         return _push(images, options.platform, stdout)
     docker_command.require_buildx()
+    own = own_services.dockerfiles(deployment)
+    own_services.require_dockerfiles(options.name, own, images)
     for platform in options.platform or [""]:
-        _build(options, [one for one in of_platforms(images, options.platform) if one.platform == platform], stdout)
+        wanted = [one for one in of_platforms(images, options.platform) if one.platform == platform]
+        if stages := [image for image in wanted if image.name not in own]:
+            _build(options, stages, stdout)
+        for image in wanted:
+            if dockerfile := own.get(image.name):
+                own_services.build(image, dockerfile, stdout)
     return Exit.OK
 
 
@@ -100,7 +112,12 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     if options.action == "push" and prefix == Deployment.image_prefix:
         raise UsageError("no registry; name it with --prefix or as images.prefix in dodo.yml")
     names = known(load_manifests()[0].values())
-    return choose(options.name, names, prefix, options.tag or deployment.image_tag)
+    own = own_services.dockerfiles(deployment)
+    found = choose(options.name, (*names, *own), prefix, options.tag or deployment.image_tag)
+    if options.name:
+        return found
+    is_left = options.action == "sbom"  # what an image of somebody else's is made of, it may not be able to tell
+    return [image for image in found if image.name not in own or (own[image.name] and not is_left)]
 
 
 def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> None:
@@ -121,9 +138,7 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
     if code:
         hint = f"; {_INDEX_HINT}" if packages is None and (stdout.isatty() or "requirements/install" in output) else ""
         raise docker_command.DockerError(f"the images cannot be built; the output above says why{hint}")
-    width = max(len(image.reference) for image in images)
-    for image in images:
-        stdout.write(f"built {image.reference:<{width}}  {docker_command.size(image.reference) / 1e6:.0f} MB\n")
+    own_services.say_built(images, stdout)
 
 
 def _packages(base_image: str, platform: str, whole: bool, stdout: TextIO) -> Path:

@@ -8,8 +8,8 @@ from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.manifest import Manifest
 
 SANDBOX = "sandbox"
-SHARED = ("base", "vision")
-"""Stages that applications may use as base images."""
+SHARED = ("base", "geometry", "vision")
+"""Stages that applications and services may use as base images."""
 DODO = "dodo"
 """DoDo itself, for a pipeline's jobs: no test needs it, so it is built and pushed only where it is named."""
 
@@ -23,7 +23,7 @@ class NoSuchImage(Exception):
 
 @dataclass(frozen=True)
 class Image:
-    """An image; ``name`` is also its stage in ``services/Dockerfile``."""
+    """An image; ``name`` is also its stage in ``services/Dockerfile``, unless it is that of a user's own service."""
 
     name: str
     reference: str
@@ -48,7 +48,7 @@ def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:
 
     A manifest with a complete reference (``registry.example.org/team/radar:1``) uses an image from elsewhere.
     """
-    bare = {m.image for m in manifests if "/" not in m.image and ":" not in m.image}
+    bare = {m.image for m in manifests if m.has_own_image}
     return (*SHARED, *sorted({SANDBOX, *bare}))
 
 

@@ -73,6 +73,11 @@ class Manifest:
     one_of: tuple[tuple[str, ...], ...] = ()
     checks: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def has_own_image(self) -> bool:
+        """Whether its image has the deployment's prefix and tag, and none that is written in full."""
+        return "/" not in self.image and ":" not in self.image
+
 
 def _ports(raw: dict[str, list[str]] | None) -> Ports:
     raw = raw or {}

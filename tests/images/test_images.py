@@ -66,7 +66,7 @@ def await_health(container: str, patience: float = 600.0) -> str:
 
 
 def test_there_is_an_image_for_each_service(built: dict[str, str]) -> None:
-    assert set(built) == {"base", "vision", "sandbox", *(m.image for m in MANIFESTS.values())}
+    assert set(built) == {"base", "geometry", "vision", "sandbox", *(m.image for m in MANIFESTS.values())}
 
 
 @each_service
@@ -136,7 +136,7 @@ def test_shared_stages_do_not_pass_for_services(built: dict[str, str]) -> None:
     assert config(built["sandbox"])["Labels"]["dodo.service"] == "sandbox"
     assert "dodo.service" not in config(built["base"])["Labels"]
     assert "dodo.service" not in config(built["vision"])["Labels"]
-    assert {config(built[name])["User"] for name in ("base", "vision", "sandbox")} == {"10001:10001"}
+    assert {config(built[name])["User"] for name in ("base", "geometry", "vision", "sandbox")} == {"10001:10001"}
 
 
 @pytest.mark.parametrize("name", ["sandbox", "virtual-camera"])

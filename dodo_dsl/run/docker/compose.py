@@ -22,6 +22,7 @@ from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
 from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
+from dodo_dsl.run.docker import own_images
 from dodo_dsl.run.docker.builds import is_built, private_images
 from dodo_dsl.run.docker.masks import masks
 from dodo_dsl.run.docker.pulls import Pulls, Say
@@ -115,7 +116,7 @@ class Compose:
             for name, s in self.services.items()
             if name in application and name not in built and image_variable(name) not in self._images
         }
-        for note in await pulls.provide(own, foreign, self._say):
+        for note in await pulls.provide(own, foreign, self._say, own_images.hints(self.plan)):
             self._say(note)
         named = [name for name in built if "image" in self.services[name]]
         if named:

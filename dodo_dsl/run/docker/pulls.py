@@ -2,8 +2,9 @@
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Callable, Coroutine, Iterable, Mapping
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 from dodo_dsl.run.docker.client import engine_error
@@ -23,12 +24,16 @@ class Pulls:
         self._client = client
         self._tasks: dict[str, asyncio.Task[str]] = {}
         self._interrupted = threading.Event()
+        self._hints: dict[str, str] = {}
 
-    async def provide(self, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
+    async def provide(
+        self, own: Iterable[str], application: Iterable[str], say: Say, hints: Mapping[str, str] = MappingProxyType({})
+    ) -> list[str]:
         """Makes the images local; returns notes on those that could not be updated, or are for another kind of machine.
 
-        Raises BackendError.
+        ``hints`` say of ``own`` images how to get them otherwise. Raises BackendError.
         """
+        self._hints.update(hints)
         ours, theirs = sorted(set(own)), sorted(set(application))
         waits = [self._pull_once(image, self._own, say) for image in ours]
         waits += [self._pull_once(image, self._application, say) for image in theirs]
@@ -63,7 +68,12 @@ class Pulls:
 
     def _own(self, image: str, say: Say) -> str:
         if not self._architecture(image):
-            self._pull(image, say)
+            try:
+                self._pull(image, say)
+            except BackendError as error:
+                if image in self._hints:
+                    raise BackendError(f"{error}; {self._hints[image]}") from error
+                raise
         return ""
 
     def _application(self, image: str, say: Say) -> str:

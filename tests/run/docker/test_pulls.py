@@ -6,10 +6,14 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 
 import pytest
+from docker.errors import ImageNotFound
 
+from dodo_dsl.plan.model import PlannedService
+from dodo_dsl.run.docker import own_images
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.protocol import BackendError
+from tests.run.scripted import plan
 
 
 def failing(times: int) -> tuple[list[int], Callable[[], Coroutine[None, None, str]]]:
@@ -48,6 +52,34 @@ def test_what_failed_is_tried_again_and_then_kept() -> None:
 
     assert asyncio.run(scene()) == ["pulled", "pulled"]
     assert len(tries) == 2
+
+
+class EmptyEngine:
+    """A client of an engine that has no image, and whose registries have none."""
+
+    def __init__(self) -> None:
+        self.api = self
+
+    def inspect_image(self, _image: str) -> None:
+        raise ImageNotFound("there is none")
+
+    def pull(self, *_words: str, **_options: bool) -> None:
+        raise ImageNotFound("not found")
+
+
+def test_an_own_service_without_its_image() -> None:
+    services = (
+        PlannedService("evaluation", "judge", "judge", "team/judge:7", ("python", "-m", "my_services.judge")),
+        PlannedService("evaluation", "radar", "radar", "elsewhere/radar:1", ("radar",)),
+        PlannedService("evaluation", "track", "collision", "team/collision:7", ("python", "-m", "services.collision")),
+    )
+    hints = own_images.hints(plan(services=services, sandbox_image="team/sandbox:7"))
+    told = "build it from your own Dockerfile on team/base:7: dodo images build judge"
+    assert hints == {"team/judge:7": told}
+    with pytest.raises(BackendError, match=rf"^image team/judge:7 cannot be pulled: not found; {told}$"):
+        asyncio.run(Pulls(EmptyEngine()).provide(["team/judge:7"], [], lambda _: None, hints))
+    with pytest.raises(BackendError, match=r"^image team/collision:7 cannot be pulled: not found$"):
+        asyncio.run(Pulls(EmptyEngine()).provide(["team/collision:7"], [], lambda _: None, hints))
 
 
 @pytest.mark.engine

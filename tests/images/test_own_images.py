@@ -1,0 +1,149 @@
+"""``dodo images`` and a service of a repository's own, with a docker command that notes what it is asked."""
+
+import json
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl import __version__
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.main import main
+
+MANIFEST = "layers: [evaluation]\ndescription: Judges.\nprocess: [python, -m, my_services.judge]\n"
+DOCKERFILE = f"ARG DODO_BASE=dodo/base:{__version__}\nFROM ${{DODO_BASE}}\n"
+PREFIX = "registry.example.org/team"
+
+
+class Repository:
+    """A repository with own services, its docker command, and what that was asked."""
+
+    def __init__(self, root: Path) -> None:
+        self.root, self.log = root, root / "asked"
+        self.log.touch()
+        (root / "dodo.yml").write_text("dodo: 1\nservices: [my_services]\n")
+        (root / "bin").mkdir()
+        self.engine(has="*")
+
+    def engine(self, has: str) -> None:
+        """Lets the engine have the images of a pattern."""
+        script = (
+            f'#!/bin/sh\nPATH=/usr/bin:/bin\necho "$@" >>{self.log}\n'
+            f'case "$1-$2" in buildx-bake) cp docker-bake.json {self.root};; image-inspect) echo 7000000;;\n'
+            f'image-ls) case "$4" in {has}) echo 1;; esac;; *) echo 28;; esac\n'
+        )
+        (self.root / "bin/docker").write_text(script)
+        (self.root / "bin/docker").chmod(0o755)
+
+    def service(self, name: str, dockerfile: str = DOCKERFILE, image: str = "") -> Path:
+        folder = self.root / "my_services" / name
+        folder.mkdir(parents=True)
+        (folder / "service.yml").write_text(f"name: {name}\nimage: {image or name}\n{MANIFEST}")
+        if dockerfile:
+            (folder / "Dockerfile").write_text(dockerfile)
+        return folder
+
+    def run(self, *words: str) -> tuple[int, str]:
+        stdout, stderr = StringIO(), StringIO()
+        code = main(["images", *words], stdout, stderr)
+        return code, stderr.getvalue() + stdout.getvalue()
+
+    def asked(self, *first: str) -> list[str]:
+        return [line for line in self.log.read_text().splitlines() if line.startswith(" ".join(first))]
+
+
+@pytest.fixture
+def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Repository:
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    monkeypatch.chdir(tmp_path)
+    return Repository(tmp_path)
+
+
+def test_it_is_built_on_the_base_of_the_same_prefix_and_tag(repository: Repository) -> None:
+    folder = repository.service("smoothness")
+    code, said = repository.run("build", "smoothness", "--prefix", PREFIX, "--tag", "2")
+    assert (code, said.splitlines()[-1]) == (0, f"built {PREFIX}/smoothness:2  7 MB")
+    (words,) = repository.asked("buildx", "build")
+    assert words == (
+        f"buildx build --file {folder}/Dockerfile --tag {PREFIX}/smoothness:2 "
+        f"--build-arg DODO_BASE={PREFIX}/base:2 --output type=docker {repository.root}"
+    )
+
+
+def test_it_stands_on_the_stage_that_its_default_names(repository: Repository) -> None:
+    repository.service("smoothness", DOCKERFILE.replace("base", "geometry"))
+    assert repository.run("build", "smoothness")[0] == 0
+    assert f"DODO_BASE=dodo/geometry:{__version__} " in repository.asked("buildx", "build")[0]
+
+
+def test_for_several_platforms(repository: Repository) -> None:
+    repository.service("smoothness")
+    words = ("build", "smoothness", "--prefix", PREFIX, "--tag", "2", "--platform", "linux/amd64,linux/arm64")
+    assert repository.run(*words)[0] == 0
+    _, second = repository.asked("buildx", "build")
+    assert f"--tag {PREFIX}/smoothness:2-arm64 --build-arg DODO_BASE={PREFIX}/base:2-arm64 " in second
+    assert "--platform linux/arm64 " in second
+
+
+def test_with_all_the_others_it_comes_after_what_it_stands_on(repository: Repository) -> None:
+    repository.service("smoothness")
+    repository.service("radar", dockerfile="")
+    assert repository.run("build")[0] == 0
+    first, second = (line.partition(" --")[0] for line in repository.asked("buildx b"))
+    assert (first, second) == ("buildx bake", "buildx build")
+    targets = json.loads((repository.root / "docker-bake.json").read_text())["target"]
+    assert {"base", "geometry", "collision"} <= set(targets) and not {"smoothness", "radar"} & set(targets)
+    assert len(repository.asked("buildx", "build")) == 1
+
+
+def test_without_a_dockerfile(repository: Repository) -> None:
+    repository.service("smoothness", dockerfile="")
+    code, said = repository.run("build", "smoothness", "--prefix", PREFIX)
+    assert (code, said) == (
+        Exit.USAGE,
+        "dodo images: there is no Dockerfile beside the service.yml of 'smoothness': write one there, or build "
+        f"{PREFIX}/smoothness:{__version__} from your own Dockerfile on {PREFIX}/base:{__version__}\n",
+    )
+
+
+def test_the_base_is_built_first(repository: Repository) -> None:
+    repository.service("smoothness")
+    repository.engine(has="none")
+    code, said = repository.run("build", "smoothness")
+    base = f"dodo/base:{__version__}"
+    assert (code, said) == (
+        Exit.USAGE,
+        f"dodo images: {base} is not on this machine; build it first: dodo images build base\n",
+    )
+
+
+def test_a_dockerfile_that_cannot_be_built(repository: Repository) -> None:
+    repository.service("smoothness")
+    docker = repository.root / "bin/docker"
+    docker.write_text(docker.read_text().replace("image-inspect)", "buildx-build) echo oh; exit 1;; image-inspect)"))
+    code, said = repository.run("build", "smoothness")
+    assert code == Exit.ERROR
+    assert f"my_services/smoothness/Dockerfile cannot be built on dodo/base:{__version__}; the output" in said
+
+
+def test_it_is_pushed_with_the_others(repository: Repository) -> None:
+    repository.service("smoothness")
+    repository.service("radar", dockerfile="")
+    assert repository.run("push", "--prefix", PREFIX, "--tag", "2")[0] == 0
+    pushed = {line.rpartition("/")[2] for line in repository.asked("push")}
+    assert "smoothness:2" in pushed and "radar:2" not in pushed
+
+
+def test_one_of_elsewhere_or_of_dodo_is_not_built(repository: Repository) -> None:
+    repository.service("radar", image="registry.example.org/other/radar:1")
+    repository.service("lane", image="collision")
+    assert repository.run("build", "radar")[0] == Exit.USAGE
+    assert repository.run("build", "collision")[0] == 0
+    assert repository.asked("buildx", "build") == []
+
+
+def test_a_manifest_with_a_mistake_is_said(repository: Repository) -> None:
+    folder = repository.service("smoothness")
+    (folder / "service.yml").write_text("name: smoothness\n")
+    told = "problems in my_services/smoothness/service.yml; dodo compile --check shows them"
+    assert repository.run("build", "smoothness") == (Exit.USAGE, f"dodo images: {told}\n")
