@@ -130,25 +130,6 @@ def test_what_checks_every_service_has_nothing_to_say(checkout: Path) -> None:
     assert "passed" in told
 
 
-@pytest.mark.slow
-def test_it_works_in_ones_own_repository(checkout: Path, tmp_path: Path) -> None:
-    """Steps 1 to 6 with another package, as the sentence below the recipe says."""
-    assert "`services: [my_services]`" in PAGE and "`PYTHONPATH=$PWD dodo run`" in PAGE
-    (tmp_path / "my_services/odometer").mkdir(parents=True)
-    (tmp_path / "my_services/odometer/__init__.py").touch()
-    for block in recipe():
-        if re.fullmatch(r"services/odometer/[a-z_]+\.(yml|py)", block.file):
-            text = block.text.replace("services.odometer", "my_services.odometer")
-            follow(Block("Write", f"my_{block.file}", "", "", text), tmp_path)
-    for name in ("maps/straight", "sil-closed-straight", "sil-odometer"):
-        shutil.copytree(checkout / "tests_registry" / name, tmp_path / "tests" / name)
-    shutil.copytree(checkout / "examples/kiwi", tmp_path / "application")
-    words = ["registry: [tests]", "services: [my_services]", "application: application/docker-compose.yml"]
-    (tmp_path / "dodo.yml").write_text("\n".join(["dodo: 1", *words, ""]))
-    assert "\nodometer " in run(tmp_path, "dodo_dsl", "list", "--services")
-    assert "\n1 passed, 0 failed, 0 in error\n" in run(tmp_path, "dodo_dsl", "run", "sil-odometer")
-
-
 def test_the_contract_of_independence_names_every_service() -> None:
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     (named,) = [contract["modules"] for contract in contracts if contract["type"] == "independence"]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.contributing.tutorial import Command, Edit, follow, steps
+from tests.contributing.tutorial import Command, Edit, New, follow, steps
 
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 
@@ -17,7 +17,16 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
 
 def test_a_page_is_read_as_its_reader_does() -> None:
     page = "```console\n$ a b\nsaid\n...\nend\n$ c\n```\n\n```diff\n--- f\n-old\n+new\n```\n\n```text\n$ not run\n```\n"
-    assert list(steps(page)) == [Command("a b", "said\n...\nend\n"), Command("c", ""), Edit("f", "old", "new")]
+    page += "Do it. Write `d/g`:\n\n```yaml\na: 1\n```\n\nAnd:\n\n```yaml\nb: 2\n```\n"
+    commands = [Command("a b", "said\n...\nend\n"), Command("c", "")]
+    assert list(steps(page)) == [*commands, Edit("f", "old", "new"), New("d/g", "a: 1\n")]
+
+
+def test_a_new_file_replaces_none(tmp_path: Path) -> None:
+    New("d/f", "text").make(tmp_path)
+    assert (tmp_path / "d/f").read_text() == "text"
+    with pytest.raises(AssertionError, match="d/f is there already"):
+        New("d/f", "other").make(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
-"""Follows a page as a reader does: runs its commands, makes its edits, and compares what is said.
+"""Follows a page as a reader does: writes its files, runs its commands, makes its edits, and compares what is said.
 
-A block ``console`` has commands after ``$`` with what they print, where ``...`` stands for anything. A block ``diff``
-begins with ``--- FILE``; the text of its lines after ``-`` is replaced by that after ``+``. Other blocks are not run.
+A block below a sentence that ends in ``Write `FILE`:`` is a new file. A block ``console`` has commands after ``$`` with
+what they print, where ``...`` stands for anything. A block ``diff`` begins with ``--- FILE``; the text of its lines
+after ``-`` is replaced by that after ``+``. Other blocks are not run.
 """
 
 import os
@@ -11,7 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-_BLOCK = re.compile(r"^```(console|diff)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_BLOCK = re.compile(
+    r"(?:Write `(?P<file>[^`\n]+)`:\n\n)?^```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE
+)
 
 
 @dataclass(frozen=True)
@@ -40,13 +43,28 @@ class Edit:
         path.write_text(text.replace(self.old, self.new))
 
 
-def steps(page: str) -> Iterator[Command | Edit]:
-    for kind, text in _BLOCK.findall(page):
-        if kind == "diff":
+@dataclass(frozen=True)
+class New:
+    file: str
+    text: str
+
+    def make(self, folder: Path) -> None:
+        path = folder / self.file
+        assert not path.exists(), f"{self.file} is there already"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(self.text)
+
+
+def steps(page: str) -> Iterator[Command | Edit | New]:
+    for block in _BLOCK.finditer(page):
+        kind, text = block["kind"], block["text"]
+        if block["file"]:
+            yield New(block["file"], text)
+        elif kind == "diff":
             first, *lines = text.splitlines()
             old, new = ("\n".join(line[1:] for line in lines if line[0] == sign) for sign in "-+")
             yield Edit(first.removeprefix("--- "), old, new)
-        else:
+        elif kind == "console":
             for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
                 words, _, said = part.partition("\n")
                 yield Command(words, said)
@@ -54,9 +72,9 @@ def steps(page: str) -> Iterator[Command | Edit]:
 
 def follow(page: Path, folder: Path, programs: Path) -> None:
     """Raises AssertionError where the page is not right; ``programs`` is the folder of ``dodo``."""
-    environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "NO_COLOR": "1"}
+    environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "NO_COLOR": "1", "PYTEST_ADDOPTS": ""}
     for step in steps(page.read_text()):
-        if isinstance(step, Edit):
+        if isinstance(step, Edit | New):
             step.make(folder)
             continue
         done = subprocess.run(

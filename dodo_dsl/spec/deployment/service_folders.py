@@ -8,10 +8,14 @@ from dodo_dsl.source import Node, Scalar, path_of, walk
 
 RULE = "service-folder"
 MANIFEST = "service.yml"
+_TAKEN = ("services", "dodo_dsl")
 
 
 def problems(root: Path, node: Node | None) -> Iterator[Diagnostic]:
-    """Folders that are a service themselves, and a warning for those without any; the others are reported elsewhere."""
+    """Folders that are a service themselves, and warnings for those without any and those that DoDo's packages hide.
+
+    Folders that do not exist are reported elsewhere.
+    """
     for item in walk(node) if node is not None else ():
         folder = path_of(root, item.text) if isinstance(item, Scalar) else None
         if folder is None or not isinstance(item, Scalar) or not folder.is_dir():
@@ -21,6 +25,10 @@ def problems(root: Path, node: Node | None) -> Iterator[Diagnostic]:
         elif not any(folder.glob(f"*/{MANIFEST}")):
             message = f"'{item.text}' holds no service"
             hint = f"a service is a folder in it with a {MANIFEST}: {item.text.rstrip('/')}/NAME/{MANIFEST}"
+            yield Diagnostic(item.span, RULE, message, hint, severity="warning")
+        elif folder.name in _TAKEN:
+            message = f"Python finds DoDo's own package '{folder.name}' before this folder"
+            hint = f"give it another name, such as my_{folder.name}, also in 'process' of its services"
             yield Diagnostic(item.span, RULE, message, hint, severity="warning")
 
 

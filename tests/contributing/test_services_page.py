@@ -1,0 +1,37 @@
+"""The page on a service of one's own is what happens, down to the image that it describes."""
+
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dodo_dsl import __version__
+from dodo_dsl.images.names import Image
+from dodo_dsl.images.own_images import base_of
+from tests.contributing.tutorial import New, follow, steps
+
+PAGE = Path(__file__).parents[2] / "docs/how-to/services.md"
+
+
+def file(name: str) -> str:
+    """What the page writes into a file."""
+    (text,) = [step.text for step in steps(PAGE.read_text()) if isinstance(step, New) and step.file == name]
+    return text
+
+
+@pytest.mark.slow
+def test_it_can_be_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    (tmp_path / "repository").mkdir()
+    follow(PAGE, tmp_path / "repository", Path(sys.executable).parent)
+
+
+def test_its_image_starts_what_the_manifest_says_on_this_version(tmp_path: Path) -> None:
+    manifest = yaml.safe_load(file("my_services/smoothness/service.yml"))
+    text = file("my_services/smoothness/Dockerfile")
+    assert text.startswith(f"ARG DODO_BASE=dodo/base:{__version__}\n")
+    assert f'ENTRYPOINT ["python3", "-m", "{manifest["process"][-1]}"]' in text
+    (tmp_path / "Dockerfile").write_text(text)
+    assert base_of(Image("smoothness", "team/smoothness:7"), tmp_path / "Dockerfile") == "team/base:7"
