@@ -8,41 +8,46 @@ from pathlib import Path
 from google.protobuf.message import Message
 
 _OURS = ("dodo_dsl.", "services.")
+_BASE = Path(__file__).resolve().parent
 
 
 def tell(error: Exception, folder: Path, *, expected: bool, verbose: bool) -> None:
     """Logs the error; the last line is one sentence. ``expected`` tells that its own text is one for users."""
     if verbose:
         logging.error("the whole traceback", exc_info=error)
-    elif not expected and (steps := own_traceback(error, folder)):
+    elif not expected and (steps := short_traceback(error, folder)):
         logging.error("%s", steps)
     logging.critical("%s", " ".join(str(error).split()) if expected else sentence(error, folder))
 
 
 def sentence(error: Exception, folder: Path) -> str:
-    """The error in one line, with the innermost place in the service's own code; ``folder`` is the service's."""
+    """The error in one line, with the innermost place in the service's own code; ``folder`` is the service's.
+
+    Where its own code only called ``run``, as when it made a verdict that cannot be sent, it is the place in the base.
+    """
     text = f"{type(error).__name__}: {_unknown_field(error) or ' '.join(str(error).split())}"
-    places = [f"{file}:{frame.lineno}, in {frame.name}" for file, frame in _own_frames(error, folder)]
+    places = [f"{file}:{frame.lineno}, in {frame.name}" for file, frame in _frames(error, folder)]
     return f"{text} ({places[-1]})" if places else text
 
 
-def own_traceback(error: Exception, folder: Path) -> str:
-    """The frames of the service's own code as Python prints them; empty where there are none."""
-    lines = [f'  File "{file}", line {f.lineno}, in {f.name}\n    {f.line}' for file, f in _own_frames(error, folder)]
-    return "\n".join(["Traceback, own code only (most recent call last):", *lines]) if lines else ""
+def short_traceback(error: Exception, folder: Path) -> str:
+    """These frames as Python prints them; empty where there are none."""
+    lines = [f'  File "{file}", line {f.lineno}, in {f.name}\n    {f.line}' for file, f in _frames(error, folder)]
+    return "\n".join(["Traceback without libraries (most recent call last):", *lines]) if lines else ""
 
 
-def _own_frames(error: Exception, folder: Path) -> Iterator[tuple[str, traceback.FrameSummary]]:
-    """Frames from the folder of services, with the files relative to the one above it.
-
-    There are none for errors of DoDo's own classes, which are sentences for users.
-    """
-    services = folder.resolve().parent
+def _frames(error: Exception, folder: Path) -> list[tuple[str, traceback.FrameSummary]]:
+    """The frames of the service's own code, or else of the base; none for errors whose text is a sentence for users."""
     if type(error).__module__.startswith(_OURS):
-        return
+        return []
+    return list(_within(folder.resolve().parent, error)) or list(_within(_BASE.parent, error))
+
+
+def _within(services: Path, error: Exception) -> Iterator[tuple[str, traceback.FrameSummary]]:
+    """The frames below a folder of services but for the call of ``run``, with files relative to the folder above."""
     for frame in traceback.extract_tb(error.__traceback__):
         path = Path(frame.filename).resolve()
-        if path.is_relative_to(services):
+        if path.is_relative_to(services) and frame.name != "<module>":
             yield path.relative_to(services.parent).as_posix(), frame
 
 

@@ -169,7 +169,7 @@ def test_a_model_that_fails(start: Start, ready_file: Path, role: str, text: str
     if role == "unjudgeable":
         assert steps == []
     else:
-        assert steps[0] == "tiny-service: ERROR: Traceback, own code only (most recent call last):"
+        assert steps[0] == "tiny-service: ERROR: Traceback without libraries (most recent call last):"
         files = {line.split(",")[0].strip() for line in steps[1::2]}
         assert files == {'File "base/tiny/__main__.py"'}
         assert steps[-1].strip() in (Path(__file__).parent / "tiny/__main__.py").read_text()
