@@ -22,7 +22,9 @@ def without_unbuilt(checked: Checked, backend: str | None) -> tuple[Checked, str
 
 
 def _runs_processes(checked: Checked, backend: str | None) -> bool:
-    services = checked.application.services.values() if checked.application else ()
+    if checked.application is None:
+        return False
+    services = checked.application.services.values()
     by_default = all("x-dodo-process" in service.node.entries for service in services)
     return by_default if backend is None else backend != "docker"
 

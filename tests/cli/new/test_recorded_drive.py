@@ -22,8 +22,7 @@ def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: compose.yml\n")
     (tmp_path / "compose.yml").write_text(
         "services: {car: {image: car, command: --cid=111, x-dodo: {in: [], out: [opendlv.sim.Frame, "
-        + STEERING
-        + "]}}}\n"
+        f"{STEERING}, opendlv.proxy.PedalPositionRequest]}}}}}}\n"
     )
     return tmp_path
 
