@@ -2,10 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any, Literal
 
 from dodo_dsl.margins import with_margin
 from dodo_dsl.outcome import SLOW_ANSWERS
+
+NEGLIGIBLE = 0.01
+"""Share of a limit by which a value may change without a word, where only its last decimal shows that."""
 
 Direction = Literal["worse", "better", "different", "unchanged"]
 """``different`` is a change of a value that has no limit, or whose limits say nothing of the direction."""
@@ -64,12 +68,26 @@ def _direction(before: Mapping[str, Any], after: Mapping[str, Any]) -> Direction
         return "unchanged"  # it differs from run to run
     is_same_unit = (before.get("unit") or "") == (after.get("unit") or "")
     is_same_limit = (before.get("limit") or {}) == (after.get("limit") or {})
-    if is_same_unit and is_same_limit and _shown(before["value"]) == _shown(after["value"]):
+    if is_same_unit and is_same_limit and _is_alike(before["value"], after["value"], after.get("limit") or {}):
         return "unchanged"
     old, new = with_margins(before)["margin"], with_margins(after)["margin"]
     if not is_same_unit or old is None or new is None or _shown(old) == _shown(new):
         return "different"
     return "better" if new > old else "worse"
+
+
+def _is_alike(before: float | None, after: float | None, limit: Mapping[str, float]) -> bool:
+    """Whether values look the same, or differ in the last decimal only and by no more than 1 % of the limit.
+
+    Where there is no limit but 0, by 1 % of the values. Counts differ from 1 on.
+    """
+    texts = _shown(before), _shown(after)
+    if before is None or after is None or texts[0] == texts[1]:
+        return texts[0] == texts[1]
+    decimals = max(-int(Decimal(text).as_tuple().exponent) for text in texts)
+    size = max((abs(bound) for bound in limit.values()), default=0.0) or max(abs(before), abs(after))
+    change = abs(after - before)
+    return decimals > 0 and change < 10 ** (1 - decimals) and change <= NEGLIGIBLE * size
 
 
 def _shown(value: float | None) -> str:
