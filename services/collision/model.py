@@ -11,7 +11,7 @@ from services.collision.gates import Gates
 from services.collision.geometry import VehicleBox, VehiclePose, between, outline, swept
 from services.collision.measures import DriveMeasures
 from services.collision.requests import Requests
-from services.collision.track import Track, fault_of_start, length_through, nearest, place, touched
+from services.collision.track import Track, fault_of_start, length_through, nearest, place, told, touched
 
 PERIOD = 10_000  # us
 _CLOSE = 1e-3
@@ -82,11 +82,12 @@ class TrackEvaluator(Evaluator):
         if wall is not None:
             self.verdict = self._verdict("failed", f"hit wall {wall} {when} {place(pose)}", obstacle=wall)
         elif margin < self.track.min_margin:
-            close = f"came within {margin:.3f} m of wall {near} {when} {place(pose)}"
+            close = f"came within {told(margin, self.track.min_margin)} m of wall {near} {when} {place(pose)}"
             expected = f"expected at least {self.track.min_margin:g} m"
             self.verdict = self._verdict("failed", f"{close}, {expected}", obstacle=near)
         elif self.track.max_speed is not None and (speed := self._measures.max_speed or 0.0) > self.track.max_speed:
-            fast = f"drove {speed:.3f} m/s {when} {place(pose)}, expected at most {self.track.max_speed:g} m/s"
+            drove = f"drove {told(speed, self.track.max_speed)} m/s {when} {place(pose)}"
+            fast = f"{drove}, expected at most {self.track.max_speed:g} m/s"
             self.verdict = self._verdict("failed", fast)
         elif goal is not None:
             self._measures.time_to_goal = self.elapsed(time)

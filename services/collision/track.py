@@ -53,8 +53,14 @@ def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
     near = nearest(track.walls, area)
     if near is not None and near[0] < track.min_margin:
         limit = f"expected at least {track.min_margin:g} m"
-        return f"the vehicle stands {near[0]:.3f} m from wall {near[1]} from the start, {limit}"
+        return f"the vehicle stands {told(near[0], track.min_margin)} m from wall {near[1]} from the start, {limit}"
     return None
+
+
+def told(value: float, limit: float) -> str:
+    """A value beyond its limit for sentences: with three decimals, or as many as it takes to tell it from the limit."""
+    texts = (f"{value:.{decimals}f}" for decimals in range(3, 10))
+    return next((text for text in texts if float(text) != limit), str(value))
 
 
 def place(pose: VehiclePose) -> str:

@@ -12,7 +12,7 @@ from services.base import UnjudgeableError, Verdict
 from services.collision.geometry import VehicleBox, VehiclePose
 from services.collision.model import TrackEvaluator
 from services.collision.requests import REQUESTS, Requests
-from services.collision.track import Track
+from services.collision.track import Track, told
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND
@@ -310,6 +310,16 @@ def test_a_margin_not_kept_is_a_failure() -> None:
     )
     (check,) = [check for check in decided(it).checks if check.name == "wall-margin"]
     assert (check.value, check.limit, check.ok) == (pytest.approx(0.0449), {"min": 0.05}, False)
+    it = judge(replace(LANE, min_margin=0.05))
+    drive(it, (0, 0, 0, 0), (1, 1.0, 0.07014, 0))
+    assert decided(it).reason.startswith("came within 0.0499 m of wall left")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0699, "0.0699"), (0.06998, "0.06998"), (0.0451, "0.045"), (0.07, "0.07")]
+)
+def test_a_value_beyond_its_limit_does_not_look_like_it(value: float, text: str) -> None:
+    assert told(value, 0.07) == text
 
 
 def test_a_margin_kept_is_a_check_with_its_limit() -> None:
