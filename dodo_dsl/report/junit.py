@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.outcome import NotRun, Outcome
+from dodo_dsl.report import check_words
 from dodo_dsl.report.run_record import RunRecord
 
 # what XML 1.0 cannot hold (section 2.2), whatever a service printed
@@ -52,7 +53,9 @@ def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
         result.text = xml_text("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
     # GitLab shows the text of a failure in place of this, and takes the attachment from here
-    lines = [check_line(check) for check in outcome.checks] + [f"note: {note}" for note in outcome.notes]
+    lines = [check_words.line(check, outcome.checks) for check in outcome.checks] + [
+        f"note: {note}" for note in outcome.notes
+    ]
     if attachment:
         lines.append(f"[[ATTACHMENT|{attachment}]]")
     if lines:
@@ -72,9 +75,3 @@ def _skipped(test: NotRun) -> Any:
 def xml_text(text: str) -> str:
     """The text without what XML cannot hold."""
     return _NOT_XML.sub("\ufffd", text)
-
-
-def check_line(check: dict[str, Any]) -> str:
-    limit = ", ".join(f"{k} {v:g}" for k, v in (check.get("limit") or {}).items())
-    value = "none" if check["value"] is None else f"{check['value']:g} {check.get('unit') or ''}".strip()
-    return f"{'ok  ' if check['ok'] else 'FAIL'} {check['name']}: {value}{f' ({limit})' if limit else ''}"

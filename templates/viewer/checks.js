@@ -4,9 +4,10 @@
 dodo.checks = (function () {
   const { make, withUnit } = dodo.dom;
   const WORDS = { min: "at least", max: "at most" };
+  const EXCLUSIVE = { min: "more than", max: "less than" };
 
   function limit(check) {
-    return Object.entries(check.limit).map(([side, value]) => `${WORDS[side]} ${withUnit(value, check.unit)}`).join(", ");
+    return Object.entries(check.limit).map(([side, value]) => `${(check.exclusive.includes(side) ? EXCLUSIVE : WORDS)[side]} ${withUnit(value, check.unit)}`).join(", ");
   }
 
   // The line with the parameters that set the limit marked in it.
@@ -27,13 +28,14 @@ dodo.checks = (function () {
   }
 
   function row(check) {
+    if (check.follows) return make("li", {}, make("b", {}, `– ${check.name}`), ` ${withUnit(check.value, check.unit)}, when the drive ended`);
     const state = check.ok ? "passed" : "failed";
     const measured = [withUnit(check.value, check.unit), limit(check)].filter(Boolean).join(", expected ");
     return make("li", { class: state }, make("b", {}, `${check.ok ? "✓" : "✗"} ${check.name}`), ` ${measured}`, ...(check.ok ? [] : places(check)));
   }
 
   function show(parent) {
-    const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok || (a.value === null) - (b.value === null));
+    const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok || a.follows - b.follows || (a.value === null) - (b.value === null));
     parent.append(make("h2", {}, "Checks"));
     if (!all.length) parent.append(make("p", { class: "nothing" }, "No evaluator measured anything."));
     const judged = all.filter((check) => Object.keys(check.limit).length || !check.ok);

@@ -10,7 +10,7 @@ from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.cli.run.progress import count, summary_line
 from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import NotRun, Outcome
-from dodo_dsl.report.junit import check_line
+from dodo_dsl.report import check_words
 from dodo_dsl.terminal import printable
 
 _MOST_NAMES = 5
@@ -39,7 +39,9 @@ def write(
         colours.write(stream, summary_line(outcome, width))
         stream.writelines(f"        note: {printable(note)}\n" for note in outcome.notes)
         if verbosity is Verbosity.VERBOSE:
-            stream.writelines(f"        {printable(check_line(check))}\n" for check in outcome.checks)
+            stream.writelines(
+                f"        {printable(check_words.line(check, outcome.checks))}\n" for check in outcome.checks
+            )
             colours.write(stream, _complaints((logs or {}).get(outcome.slug)))
         if outcome.outcome != "passed":
             stream.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)

@@ -16,6 +16,7 @@ from markupsafe import Markup
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.report import check_words
 from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.comparison import KINDS, Comparison
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
@@ -91,6 +92,7 @@ def render(
             comparison=comparison,
             changed=comparison.by_slug() if comparison else {},
             words=words,
+            check_words=check_words,
             kinds=KINDS,
             directions=_DIRECTIONS,
             urgencies=_URGENCIES,

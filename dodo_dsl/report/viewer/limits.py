@@ -8,6 +8,7 @@ from dodo_dsl import package_data
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS, Outcome
 from dodo_dsl.plan.model import Place, Plan, PlannedService
+from dodo_dsl.report import check_words
 from dodo_dsl.report.viewer.encoded import shown
 from dodo_dsl.report.viewer.scene import flags_of
 
@@ -59,6 +60,8 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines) -> Iterator[dict[str,
             "limit": {key: value for key, value in (check.get("limit") or {}).items() if key in ("min", "max")},
             "unit": shown(check.get("unit") or "", 40),
             "ok": bool(check["ok"]),
+            "exclusive": [side for side in check.get("limit") or {} if check_words.is_exclusive(check, side)],
+            "follows": check_words.only_follows(check, outcome.checks),
             "margin": check.get("margin"),
             "places": [
                 {"file": shown(place.file, 400), "line": place.line, "text": lines.line(place), "flag": flag}
