@@ -45,8 +45,8 @@ _MOST_READ = 256  # files that are kept for the tests that extend them
 class Checked:
     """Tests with everything that was found wrong with them, sorted by place.
 
-    ``by_rules`` has what the rules found, by spec. ``unasked`` are the specs of shipped tests that were not asked for by
-    name, ``left_out`` names those that were among them and need what the application does not send.
+    ``by_rules`` has what the rules found, by spec. ``unasked`` are the specs of shipped tests that were not asked for
+    by name, ``left_out`` names those that were among them and need what the application does not send.
     """
 
     deployment: Deployment
