@@ -9,6 +9,7 @@ from typing import NamedTuple
 from dodo_dsl.outcome import SLOW_ANSWERS, Outcome
 from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.check_change import with_margins
+from dodo_dsl.report.check_words import only_follows
 
 _CHOICE = re.compile(r"(?P<before>.*)\[(?P<choice>[^\[\]]+)\]")
 _NEXT = re.compile(r",(?=[a-z][a-z0-9-]*=)")
@@ -51,7 +52,8 @@ def decisive_value(outcome: Outcome) -> str:
 
     As for a test's margin, checks that cannot be better do not count.
     """
-    failed = [check for check in outcome.checks if not check["ok"]]
+    checks = outcome.checks
+    failed = [check for check in checks if not check["ok"] and not only_follows(check, checks)]
     shares = ((with_margins(check)["margin_share"], check) for check in outcome.checks if check["name"] != SLOW_ANSWERS)
     judged = sorted(((share, check) for share, check in shares if share), key=lambda pair: pair[0])
     found = failed or [check for _, check in judged]

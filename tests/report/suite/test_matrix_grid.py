@@ -66,6 +66,13 @@ def test_what_is_no_matrix_has_no_grid(names: list[str]) -> None:
         ([check(9, max=10), check(0.1, min=0.01), check(5, max=6, unit="s")], "x 9 m"),
         ([check(9, max=10), check(2, max=1, unit="s"), check(3, max=1)], "x 2 s"),
         ([check(None, ok=False, max=1)], "x none"),
+        (
+            [
+                {**check(None, ok=False, unit="s", max=40), "name": "time-to-goal"},
+                {**check(0.0, ok=False, min=0), "name": "wall-margin"},
+            ],
+            "wall-margin 0 m",
+        ),
     ],
 )
 def test_the_value_that_decided(checks: list[dict[str, Any]], told: str) -> None:
