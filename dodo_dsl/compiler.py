@@ -46,7 +46,7 @@ class Checked:
     """Tests with everything that was found wrong with them, sorted by place.
 
     ``by_rules`` has what the rules found, by spec. ``unasked`` are the specs of shipped tests that were not asked for
-    by name, ``left_out`` names those that were among them and need what the application does not send.
+    by name; ``left_out`` names those among them that need what the application does not send.
     """
 
     deployment: Deployment
