@@ -27,4 +27,4 @@ def _bytes(node: object, default: int) -> int:
 
 
 def _count(node: object, default: int) -> int:
-    return int(str(node.value)) if isinstance(node, Scalar) else default
+    return node.value if isinstance(node, Scalar) and isinstance(node.value, int) else default

@@ -6,11 +6,18 @@ from typing import Any
 from dodo_dsl.slips.keys import meant
 
 Path = tuple[str | int, ...]
+_BOUNDS = ("minimum", "maximum")
 
 
 def without_consequences(errors: Iterable[Any]) -> list[Any]:
-    """The errors of jsonschema without missing keys that are misspelt, and empty ones whose content is not indented."""
-    kept = list(errors)
+    """The errors of jsonschema without what follows from others.
+
+    Those are missing keys that are misspelt, empty ones whose content is not indented, and bounds of what is no number
+    of the expected kind.
+    """
+    typed = list(errors)
+    wrong = {tuple(error.absolute_path) for error in typed if error.validator == "type"}
+    kept = [error for error in typed if not (error.validator in _BOUNDS and tuple(error.absolute_path) in wrong)]
     follows = {consequence for error in kept if error.validator == "additionalProperties" for consequence in _of(error)}
     return [error for error in kept if not follows & set(_is(error))]
 

@@ -13,7 +13,7 @@ from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.schema.consequences import unindented, without_consequences
-from dodo_dsl.spec.schema.validity import UNIT, WORDS, check_quantity, is_valid, schema_of
+from dodo_dsl.spec.schema.validity import OF_COMPOSE, UNIT, WORDS, check_quantity, is_valid, is_whole, schema_of
 
 _HINT = "x-hint"
 _TYPE_NAMES = {
@@ -50,7 +50,11 @@ def _validator(name: str) -> Any:
                 if error is None:
                     valid.add(known_as)
 
-    return extend(Draft202012Validator, {UNIT: is_quantity, "properties": properties})(schema_of(name))  # type: ignore[no-untyped-call]
+    checker = Draft202012Validator.TYPE_CHECKER
+    if name != OF_COMPOSE:
+        checker = checker.redefine("integer", is_whole)
+    keywords = {UNIT: is_quantity, "properties": properties}
+    return extend(Draft202012Validator, keywords, type_checker=checker)(schema_of(name))  # type: ignore[no-untyped-call]
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:

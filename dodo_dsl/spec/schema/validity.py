@@ -6,11 +6,13 @@ through schemas of this size in Python takes a third of a second.
 
 import functools
 import json
+import math
 from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.spec import quantity
 
+OF_COMPOSE = "application"
 UNIT = "x-unit"
 WORDS = "x-words"
 """Allowed in place of a quantity."""
@@ -48,8 +50,29 @@ def _validator(name: str) -> Any:
 
 
 def is_valid(document: object, schema: str) -> bool:
-    """Whether a document certainly fits ``schemas/<schema>.schema.json``; not so for one that JSON cannot express."""
+    """Whether a document certainly fits ``schemas/<schema>.schema.json``; not so for one that JSON cannot express.
+
+    For JSON Schema 1.0 is a whole number, and for compose: with fractions in place of such numbers, those at a wrong
+    place show.
+    """
     try:
-        return bool(_validator(schema).is_valid(document))
+        validator = _validator(schema)
+        return bool(
+            validator.is_valid(document) and (schema == OF_COMPOSE or validator.is_valid(_fractional(document)))
+        )
     except (ValueError, OverflowError, RecursionError):
         return False
+
+
+def is_whole(_: object, value: object) -> bool:
+    """Whether a value is written as a whole number: 140, but neither 140.0 nor 1.4e2."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _fractional(value: Any) -> Any:
+    """The same with numbers such as 1.0 moved by the least amount."""
+    if isinstance(value, dict):
+        return {key: _fractional(below) for key, below in value.items()}
+    if isinstance(value, list):
+        return [_fractional(item) for item in value]
+    return math.nextafter(value, math.inf) if isinstance(value, float) and value.is_integer() else value
