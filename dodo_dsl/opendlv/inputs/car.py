@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -74,15 +75,19 @@ _ANY = ("steering-gain",)
 
 def read_car(path: Path) -> Car:
     """The car of a YAML or JSON file, the Kiwi's for parameters that it omits; raises CarError."""
+    text = ""
     try:
-        node = yaml.compose(regular_file.text(path, MOST_BYTES), Loader=yaml.SafeLoader)
+        text = regular_file.text(path, MOST_BYTES)
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
     except OSError as error:
         raise CarError(f"{path} cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        _without_space(path, text)
         mark = getattr(error, "problem_mark", None)
         place = f"{path}:{mark.line + 1}" if mark else str(path)
         raise CarError(f"{place}: neither YAML nor JSON: {getattr(error, 'problem', None) or error}") from None
     if not isinstance(node, yaml.MappingNode):
+        _without_space(path, text)
         raise CarError(f"{path}: expected the parameters of a car, such as 'mass: 1.113'")
     given: dict[str, float] = {}
     for place, name, value in _entries(path, node):
@@ -90,6 +95,15 @@ def read_car(path: Path) -> Car:
             raise CarError(f"{place}: {name} appears twice")
         given[KEYS[name]] = value
     return replace(KIWI, **given)
+
+
+def _without_space(path: Path, text: str) -> None:
+    """Raises CarError for a line ``mass:1``, with which YAML has no parameters."""
+    for at, line in enumerate(text.splitlines(), 1):
+        match = re.match(r"(?P<name>[a-z-]+):(?P<value>[^\s:]+)", line)
+        if match and match["name"] in KEYS:
+            what = f"a space is missing after the colon, write '{match['name']}: {match['value']}'"
+            raise CarError(f"{path}:{at}:{match.end('name') + 1}: {what}")
 
 
 def _entries(path: Path, node: yaml.MappingNode) -> Iterator[tuple[str, str, float]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.inputs import map_file, mesh_text, obstacles
-from dodo_dsl.opendlv.inputs.json_node import MapError, read_bytes
+from dodo_dsl.opendlv.inputs.json_node import MapError, Node, read_bytes
 from dodo_dsl.opendlv.inputs.problem import InputError
 from dodo_dsl.opendlv.video.picture_size import problem_of
 
@@ -23,12 +23,23 @@ RECORDING = ".rec"
 PICTURES = (".png", ".jpg", ".jpeg")
 _BOXES = "annotations"
 _IMAGE, _IMAGE_NAME = 1055, "pictures"
+_POINTER = b"version https://git-lfs"
 _QUOTED = re.compile(r"'([^']+)'")
 
 
 def problems(name: str, path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
     """What is wrong with a file of a format; nothing where the services of DoDo do not read it."""
-    return _FORMATS[name](path, settings, ids)
+    yield from _pointer(map_file.find_map(path)) or _FORMATS[name](path, settings, ids)
+
+
+def _pointer(path: Path) -> list[InputError]:
+    """The problem of a file whose content is elsewhere, in Git LFS."""
+    try:
+        with regular_file.opened(path) as file:
+            is_pointer = file.read(len(_POINTER)) == _POINTER
+    except OSError:
+        return []
+    return [InputError(path, "a Git LFS pointer, not the file", hint="run: git lfs pull")] if is_pointer else []
 
 
 def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -40,7 +51,10 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
     paints = [*(model.paint for model in read.models), *(block.paint for block in read.blocks)]
     for file in meshes:
         try:
-            mesh_text.check(file, read_bytes(file))
+            pointer = _pointer(file)
+            yield from pointer
+            if not pointer:
+                mesh_text.check(file, read_bytes(file))
         except MapError as error:
             yield error
     for paint in dict.fromkeys((*paints, *(overlay.file for overlay in read.overlays))):
@@ -49,17 +63,24 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
 
 
 def _picture(file: Path) -> Iterator[InputError]:
+    pointer = _pointer(file)
+    yield from pointer
     try:
         problem = problem_of(read_bytes(file))
     except MapError as error:
         yield error
     else:
-        if problem:
+        if problem and not pointer:
             yield InputError(file, problem, hint="save the picture again as PNG or JPEG")
 
 
 def _obstacles(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
-    yield from _raised(path, lambda: obstacles.read(path))
+    file = map_file.find_map(path)
+    try:
+        slips = list(obstacles.slips(Node.load(file)))
+    except MapError as error:
+        slips = [error]
+    yield from slips or _raised(path, lambda: obstacles.read(path))
 
 
 def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -72,6 +93,7 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
         if error.where != _BOXES:  # told by the rule on empty files
             yield error
         return
+    yield from truth_file.corners(path)
     labels = {label for boxes in pictures.values() for label, _ in boxes}
     missing = [name for name in settings["classes"].split(",") if name and name not in labels]
     known = truth_file.categories(path) if missing else ()
@@ -85,7 +107,7 @@ def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
     if path.suffix != RECORDING:
         from dodo_dsl.opendlv.inputs import target_table
 
-        yield from _raised(path, lambda: target_table.read(path, field))
+        yield from _table(path) or _raised(path, lambda: target_table.read(path, field))
         return
     message = settings["target-message"] or settings["message"]
     sender = settings["target-sender"] or settings["sender"]
@@ -93,12 +115,20 @@ def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
         yield from _contents(path, ids[message], int(sender), message, is_needed=True)
 
 
+def _table(path: Path) -> list[InputError]:
+    """What is wrong with any table: services that read the same one tell it alike."""
+    from dodo_dsl.opendlv.inputs import table_text
+
+    problem = table_text.problem_in(path)
+    return [] if problem is None else [problem]
+
+
 def _way_points(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     from dodo_dsl.opendlv.inputs import way_points
     from dodo_dsl.opendlv.inputs.trajectory import Trajectory
 
     speed = float(settings["speed"] or 1)
-    yield from _raised(path, lambda: Trajectory(way_points.read_table(path, 0.0), speed))
+    yield from _table(path) or _raised(path, lambda: Trajectory(way_points.read_table(path, 0.0), speed))
 
 
 def _car(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn, Self
 
+from dodo_dsl.opendlv.inputs import json_slips
 from dodo_dsl.opendlv.inputs.problem import InputError
 
 MAX_BYTES = 64 * 1024 * 1024
@@ -47,7 +48,7 @@ def near(word: str, known: Iterable[str]) -> str:
 @functools.lru_cache(maxsize=2)
 def _document(data: bytes) -> object:
     """The JSON in a file, which several readers may look at one after the other; none of them changes it."""
-    return json.loads(data.decode("utf-8-sig"))
+    return json_slips.loads(data.decode("utf-8-sig"))
 
 
 def forget() -> None:
@@ -68,8 +69,8 @@ class Node:
         data = read_bytes(file)
         try:
             return cls(file, "$", _document(data))
-        except json.JSONDecodeError as error:
-            raise MapError(file, f"not JSON: {error.msg}", line=error.lineno, column=error.colno) from error
+        except json_slips.JsonError as error:
+            raise MapError(file, error.what, line=error.line, column=error.column, hint=error.hint) from error
         except UnicodeDecodeError as error:
             raise MapError(
                 file, "not UTF-8 text", line=_line(error), sentence=f"{file}: byte {error.start} is not UTF-8 text"
@@ -112,7 +113,8 @@ class Node:
         """A list of as many numbers as there are names, each at most 100 000 either way."""
         wanted = names.split()
         if not isinstance(self.value, list) or len(self.value) != len(wanted):
-            self.fail(f"the numbers [{', '.join(wanted)}]")
+            more = isinstance(self.value, list) and len(self.value) > len(wanted)
+            self.fail(f"the numbers [{', '.join(wanted)}]", "decimals have a point: 0.25, and not 0,25" if more else "")
         return tuple(self._number(f"{self.place}[{i}]", v) for i, v in enumerate(self.value))
 
     def _number(self, place: str, value: object) -> float:
@@ -136,12 +138,15 @@ class Node:
             self.fail("a file in the map's folder", near(path.name, beside))
         return path
 
-    def slips(self, known: Collection[str]) -> Iterator[MapError]:
-        """Keys that are spelt almost like known ones, and so mean nothing."""
-        for key in self.value if isinstance(self.value, dict) else ():
+    def slips(self, known: Collection[str], needed: Collection[str] = ()) -> Iterator[MapError]:
+        """Keys that are spelt almost like known ones, and so mean nothing; an error where one ``needed`` is meant."""
+        values = self.value if isinstance(self.value, dict) else {}
+        for key in values:
             hint = near(key, known) if key not in known else ""
             if hint:
-                yield MapError(self.file, f"nothing reads '{key}'", f"{self.place}.{key}", hint=hint, is_slip=True)
+                is_slip = not any(f"'{name}'" in hint for name in needed if name not in values)
+                where = f"{self.place}.{key}"
+                yield MapError(self.file, f"nothing reads '{key}'", where, hint=hint, is_slip=is_slip, is_of_key=True)
 
 
 def _line(error: UnicodeDecodeError) -> int:

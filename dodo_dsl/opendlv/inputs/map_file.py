@@ -1,14 +1,17 @@
 """An OpenDLV ``map.json``, checked; models and textures are not loaded yet."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from dodo_dsl.opendlv.inputs.json_node import MapError, Node
+from dodo_dsl.opendlv.inputs.json_node import MAX_NUMBER, MapError, Node
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
+_TURN = 6.3
+"""rad"""
 MAX_OVERLAYS = 50
 """Places of overlays, each of which takes the memory of a picture."""
 
@@ -171,12 +174,30 @@ def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
         read = _collected(file, root, found.append)
     except MapError as error:
         return None, [error]
-    found.extend(root.slips(_KEYS))
+    found.extend(root.slips(_KEYS, ("obstacles",)))
     for key, known in _KEYS.items():
         entries = root.member(key)
         if entries is not None and isinstance(entries.value, list):
-            found.extend(slip for entry in root.items(key) for slip in entry.slips(known))
+            needed = known if key == "obstacles" else ()
+            found.extend(slip for entry in root.items(key) for slip in entry.slips(known, needed))
+    found.extend(_degrees(read, root))
     return read, found
+
+
+def _degrees(read: MapFile, root: Node) -> Iterator[MapError]:
+    """The first angle of more than a turn, which is hardly in radians."""
+    for key in ("model", "block"):
+        value = root.value.get(key) if isinstance(root.value, dict) else None
+        for item in root.items(key) if isinstance(value, list) else ():
+            rows = item.value.get("instances") if isinstance(item.value, dict) else None
+            for index, row in enumerate(rows if isinstance(rows, list) else ()):
+                angle = row[3] if isinstance(row, list) and len(row) == 4 else 0
+                if isinstance(angle, int | float) and _TURN < abs(angle) <= MAX_NUMBER:
+                    place = f"{item.place}.instances[{index}][3]"
+                    what = f"the angle {angle:g} is more than a turn, expected radians"
+                    hint = f"{angle:g} degrees are {math.radians(angle):.5g} rad"
+                    yield MapError(read.path, what, place, hint=hint, is_slip=True)
+                    return
 
 
 _KEYS = {

@@ -16,6 +16,7 @@ _FACE, _VERTEX = (re.compile(rb"^[ \t]*%b[ \t]" % letter, re.MULTILINE) for lett
 _RELATIVE_FACE = re.compile(rb"^\s*f\s[^#\n]*-\d", re.MULTILINE)
 _CONTINUED = b"\\\n"
 _THREE = 3
+_CAPITALS = {b"V": "v", b"VT": "vt", b"VN": "vn", b"F": "f"}
 
 Vertex = tuple[float, ...]
 Problem = tuple[int, str, str]
@@ -59,6 +60,10 @@ def problem_of(data: bytes) -> Problem | None:
 
 def _read(data: bytes) -> None:
     lines = [(number, line.split()) for number, line in enumerate(data.split(b"\n"), 1) if line.strip()]
+    for number, words in lines:
+        if words[0] in _CAPITALS:
+            letter = _CAPITALS[words[0]]
+            raise _Wrong(number, f"'{_text(words)}' begins with a capital letter", f"write '{letter}'")
     vertices = [_vertex(number, words) for number, words in lines if words[0] == b"v"]
     faces = ((number, _face(number, words, len(vertices))) for number, words in lines if words[0] == b"f")
     count, has_area = 0, False
@@ -68,7 +73,7 @@ def _read(data: bytes) -> None:
     if not count:
         raise _Wrong(0, "the OBJ file has no faces", "save the mesh with its faces, lines that begin with f")
     if not has_area:
-        raise _Wrong(0, "no face of the OBJ file has an area", "")
+        raise _Wrong(0, "no face of the OBJ file has an area", "save the mesh again: all its triangles are lines")
 
 
 def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
@@ -77,9 +82,15 @@ def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
     except ValueError:
         place = ()
     if len(place) < _THREE:
-        raise _Wrong(number, f"'{_text(words)}' is no vertex, expected v and three numbers in m", "")
+        commas = any(b"," in word for word in words)
+        hint = (
+            f"decimals have a point: write '{_text(words).replace(',', '.')}'"
+            if commas
+            else "for example 'v 0.1 0.2 0.3'"
+        )
+        raise _Wrong(number, f"'{_text(words)}' is no vertex, expected v and three numbers in m", hint)
     if not all(abs(part) <= FARTHEST for part in place):
-        raise _Wrong(number, "the OBJ file has vertices that are not finite numbers below 100 km", "")
+        raise _Wrong(number, "the OBJ file has vertices that are not finite numbers below 100 km", "save it in m")
     return place
 
 
@@ -91,7 +102,8 @@ def _face(number: int, words: Sequence[bytes], count: int) -> list[int]:
     except ValueError:
         corners = []
     if len(corners) < _THREE:
-        raise _Wrong(number, f"'{_text(words)}' is no face, expected f and three or more vertices", "")
+        hint = "for example 'f 1 2 3', the numbers of its vertices from 1"
+        raise _Wrong(number, f"'{_text(words)}' is no face, expected f and three or more vertices", hint)
     outside = next((corner for corner in corners if not 0 < corner <= count), None)
     if outside is not None:
         raise _Wrong(number, f"the face has vertex {outside}, expected 1 to {count}", "save the whole mesh again")

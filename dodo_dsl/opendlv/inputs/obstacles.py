@@ -1,5 +1,7 @@
 """The obstacles of an OpenDLV map as an evaluator needs them: each with a name and lines on the ground."""
 
+import itertools
+from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl.opendlv.inputs.json_node import MapError, Node
@@ -7,6 +9,18 @@ from dodo_dsl.opendlv.inputs.json_node import MapError, Node
 Line = tuple[tuple[float, float], tuple[float, float]]
 NUMBERS = 4
 FARTHEST = 1e300
+
+
+KEYS = ("name", "lines")
+
+
+def slips(root: Node) -> Iterator[MapError]:
+    """Misspelt keys of a map without which there would be an obstacle, or its lines."""
+    yield from (slip for slip in root.slips(("obstacles",), ("obstacles",)) if not slip.is_slip)
+    value = root.value if isinstance(root.value, dict) else {}
+    if isinstance(value.get("obstacles"), list):
+        found = itertools.chain.from_iterable(entry.slips(KEYS, KEYS) for entry in root.items("obstacles"))
+        yield from (slip for slip in found if not slip.is_slip)
 
 
 def read(path: Path) -> dict[str, list[Line]]:
@@ -27,6 +41,9 @@ def _obstacle(entry: Node) -> tuple[str, list[Line]]:
     value = entry.value
     if not isinstance(value, dict) or not isinstance(value.get("name"), str) or not value["name"]:
         raise MapError(entry.file, "expected an object with a name", entry.place)
+    if value["name"] != value["name"].strip():
+        what = f"the name '{value['name']}' has blanks around it, with which a test does not find it"
+        raise MapError(entry.file, what, f"{entry.place}.name", hint=f'write "{value["name"].strip()}"')
     lines, place = value.get("lines"), f"{entry.place}.lines"
     if not isinstance(lines, list) or not lines:
         raise MapError(entry.file, "expected a list of lines [x1, y1, x2, y2]", place)

@@ -14,8 +14,8 @@ class InputError(ValueError):
     """A file that cannot be used; as a string one sentence that names the file, the place in it and what was expected.
 
     ``where`` is a path in a JSON document, such as ``$.model[0].color``; in other text there is a line, and perhaps a
-    column, from 1. With ``is_slip`` the file can be used, but hardly means what is written. ``what`` is said after the
-    file and a colon, or as a sentence of its own.
+    column, from 1. With ``is_slip`` the file can be used, but hardly means what is written. With ``is_of_key`` the key
+    at ``where`` is wrong. ``what`` is said after the file and a colon, or as a sentence of its own.
     """
 
     def __init__(
@@ -28,10 +28,11 @@ class InputError(ValueError):
         hint: str = "",
         is_slip: bool = False,
         sentence: str = "",
+        is_of_key: bool = False,
     ) -> None:
         self.file, self.where, self.hint, self.is_slip = file, where, hint, is_slip
         self.what = f"{where}: {what}" if where else what
-        self._line, self._column = line, column
+        self._line, self._column, self._is_of_key = line, column, is_of_key
         numbers = "".join(f":{number}" for number in (line, column) if number)
         super().__init__(sentence or f"{file}{numbers}: {self.what}")
 
@@ -39,20 +40,28 @@ class InputError(ValueError):
         """Line and column in the file, from 1; the file is read again for a place in JSON."""
         if self.where and not self._line:
             try:
-                return json_position(regular_file.text(self.file, encoding="utf-8-sig"), self.where)
+                text = regular_file.text(self.file, encoding="utf-8-sig")
+                return json_position(text, self.where, self._is_of_key)
             except (OSError, ValueError, RecursionError):
                 return 1, 1
         return self._line or 1, self._column or 1
 
 
-def json_position(text: str, where: str) -> tuple[int, int]:
-    """Line and column of a path in a JSON document; of what is around it where the document ends before."""
+def json_position(text: str, where: str, is_of_key: bool = False) -> tuple[int, int]:
+    """Line and column of a path in a JSON document, or of its key.
+
+    Where the document ends before, that of what is around it.
+    """
     at, decoder = _skip(text, 0), JSONDecoder()
+    key = at
     for match in _STEP.finditer(where):
-        inner = _item(text, at, int(match[1]), decoder) if match[1] else _member(text, at, match[2], decoder)
+        begin, inner = (
+            (at, _item(text, at, int(match[1]), decoder)) if match[1] else _member(text, at, match[2], decoder)
+        )
         if inner is None:
             break
-        at = inner
+        key, at = begin, inner
+    at = key if is_of_key else at
     return text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
 
 
@@ -61,15 +70,16 @@ def _skip(text: str, at: int) -> int:
     return match.end() if match else at
 
 
-def _member(text: str, at: int, key: str, decoder: JSONDecoder) -> int | None:
-    """Where the value of a key begins; of equal keys the last counts."""
-    found, at = None, _skip(text, at + 1) if text[at] == "{" else len(text)
+def _member(text: str, at: int, key: str, decoder: JSONDecoder) -> tuple[int, int | None]:
+    """Where a key and its value begin; of equal keys the last counts."""
+    begin, found, at = at, None, _skip(text, at + 1) if text[at] == "{" else len(text)
     while at < len(text) and text[at] == '"':
+        here = at
         name, at = decoder.raw_decode(text, at)
         at = _skip(text, _skip(text, at) + 1)
-        found = at if name == key else found
+        begin, found = (here, at) if name == key else (begin, found)
         at = _behind(text, at, decoder)
-    return found
+    return begin, found
 
 
 def _item(text: str, at: int, index: int, decoder: JSONDecoder) -> int | None:

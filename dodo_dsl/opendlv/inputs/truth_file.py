@@ -1,13 +1,13 @@
 """True boxes from a file in the COCO format (cocodataset.org, "Data format", object detection), in pixels."""
 
 import difflib
-import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NoReturn
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.inputs import json_slips
 from dodo_dsl.opendlv.inputs.problem import InputError
 
 Frames = Literal["one", "sample-time", "number"]
@@ -15,6 +15,8 @@ Area = tuple[float, float, float, float]
 """x, y, width and height as fractions of the picture."""
 
 LARGEST = 2**63
+_FAR = 1.1
+"""Times the image, up to which boxes may go on outside it."""
 PREFIX = "color:"
 
 
@@ -57,6 +59,21 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
     return {keys[number]: found for number, found in boxes.items()}
 
 
+def corners(path: Path) -> Iterator[TruthFileError]:
+    """The first box that ends far outside its image, as one does that is written as two corners; the file is right."""
+    document = _document(path)
+    images = {entry["id"]: entry for entry in document["images"]}
+    for index, entry in enumerate(document["annotations"]):
+        image, (x, y, wide, high) = images[entry["image_id"]], entry["bbox"]
+        beyond = max((x + wide) / image["width"], (y + high) / image["height"])
+        if beyond > _FAR and x < wide and y < high:
+            what = f"the box ends at {x + wide:g}, {y + high:g}, outside its image of {image['width']} x "
+            what += f"{image['height']} pixels"
+            hint = f"a box is [x, y, width, height]: the one with these corners is {[x, y, wide - x, high - y]}"
+            yield TruthFileError(path, what, f"annotations[{index}].bbox", hint=hint, is_slip=True)
+            return
+
+
 def no_box(name: str, labels: Collection[str]) -> str:
     """What to say of a class that none of the boxes has; ``labels`` are theirs."""
     close = difflib.get_close_matches(name, labels, n=1)
@@ -71,12 +88,13 @@ def categories(path: Path) -> list[str]:
 
 def _document(path: Path) -> Any:
     try:
-        return json.loads(regular_file.text(path))
+        return json_slips.loads(regular_file.text(path))
+    except json_slips.JsonError as error:
+        raise TruthFileError(path, error.what, line=error.line, column=error.column, hint=error.hint) from None
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        line, column = (error.lineno, error.colno) if isinstance(error, json.JSONDecodeError) else (0, 0)
         what = f"cannot be read as COCO JSON: {reason}"
-        raise TruthFileError(path, what, line=line, column=column, sentence=f"{path}: {what}") from None
+        raise TruthFileError(path, what, sentence=f"{path}: {what}") from None
 
 
 def _entries(document: Any, name: str, path: Path) -> Sequence[tuple[dict[str, Any], Place]]:

@@ -60,7 +60,7 @@ def test_a_map_may_have_none(tmp_path: Path) -> None:
         ),
         (
             "[",
-            ":1:2: not JSON: Expecting value",
+            ":1:1: '[' is not closed",
         ),
     ],
 )

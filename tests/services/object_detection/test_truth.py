@@ -103,11 +103,22 @@ def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> Non
         load(write(tmp_path, COCO), "one")
 
 
-@pytest.mark.parametrize("text", ["", "[1, 2", "\x00", "[" * 100_000])
-def test_files_that_are_no_json(tmp_path: Path, text: str) -> None:
-    for path in (write(tmp_path, text), tmp_path / "absent.json", tmp_path):
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", ":1:1: the file is empty, expected JSON"),
+        ("[1, 2", ":1:1: '[' is not closed"),
+        ("\x00", ":1:1: not JSON, which begins with { or [: '\x00'"),
+        ("[" * 100_000, ": cannot be read as COCO JSON: "),
+    ],
+)
+def test_files_that_are_no_json(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(TruthFileError) as raised:
+        load(path := write(tmp_path, text), "one")
+    assert str(raised.value).startswith(f"{path}{said}")
+    for other in (tmp_path / "absent.json", tmp_path):
         with pytest.raises(TruthFileError, match=r"cannot be read as COCO JSON: "):
-            load(path, "one")
+            load(other, "one")
 
 
 KEYS = ["images", "annotations", "categories", "id", "name", "bbox", "width", "height", "image_id", "category_id"]

@@ -21,8 +21,7 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
         if service.use.layer not in service.manifest.layers:
             continue
         for argument in service.arguments.values():
-            if argument.parameter.format and argument.value and argument.value.path:
-                yield from _problems(context, service, argument, argument.value.path)
+            yield from file_problems(context, service, argument)
 
 
 def is_own(diagnostic: Diagnostic) -> bool:
@@ -30,8 +29,11 @@ def is_own(diagnostic: Diagnostic) -> bool:
     return diagnostic.rule == RULE and not diagnostic.span.file.endswith(SUFFIX)
 
 
-def _problems(context: RuleContext, service: ResolvedService, argument: Argument, path: Path) -> tuple[Diagnostic, ...]:
-    name = argument.parameter.format
+def file_problems(context: RuleContext, service: ResolvedService, argument: Argument) -> tuple[Diagnostic, ...]:
+    """The problems of the file that a parameter names; none without a format."""
+    name, path = argument.parameter.format, argument.value.path if argument.value else None
+    if not name or path is None:
+        return ()
     given = tuple((key, service.texts.get(key, "")) for key in formats.SETTINGS.get(name, ()))
     return problems(name, path, given, context.deployment.messages)
 

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean, only_fix
+from dodo_dsl.check.rules.inputs.files import file_problems
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, has_errors, only_fix
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 
@@ -20,6 +21,7 @@ MAP = "map.json"
 _MAX_BYTES = 20 << 20
 _ATTEMPT = re.compile(r"\$\{(matrix|vary)")
 """A placeholder that nothing has replaced, which another rule reports."""
+_CLASSES = "categories"
 _HELP = {"obstacles": "see docs/reference/maps.md"}
 
 
@@ -28,18 +30,18 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
         for name, entry in service.use.parameters.items():
             argument = service.arguments.get(name)
             if argument and argument.value and argument.parameter.among:
-                yield from _among(service, argument, entry)
+                yield from _among(context, service, argument, entry)
             if argument and argument.value and argument.parameter.within_timeout:
                 yield from _within(context, service, argument.value.text, entry)
 
 
-def _among(service: ResolvedService, argument: Argument, entry: Entry) -> Iterator[Diagnostic]:
+def _among(context: RuleContext, service: ResolvedService, argument: Argument, entry: Entry) -> Iterator[Diagnostic]:
     source, _, key = argument.parameter.among.partition(".")
     file = _file(service.arguments[source])
     if file is None:
         return
     names = _names(file, key)
-    if isinstance(names, str) and service.arguments[source].parameter.format:
+    if has_errors(file_problems(context, service, service.arguments[source])):
         return  # told with the file
     if isinstance(names, str):
         yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(key, ""))
@@ -62,7 +64,7 @@ def _file(argument: Argument) -> Path | None:
 def _names(file: Path, key: str) -> tuple[str, ...] | str:
     """The names of the entries of a list in a JSON file, or the problem of the file."""
     found = entries(file, key)
-    return found if isinstance(found, str) else tuple(name for name in found if name)
+    return found if isinstance(found, str) else tuple(dict.fromkeys(name for name in found if name))
 
 
 @functools.lru_cache(maxsize=256)
@@ -80,7 +82,8 @@ def entries(file: Path, key: str) -> tuple[str, ...] | str:
         found = document.get(key, []) if isinstance(document, dict) else None
         if not isinstance(found, list):
             return f"expected an object with a list '{key}'"
-        return tuple(_plain(e["name"]) if isinstance(e, dict) and "name" in e else "" for e in found)
+        plain = _plain if key == _CLASSES else str
+        return tuple(plain(e["name"]) if isinstance(e, dict) and "name" in e else "" for e in found)
     except OSError as error:
         return f"cannot be read: {error.strerror}"
     except (ValueError, RecursionError) as error:

@@ -93,7 +93,7 @@ def test_a_bad_block_is_told_with_its_place(write_map, change, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", r"map\.json:1:2: not JSON"),
+        ("{", r"map\.json:1:1: '{' is not closed"),
         ("[]", r"map\.json: \$: expected an object, found \[\]"),
         ('{"model": 1}', r"\$\.model: expected a list, found 1"),
         ('{"model": [null]}', r"\$\.model\[0\]: expected an object, found null"),
