@@ -1,21 +1,18 @@
 """Problems of an application as a whole: missing files, dependency cycles, and no service that takes a CID."""
 
-import os
-import shlex
-import shutil
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.host_access import references
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain, text
 from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.application.service_problems import Written, problems
-from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, has_errors
-
-INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
+from dodo_dsl.application.slips.flags import cid_slips
+from dodo_dsl.application.slips.programs import missing_program
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 
 
 def application_problems(application: ApplicationSource, first: Span) -> Iterator[Diagnostic]:
@@ -29,7 +26,8 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     for service in application.services.values():
         found.extend(problems(Written.of(service, application, volumes or {})))
         found.extend(_missing_files(service, application))
-        found.extend(_missing_program(service, application.folder))
+        found.extend(_missing_folder(service, application))
+        found.extend(missing_program(service, application.folder))
     found.extend(_cycles(application))
     found.extend(_same_variable(application))
     yield from found
@@ -45,47 +43,15 @@ def _missing_files(service: ComposeService, application: ApplicationSource) -> I
             yield Diagnostic(file.span, "application-file", f"there is no file '{file.path}'", hint)
 
 
-def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
-    """What of ``x-dodo-process`` cannot start; programs may be built later, or be in the PATH of another machine."""
-    process = service.node.get("x-dodo-process")
-    words = [word for word in process.items if isinstance(word, source.Scalar)] if _is_list(process) else []
-    if not words or "$" in words[0].text:
+def _missing_folder(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
+    """A folder to build from that is not there: a warning, as an image or a variable for it may stand in."""
+    build = service.node.get("build")
+    context = build.get("context") if isinstance(build, source.Mapping) else build
+    if not isinstance(context, source.Scalar) or not isinstance(context.value, str) or not is_local(context.value):
         return
-    program = words[0]
-    if program.text in INTERPRETERS:
-        if len(words) > 1:
-            yield from _missing_script(program.text, words[1], folder)
-        return
-    own = folder / program.text
-    if "/" not in program.text:
-        near = [] if shutil.which(program.text) else closest(program.text, INTERPRETERS)
-        if near:
-            yield _cannot_start(program, f"there is no program '{program.text}'", f"did you mean '{near[0]}'?")
-    elif own.is_file() and not os.access(own, os.X_OK):
-        yield _cannot_start(
-            program, f"'{program.text}' is not executable", f"run: chmod +x {shlex.quote(program.text)}"
-        )
-    elif not own.exists() and own.parent.is_dir():
-        near = closest(own.name, [path.name for path in own.parent.iterdir() if os.access(path, os.X_OK)])
-        if near:
-            meant = program.text.removesuffix(own.name) + near[0]
-            yield _cannot_start(program, f"there is no program '{program.text}'", f"did you mean '{meant}'?")
-
-
-def _is_list(node: source.Node | None) -> TypeGuard[source.Sequence]:
-    return isinstance(node, source.Sequence)
-
-
-def _cannot_start(word: source.Scalar, message: str, hint: str) -> Diagnostic:
-    return Diagnostic(word.span, "application-file", message, hint, "warning")
-
-
-def _missing_script(interpreter: str, script: source.Scalar, folder: Path) -> Iterator[Diagnostic]:
-    name = script.text
-    if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
-        beside = [path.name for path in folder.iterdir() if path.suffix == Path(name).suffix]
-        hint = did_you_mean(Path(name).name, beside) or "without it the application starts in containers only"
-        yield _cannot_start(script, f"there is no file '{name}' for {interpreter} to run", hint)
+    if application.paths.is_own(context.value) and not (application.folder / context.value).is_dir():
+        hint = "create it, or remove 'build'; paths are relative to this file"
+        yield Diagnostic(context.span, "application-file", f"there is no folder '{context.text}'", hint, "warning")
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -133,12 +99,19 @@ def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
 
 
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """A warning when no service takes a CID."""
-    if any(map(_takes_cid, application.services.values())):
+    """Warnings of flags that give no CID, of services with messages that take none, and of none that does."""
+    services = application.services.values()
+    slips = {service.name: list(cid_slips(service, _takes_cid(service))) for service in services}
+    yield from (slip for found in slips.values() for slip in found)
+    without = [service for service in services if not slips[service.name] and not _takes_cid(service)]
+    if len(without) == len(services):
+        message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
+        yield Diagnostic(without[0].span, "application-cid", message, "add --cid=111 to its command", "warning")
         return
-    first = next(iter(application.services.values())).span
-    message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
-    yield Diagnostic(first, "application-cid", message, "add --cid=111 to its command", "warning")
+    for service in without:
+        if service.declared and (service.declared.inputs or service.declared.outputs):
+            message = f"'{service.name}' has messages, but takes no CID (--cid=, CID or OD4SESSION_CID)"
+            yield Diagnostic(service.span, "application-cid", message, "add --cid=111 to its command", "warning")
 
 
 def _takes_cid(service: ComposeService) -> bool:

@@ -48,6 +48,11 @@ def is_path(text: str) -> bool:
     return text.startswith((".", "/", "~", "$"))
 
 
+def is_local(context: str) -> bool:
+    """Whether what is built is a folder, and not known to be elsewhere."""
+    return "$" not in context and "://" not in context and not context.startswith(_REMOTE)
+
+
 def mapped_service(service: source.Mapping, change: Change) -> source.Mapping:
     """A service with ``change`` applied to each of its paths."""
     return _mapped(service, _SERVICE, change)

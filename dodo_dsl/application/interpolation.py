@@ -6,7 +6,7 @@ from pathlib import Path
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LINE = re.compile(r"\s*(?:export\s+)?(?P<name>[A-Za-z_][A-Za-z0-9_.-]*)[ \t]*[=:][ \t]*")
-_VARIABLE = re.compile(
+VARIABLE = re.compile(
     r"\$(?:(?P<escaped>\$)|(?P<bare>[A-Za-z_][A-Za-z0-9_]*)"
     r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>.*))?\})",
     re.DOTALL,
@@ -69,7 +69,7 @@ def interpolate(text: str, known: Mapping[str, str], *, unset: bool = True) -> s
     parts, place = [], 0
     while (dollar := text.find("$", place)) >= 0:
         end = end_of_variable(text, dollar)
-        match = _VARIABLE.fullmatch(text, dollar, end)
+        match = VARIABLE.fullmatch(text, dollar, end)
         parts += [text[place:dollar], _filled(match, known, unset) if match else text[dollar:end]]
         place = end
     return "".join([*parts, text[place:]])
@@ -99,7 +99,7 @@ def with_values(text: str, values: Mapping[str, str]) -> str:
     parts, place = [], 0
     while (dollar := text.find("$", place)) >= 0:
         end = end_of_variable(text, dollar)
-        match = _VARIABLE.fullmatch(text, dollar, end)
+        match = VARIABLE.fullmatch(text, dollar, end)
         parts += [text[place:dollar], _with_value(match, values) if match else text[dollar:end]]
         place = end
     return "".join([*parts, text[place:]])

@@ -21,6 +21,7 @@ from dodo_dsl.application.load import load
 from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
 from dodo_dsl.application.service_environment import cid_variables, env_files
 from dodo_dsl.application.service_problems import unknown_keys
+from dodo_dsl.application.slips.variables import variable_problems
 from dodo_dsl.application.tunables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.source import Entry, Reader
@@ -54,6 +55,7 @@ def read_application(
             )
     if document is not None and not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
         found.extend(validate(document, "application"))
+        found.extend(variable_problems(document))
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
     application = _application(paths[0].resolve(), document, services, files, access, limits)

@@ -11,8 +11,10 @@ from dodo_dsl.application.access import filled
 from dodo_dsl.application.access.access_diagnostics import diagnostic, place
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, plain
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix
 from dodo_dsl.source import Node
+
+_CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _words, _references, _volumes, _access, _single):
+    for rule in (_name, _words, _references, _conditions, _volumes, _access, _single):
         yield from rule(written)
 
 
@@ -98,6 +100,18 @@ def _references(written: Written) -> Iterator[Diagnostic]:
             message = f"'{key}' of '{written.name}' names the unknown service '{name}'"
             fix = only_fix(name, written.others, _taken(written, key))
             yield _bad(_of_name(written, key, name), message, hint, fix)
+
+
+def _conditions(written: Written) -> Iterator[Diagnostic]:
+    """What compose does not know of ``depends_on``."""
+    needed = written.plain.get("depends_on")
+    for name, about in needed.items() if isinstance(needed, dict) else ():
+        condition = about.get("condition") if isinstance(about, dict) else None
+        if isinstance(condition, str) and condition not in _CONDITIONS and "$" not in condition:
+            message = f"'{condition}' is not a condition of 'depends_on'"
+            near = closest(condition, _CONDITIONS)
+            hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(_CONDITIONS)}"
+            yield _bad(place(written.node, ("depends_on", name, "condition"), written.key), message, hint)
 
 
 def _taken(written: Written, key: str) -> list[str]:

@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from decimal import Decimal
 
 from dodo_dsl import source
-from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.compose_files import variables_of
+from dodo_dsl.application.interpolation import names
+from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.test_variables import owner
-from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.diagnostics import Diagnostic, closest
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.instances.vary import Range
 
@@ -29,9 +31,14 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
 def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Parameters that are DoDo's own, without a range, or with different ones at several services."""
     seen: dict[str, tuple[str, Range]] = {}
+    used = _variables(application)
     for service in application.services.values():
         for name, entry in _written(service).items():
             problems = list(_problems(name, entry))
+            near = closest(name.lower(), {each.lower() for each in used}) if name not in used else []
+            if meant := [each for each in sorted(used) if each.lower() in near[:1]]:
+                message = f"nothing in the application uses the variable '{name}'"
+                yield Diagnostic(entry.key, _RULE, message, f"did you mean '{meant[0]}'?", "warning")
             yield from problems
             if problems:
                 continue
@@ -40,6 +47,18 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
             if _numbers(first) != _numbers(one):
                 message = f"'{name}' has another range at '{other}', expected the same one: a parameter has one value"
                 yield Diagnostic(entry.key, _RULE, message)
+
+
+def _variables(application: ApplicationSource) -> set[str]:
+    """The variables that the services set or fill in; a program may read others."""
+    found: set[str] = set()
+    for service in application.services.values():
+        found.update(environment(plain(service.node).get("environment")))
+        texts = (part.text for part in source.walk(service.node) if isinstance(part, Scalar))
+        found.update(*map(names, texts))
+        for file in service.env_files:
+            found.update(variables_of(application.folder / file.path) if application.paths.is_own(file.path) else ())
+    return found
 
 
 def _written(service: ComposeService) -> dict[str, Entry]:

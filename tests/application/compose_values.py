@@ -49,6 +49,18 @@ labels: {a: b, c: 5, d: true, e: null, f: "${B}"}
 labels: [a=b, c]
 labels: []
 x-extra: {stop_grace_period: soon, init: perhaps}
+mem_limit: 512m
+mem_limit: 512 MB
+mem_limit: 1e9
+mem_limit: "512.5kib"
+mem_limit: ${M:-1g}
+memswap_limit: -1
+pids_limit: "-1"
+pids_limit: 1e3
+volumes: [{type: tmpfs, target: /t, tmpfs: {size: 5m}}]
+deploy: {resources: {limits: {memory: 50M}}}
+environment: {A: "${B-1}", C: "$$x", D: "$(e)", F: "g$", H: "$5", I: "${J:-${K:+l}}", M: "${N:-{o}}}", P: "$${"}
+environment: ["A=${B:-$}"]
 """.strip().splitlines()
 
 WRONG = """
@@ -98,6 +110,29 @@ labels: 5
 labels: a
 labels: {a: [b]}
 labels: [5]
+mem_limit: 512 megs
+mem_limit: lots
+mem_limit: 0,5g
+mem_limit: .5g
+mem_limit: ""
+mem_limit:
+memswap_limit: "-1"
+mem_reservation: lots
+shm_size: 64 MBs
+build: {context: ., shm_size: lots}
+deploy: {resources: {limits: {memory: lots}}}
+deploy: {resources: {reservations: {memory: 5}}}
+pids_limit: lots
+volumes: [{type: tmpfs, target: /t, tmpfs: {size: lots}}]
+environment: {A: "${B:-1"}
+environment: {A: "${B:1}"}
+environment: {A: "${}"}
+environment: {A: "${B C:-1}"}
+environment: ["A=${B:=1}"]
+environment: ["A=${B:-${C}"]
+environment: ["A=${B:-${}}"]
+labels: ["a=${1b}"]
+x-own: "${B"
 """.strip().splitlines()
 
 RIGHT_FOR_UP = ["restart: any", "restart: always:0", "restart: on-failure:+3"]

@@ -34,8 +34,11 @@ def test_missing_files(tmp_path: Path) -> None:
         ("[python, here.py]", []),
         ("[python, -m, drive]", []),
         ("[python, $A]", []),
-        ("[./drive]", []),
-        ("[build/drive, drive.py]", []),
+        ("[./drive]", ["there is no program './drive'"]),
+        ("[build/drive, drive.py]", ["there is no program 'build/drive'"]),
+        ("[python here.py]", ["there is no program 'python here.py', which is one word"]),
+        ("[here.py]", ["there is no program 'here.py' in the PATH"]),
+        ("[drive.py]", []),
         ("[pyhton, here.py]", ["there is no program 'pyhton'"]),
         ("[rosrun, here.py]", []),
         ("[./here.py]", ["'./here.py' is not executable"]),
@@ -48,6 +51,21 @@ def test_missing_programs(process: str, expected: list[str], tmp_path: Path) -> 
     (tmp_path / "three").touch(0o755)
     service = f"a: {{image: x, command: --cid=1, x-dodo-process: {process}}}"
     assert messages(service, tmp_path) == expected
+
+
+@pytest.mark.parametrize(
+    ("build", "missing"),
+    [
+        (".", ""),
+        ("away", "away"),
+        ("{context: ./away}", "./away"),
+        ("{dockerfile: Dockerfile}", ""),
+        ("${FOLDER:-away}", ""),
+    ],
+)
+def test_missing_folders_to_build_from(build: str, missing: str, tmp_path: Path) -> None:
+    found = messages(f"a: {{command: --cid=1, build: '{build}'}}".replace("'{", "{").replace("}'}", "}}"), tmp_path)
+    assert found == ([f"there is no folder '{missing}'"] if missing else [])
 
 
 def test_a_cycle() -> None:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from dodo_dsl.application import host_access
@@ -22,11 +23,15 @@ _TMPFS_OPTIONS = re.compile(r"(size|mode|uid|gid|nr_inodes|nr_blocks)=[\w%]+|nos
 _BIND_OPTIONS = re.compile(r"r?bind|rw|ro|nosuid|nodev|noexec")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _OURS = "dodo-"
+_OF_SERVICES = ("image", "build", "command", "x-dodo", "x-dodo-process")
 
 
 def shared_findings(document: Mapping[str, Any], paths: HostPaths, passed: Collection[str]) -> Iterator[AccessFinding]:
     """Everything beside the services, in a mapping of the file's other keys."""
-    yield from key_findings("the compose file", TOP, document)
+    for finding in key_findings("the compose file", TOP, document):
+        about = document.get(str(finding.steps[0])) if finding.kind == "unknown" else None
+        is_service = isinstance(about, dict) and any(key in about for key in _OF_SERVICES)
+        yield replace(finding, hint="indent it by 2: it looks like a service", fix=None) if is_service else finding
     for key, (what, rows) in _TABLES.items():
         entries = document.get(key)
         for name, about in entries.items() if isinstance(entries, dict) else ():

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
-from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.access import filled
 from dodo_dsl.application.model import ComposeService
+from dodo_dsl.application.slips import flags
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, Span, closest
 from dodo_dsl.source import Scalar
@@ -21,12 +21,14 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
     known = {**context.application.known, **set_here}
+    for service in context.application.services.values():
+        yield from _slips(service, known, made)
     asked = {service.name: _asked(service, known) for service in context.application.services.values()}
-    for service, names in asked.items():
-        others = {name for other, own in asked.items() if other != service for name in own}
+    for owner, names in asked.items():
+        others = {name for other, own in asked.items() if other != owner for name in own}
         if made.isdisjoint(names) and others.isdisjoint(names):
             for name, span in names.items():
-                yield _missing(service, name, span, made)
+                yield _missing(owner, name, span, made)
 
 
 def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
@@ -36,20 +38,18 @@ def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
     return Diagnostic(span, "application-memory", message, hint, "warning")
 
 
+def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> Iterator[Diagnostic]:
+    """Flags that are almost ``--name=``, with a memory of the test."""
+    for word, item in flags.words(service):
+        flag = flags.meant(filled.text(word, known), "--name")
+        if flag.partition("=")[2].removeprefix("/") in made:
+            message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
+            yield Diagnostic(item.span, "application-memory", message, f"did you mean '{flag}'?", "warning")
+
+
 def _asked(service: ComposeService, known: dict[str, str]) -> Asked:
     found: Asked = {}
-    for key in ("x-dodo-process", "entrypoint", "command"):
-        node = service.node.get(key)
-        for item in node.items if isinstance(node, source.Sequence) else (node,):
-            if isinstance(item, Scalar):
-                text = filled.text(item.text, known)
-                words = (text,) if isinstance(node, source.Sequence) else _words(text)
-                found.update((name, item.span) for name in opendlv_flags.memories(words) if "$" not in name)
+    for word, item in flags.words(service):
+        names = opendlv_flags.memories([filled.text(word, known)])
+        found.update((name, item.span) for name in names if "$" not in name)
     return found
-
-
-def _words(command: str) -> tuple[str, ...]:
-    try:
-        return opendlv_flags.split(command)
-    except ValueError:
-        return ()  # reported with the application

@@ -25,7 +25,7 @@ from dodo_dsl.run.application_files import application_paths, env_file_findings,
 from dodo_dsl.run.docker import own_images
 from dodo_dsl.run.docker.builds import is_built, private_images
 from dodo_dsl.run.docker.masks import masks
-from dodo_dsl.run.docker.pulls import Pulls, Say
+from dodo_dsl.run.docker.pulls import PullError, Pulls, Say
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.ports import known_ports
 
@@ -116,7 +116,11 @@ class Compose:
             for name, s in self.services.items()
             if name in application and name not in built and image_variable(name) not in self._images
         }
-        for note in await pulls.provide(own, foreign, self._say, own_images.hints(self.plan)):
+        try:
+            notes = await pulls.provide(own, foreign, self._say, own_images.hints(self.plan))
+        except PullError as error:
+            raise BackendError(f"{error}{self._other_way(error.image)}") from error
+        for note in notes:
             self._say(note)
         named = [name for name in built if "image" in self.services[name]]
         if named:
@@ -124,6 +128,12 @@ class Compose:
             await pulls.once(key, lambda: self._build(named, _BUILD_PROJECT))
         if len(named) < len(built):
             await self._build([name for name in built if name not in named], self.project)
+
+    def _other_way(self, image: str) -> str:
+        """How a service of the application starts without its image; empty where it has a process, and for others."""
+        with_image = {name for name, service in self.services.items() if service.get("image") == image}
+        found = [s.name for s in self.plan.application.services if s.name in with_image and not s.process]
+        return f"; with 'x-dodo-process: [python, main.py]' '{found[0]}' starts as a process" if found else ""
 
     async def _build(self, names: list[str], project: str) -> str:
         """Builds images; compose labels them with the project, so named images are built in one common project."""

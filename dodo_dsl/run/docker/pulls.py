@@ -17,6 +17,14 @@ _SMALLER = {"amd64": "386", "arm64": "arm"}
 """Whose programs most machines run, too."""
 
 
+class PullError(BackendError):
+    """An image cannot be pulled."""
+
+    def __init__(self, image: str, reason: str) -> None:
+        super().__init__(f"image {image} cannot be pulled: {reason}")
+        self.image = image
+
+
 class Pulls:
     """Pulls images for all tests of a run: each once, several at a time."""
 
@@ -130,7 +138,7 @@ class Pulls:
                     return
                 progress.take(line)
         except (DockerException, OSError) as error:
-            raise BackendError(f"image {image} cannot be pulled: {_reason(engine_error(error))}") from error
+            raise PullError(image, _reason(engine_error(error))) from error
 
 
 def split_reference(image: str) -> tuple[str, str]:
@@ -160,7 +168,7 @@ class _Progress:
 
     def take(self, line: dict[str, Any]) -> None:
         if "error" in line:
-            raise BackendError(f"image {self._image} cannot be pulled: {_reason(str(line['error']))}")
+            raise PullError(self._image, _reason(str(line["error"])))
         if str(line.get("status")).startswith("Retrying") and not self._retried:
             self._retried = True
             self._say(f"pulling {self._image}: the connection broke, the engine retries")

@@ -10,12 +10,14 @@ from typing import Any
 from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.slips.keys import slip_in_key
-from dodo_dsl.source import MAX_PROBLEMS, Mapping, Node, Scalar, Sequence, plain
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.schema.consequences import unindented, without_consequences
 from dodo_dsl.spec.schema.validity import OF_COMPOSE, UNIT, WORDS, check_quantity, is_valid, is_whole, schema_of
 
 _HINT = "x-hint"
+_PAIRS = tuple(f" of '{key}'" for key in ("environment", "labels", "args", "sysctls"))
+"""What items of a list with NAME=value are called."""
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
     "array": "a list",
@@ -103,8 +105,12 @@ class _Place:
         self.name = name
         self.about: dict[str, Any] = {}
 
+    @property
+    def entries(self) -> dict[str, Entry]:
+        return dict(self.node.entries) if isinstance(self.node, Mapping) else {}
+
     def key(self, name: str) -> Span:
-        entries = self.node.entries if isinstance(self.node, Mapping) else {}
+        entries = self.entries
         return entries[name].key if name in entries else self.span
 
 
@@ -150,7 +156,13 @@ def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
 def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
     # jsonschema reports each missing key by itself, in the order of the schema
     missing = next(n for n in error.validator_value if n not in error.instance and f"'{n}'" in error.message)
-    about = (error.schema.get("properties") or place.about).get(missing, {})
+    known = error.schema.get("properties") or place.about
+    almost = next((key for key in error.instance if key not in known and only_fix(key, [missing])), None)
+    if almost is not None:
+        hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
+        yield Diagnostic(place.key(almost), "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
+        return
+    about = known.get(missing, {})
     about = about if isinstance(about, dict) else {}
     hint = f"write '{missing}: {about['const']}'" if "const" in about else about.get("description", "")
     yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
@@ -176,6 +188,10 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     hint = error.schema.get(_HINT, in_quotes)
     if not hint and wanted == "array" and "examples" in error.schema:
         hint = f"write for example {place.name[1:-1]}: [{', '.join(error.schema['examples'][0])}]"
+    if wanted == "string" and place.name.endswith(_PAIRS) and isinstance(error.instance, dict) and error.instance:
+        name, value = next((key, entry.value) for key, entry in place.entries.items())
+        text = value.text if isinstance(value, Scalar) else "value"
+        hint = f'write {name}: "{text}" without the dash, or - {name}={text}'
     span = place.span
     if isinstance(place.node, Sequence) and wanted == "object":
         span, hint = place.node.span, hint or "write 'key: value' in place of list items"

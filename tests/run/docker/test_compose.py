@@ -2,11 +2,14 @@
 
 import asyncio
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.plan.model import ApplicationService
 from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.docker.pulls import PullError, Pulls
 from dodo_dsl.run.protocol import BackendError
 from tests.run.scripted import plan
 
@@ -28,3 +31,27 @@ def test_a_command_without_compose_is_not_the_tests_fault(
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     with pytest.raises(BackendError, match=said):
         asyncio.run(Compose(plan(), tmp_path, tmp_path, "project", print).read())
+
+
+@pytest.mark.parametrize(
+    ("process", "image", "said"),
+    [
+        (None, "team/a", "; with 'x-dodo-process: [python, main.py]' 'a' starts as a process"),
+        (("python", "a.py"), "team/a", ""),
+        (None, "dodo/clock", ""),
+    ],
+)
+def test_an_image_that_cannot_be_pulled(
+    process: tuple[str, ...] | None, image: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def failing(*_: object) -> list[str]:
+        raise PullError(image, "not found")
+
+    monkeypatch.setattr(Pulls, "provide", failing)
+    made = plan()
+    made = replace(made, application=replace(made.application, services=(ApplicationService("a", process),)))
+    test = Compose(made, tmp_path, tmp_path, "project", print)
+    test.services = {"a": {"image": "team/a"}, "dodo-clock": {"image": "dodo/clock"}}
+    with pytest.raises(BackendError) as raised:
+        asyncio.run(test.provide_images(Pulls(None)))
+    assert str(raised.value) == f"image {image} cannot be pulled: not found{said}"

@@ -1,0 +1,1 @@
+"""What people hardly mean, though it is a compose file: variables, flags and programs that are almost right."""
