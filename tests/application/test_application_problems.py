@@ -36,6 +36,8 @@ def test_missing_files(tmp_path: Path) -> None:
         ("[python, $A]", []),
         ("[./drive]", ["there is no program './drive'"]),
         ("[build/drive, drive.py]", ["there is no program 'build/drive'"]),
+        ("[build/drive], build: .", []),
+        ("[./there], build: .", ["there is no program './there'"]),
         ("[python here.py]", ["there is no program 'python here.py', which is one word"]),
         ("[here.py]", ["there is no program 'here.py' in the PATH"]),
         ("[drive.py]", []),
@@ -60,11 +62,11 @@ def test_missing_programs(process: str, expected: list[str], tmp_path: Path) -> 
         ("away", "away"),
         ("{context: ./away}", "./away"),
         ("{dockerfile: Dockerfile}", ""),
-        ("${FOLDER:-away}", ""),
+        ('"${FOLDER:-away}"', ""),
     ],
 )
 def test_missing_folders_to_build_from(build: str, missing: str, tmp_path: Path) -> None:
-    found = messages(f"a: {{command: --cid=1, build: '{build}'}}".replace("'{", "{").replace("}'}", "}}"), tmp_path)
+    found = messages(f"a: {{command: --cid=1, build: {build}}}", tmp_path)
     assert found == ([f"there is no folder '{missing}'"] if missing else [])
 
 

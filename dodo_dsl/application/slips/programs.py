@@ -29,12 +29,13 @@ def missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnosti
         parts = ", ".join(program.text.split())
         yield _cannot_start(program, f"there is no program '{program.text}', which is one word", f"write [{parts}]")
     elif "/" in program.text:
-        yield from _wrong_path(program, folder)
+        yield from _wrong_path(program, folder, is_built="build" in service.node.entries)
     elif not shutil.which(program.text):
         yield from _not_in_path(program, folder)
 
 
-def _wrong_path(program: Scalar, folder: Path) -> Iterator[Diagnostic]:
+def _wrong_path(program: Scalar, folder: Path, is_built: bool) -> Iterator[Diagnostic]:
+    """A service that ``is_built`` as an image has a program that a pipeline's check never sees."""
     own = folder / program.text
     if own.is_file() and not os.access(own, os.X_OK):
         hint = f"run: chmod +x {shlex.quote(program.text)}"
@@ -43,7 +44,8 @@ def _wrong_path(program: Scalar, folder: Path) -> Iterator[Diagnostic]:
         beside = own.parent.iterdir() if own.parent.is_dir() else ()
         near = closest(own.name, [path.name for path in beside if os.access(path, os.X_OK)])
         meant = f"did you mean '{program.text.removesuffix(own.name)}{near[0]}'?" if near else ""
-        yield _cannot_start(program, f"there is no program '{program.text}'", meant or "build it first")
+        if near or not is_built:
+            yield _cannot_start(program, f"there is no program '{program.text}'", meant or "build it first")
 
 
 def _not_in_path(program: Scalar, folder: Path) -> Iterator[Diagnostic]:
