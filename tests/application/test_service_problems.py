@@ -62,7 +62,7 @@ def test_hardware(service: str) -> None:
 @pytest.mark.parametrize(
     "service",
     [
-        "build: ${HERE:-.}",
+        'build: "${HERE:-.}"',
         "x-dodo-process: [prog]",
         "image: x, ipc: 'container:eyes', volumes_from: ['container:eyes'], network_mode: 'service:b'",
         "image: x, depends_on: [car], pid: 'service:b', volumes: ['shared:/s:ro', '/sys:/p:ro'], cap_add: [SYS_NICE]",

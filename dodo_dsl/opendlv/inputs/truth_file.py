@@ -15,8 +15,8 @@ Area = tuple[float, float, float, float]
 """x, y, width and height as fractions of the picture."""
 
 LARGEST = 2**63
-_FAR = 1.1
-"""Times the image, up to which boxes may go on outside it."""
+_FAR, _FARTHER = 1.1, 1.5
+"""Times the image, up to which boxes may go on outside it: those that could be corners, and others."""
 PREFIX = "color:"
 
 
@@ -60,16 +60,18 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
 
 
 def corners(path: Path) -> Iterator[TruthFileError]:
-    """The first box that ends far outside its image, as one does that is written as two corners; the file is right."""
+    """The first box that ends far outside its image, as one does that is written as two corners; the file is read."""
     document = _document(path)
     images = {entry["id"]: entry for entry in document["images"]}
     for index, entry in enumerate(document["annotations"]):
         image, (x, y, wide, high) = images[entry["image_id"]], entry["bbox"]
         beyond = max((x + wide) / image["width"], (y + high) / image["height"])
-        if beyond > _FAR and x < wide and y < high:
+        is_corners = x < wide <= image["width"] and y < high <= image["height"]
+        if beyond > (_FAR if is_corners else _FARTHER):
             what = f"the box ends at {x + wide:g}, {y + high:g}, outside its image of {image['width']} x "
             what += f"{image['height']} pixels"
-            hint = f"a box is [x, y, width, height]: the one with these corners is {[x, y, wide - x, high - y]}"
+            hint = "a box is [x, y, width, height]"
+            hint += f": the one with these corners is {[x, y, wide - x, high - y]}" if is_corners else ""
             yield TruthFileError(path, what, f"annotations[{index}].bbox", hint=hint, is_slip=True)
             return
 
