@@ -8,7 +8,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from dodo_dsl.search.optimiser import ENOUGH, Tried, propose
+from dodo_dsl.search.optimiser import Tried, propose
 from dodo_dsl.search.space import Space, sweep, texts
 from dodo_dsl.spec.instances.vary import Values
 
@@ -31,13 +31,18 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Itinerary:
-    """``runs`` drives in a space; ``proposes`` is whether the optimiser takes part, ``enough`` is for it."""
+    """``runs`` drives in a space; ``proposes`` is whether the optimiser takes part.
+
+    With ``seeks_best`` it looks for the least margin alone, as a tuning does with negative ones, and not for failures
+    of each kind. ``swept`` of the drives of each later generation are of the sweep.
+    """
 
     space: Space
     runs: int
     seed: int
     proposes: bool = True
-    enough: float = ENOUGH
+    seeks_best: bool = False
+    swept: int = SWEPT
 
     def generations(self, margins: Mapping[tuple[str, ...], float | None]) -> Iterator[list[Candidate]]:
         """Candidates to be driven before the next ones are asked for; ``margins`` grows meanwhile.
@@ -49,13 +54,14 @@ class Itinerary:
         done: list[Candidate] = []
         number, is_exhausted = 0, False
         while len(done) < self.runs and not is_exhausted:
-            proposed_now = PROPOSED if number <= PATIENCE or _has_failed(done, margins) else 1
-            first = self.runs if not self.proposes else FIRST if number == 0 else SWEPT + PROPOSED - proposed_now
+            size = SWEPT + PROPOSED
+            proposed_now = size - self.swept if number <= PATIENCE or _has_failed(done, margins) else 1
+            first = self.runs if not self.proposes else FIRST if number == 0 else size - proposed_now
             batch = [Candidate(values, True) for values in itertools.islice(points, first)]
             if number and self.proposes:
                 tried = list(_tried(self.space, done, margins))
                 seen = {key(one.values) for one in (*done, *batch)}
-                proposed = propose(self.space, tried, seen, proposed_now, (self.seed, number), self.enough)
+                proposed = propose(self.space, tried, seen, proposed_now, (self.seed, number), self.seeks_best)
                 is_exhausted = bool(tried) and not proposed
                 batch += [Candidate(values, False) for values in proposed]
             batch = batch[: self.runs - len(done)]

@@ -33,12 +33,14 @@ def propose(
     seen: Collection[tuple[str, ...]],
     number: int,
     seed: tuple[int, int],
-    enough: float = ENOUGH,
+    seeks_best: bool = False,
 ) -> list[Values]:
     """Up to ``number`` values that are not ``seen`` yet, always the same for the same arguments.
 
     ``seed`` is that of the search and the number of the generation. Odd generations look for failures that are far
-    from those known, even ones for worse drives: margins below ``enough`` are alike in odd ones.
+    from those known, even ones for worse drives: margins below ENOUGH are alike in odd ones. With ``seeks_best``,
+    the least margins matter alone: those of the other half are alike, as one crash would hide by how little good
+    values differ.
     """
     if not tried:
         return []
@@ -46,8 +48,10 @@ def propose(
     used = _kept(tried)
     points = np.array([one.point for one in used])
     margins = np.array([one.margin for one in used])
-    if seed[1] % 2:
-        margins = np.maximum(margins, enough)
+    if seeks_best:
+        margins = np.minimum(margins, np.median(margins))
+    elif seed[1] % 2:
+        margins = np.maximum(margins, ENOUGH)
     lists = np.array([one.is_list for one in space.ranges])
     surrogate = None if is_flat(margins) else Surrogate(points, margins, lists)
     taken = set(seen)

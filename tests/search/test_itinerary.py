@@ -34,6 +34,19 @@ def test_the_sweep_comes_by_turns_with_what_is_proposed() -> None:
     assert all(one.swept for one, _ in driven(20, 1, proposes=False))
 
 
+def test_a_crash_does_not_hide_by_how_little_good_values_differ() -> None:
+    """As a tuning has it: the objective, negative, of a hill within a hundredth, beside values that crash."""
+
+    def objective(one: Candidate) -> float:
+        off = sum((float(text) - 0.37) ** 2 for text in texts(one.values).values())
+        return -0.10 + 0.04 * off if off < 0.5 else 0.65
+
+    margins: dict[tuple[str, ...], float | None] = {}
+    for batch in Itinerary(SPACE, 48, 0, seeks_best=True, swept=1).generations(margins):
+        margins.update({key(one.values): objective(one) for one in batch})
+    assert min(found for found in margins.values() if found is not None) < -0.0995
+
+
 def test_more_drives_go_on_with_fewer() -> None:
     assert driven(18, 3) == driven(27, 3)[:18]
 

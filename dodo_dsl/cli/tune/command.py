@@ -45,6 +45,8 @@ failed, 130 interrupted
 
 FOLDER, STORE, RESULT, VALUES = "tune", "tune.sqlite", "tune.json", "best.env"
 _RUNS = 50
+_SWEPT = 1
+"""Drives of the sweep in a generation: a tuning looks for the best values, and not for an even cover."""
 _MOST_RUNS = 1 << 14
 _NEEDED = "scipy"
 _RIG_MINUTES, _RIG_METRES = 30.0, 100.0
@@ -94,7 +96,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         study = tune_study(options, folder.path, stdout)
         with opened(report, study.key, STORE) as store:
             runs = min(options.runs or (_MOST_RUNS if options.minutes else _RUNS), _MOST_RUNS)
-            itinerary = Itinerary(study.space, runs, options.seed, enough=-math.inf)
+            itinerary = Itinerary(study.space, runs, options.seed, seeks_best=True, swept=_SWEPT)
             course = TuneCourse(study, itinerary, store, options.mean)
             end = _tune(options, course, folder.path, report, load, stdout)
             if course.done:
