@@ -4,6 +4,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
@@ -245,6 +246,48 @@ def test_no_template_names_a_host_or_shows_the_token(template: Path) -> None:
     assert not re.findall(r"https?://|[a-z0-9-]+\.(?:com|org|io|net)\b", text)
     for line in text.splitlines():
         assert "CI_JOB_TOKEN" not in line or line.strip().startswith("- printf '%s' \"$CI_JOB_TOKEN\" | docker login")
+
+
+@each_parent
+def test_the_problems_are_in_the_log_and_in_a_file_that_can_be_browsed(template: Path, tmp_path: Path) -> None:
+    (tmp_path / "bad.dodo.yml").write_text("dodo: 1\nname: bad\n")
+    job = included(template)["dodo-check"]
+    result = run_script(job, tmp_path, {"DODO_COMPILE_OPTIONS": "bad.dodo.yml"})
+    assert result.returncode == 2
+    assert "bad.dodo.yml:1:1: error[missing-key]" in result.stderr
+    (path,) = job["artifacts"]["paths"]
+    assert path == job["artifacts"]["reports"]["codequality"]
+    assert "missing-key" in {row["check_name"] for row in json.loads((tmp_path / path).read_text())}
+
+
+@each_parent
+def test_another_job_of_the_name_compile_is_told(template: Path, tmp_path: Path) -> None:
+    job = included(template)["dodo-pipeline"]
+    result = run_script(job, tmp_path, {})
+    assert (result.returncode, result.stderr) == (1, "")
+    told = "job 'compile' wrote no generated/child.gitlab-ci.yml; does another job have its name?\n"
+    assert result.stdout == told
+    (tmp_path / "generated/first").mkdir(parents=True)
+    for name in ("child.gitlab-ci.yml", "first/test.json"):
+        (tmp_path / "generated" / name).touch()
+    assert run_script(job, tmp_path, {}).returncode == 0
+
+
+def run_script(job: dict[str, Any], folder: Path, variables: dict[str, str]) -> "subprocess.CompletedProcess[str]":
+    """A job's script as a runner's shell runs it, with the ``dodo`` of these tests."""
+    (folder / "bin").mkdir(exist_ok=True)
+    program = f'#!/bin/sh\nexec {sys.executable} -m dodo_dsl "$@"\n'
+    (folder / "bin/dodo").write_text(program)
+    (folder / "bin/dodo").chmod(0o755)
+    environment = {
+        "PATH": f"{folder / 'bin'}:{os.environ['PATH']}",
+        "PYTHONPATH": str(package_data.root()),
+        **variables,
+    }
+    script = "set -e\n" + "\n".join(job["script"])
+    return subprocess.run(
+        ["sh", "-c", script], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
 
 
 def run_images(tmp_path: Path, docker: str, **inputs: Any) -> "subprocess.CompletedProcess[str]":

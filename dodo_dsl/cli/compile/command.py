@@ -57,7 +57,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     verbosity.add(parser, "print only problems, and what is stale", "print the name of each test, too")
     parser.add_argument("--fix", action="store_true",
                         help="with --check: correct names, units and spaces where there is one way to")  # fmt: skip
-    parser.add_argument("--format", choices=FORMATS, default="text", help="format of the diagnostics (default: text)")
+    parser.add_argument("--format", choices=FORMATS, default="text",
+                        help="format of the diagnostics (default: text); with gitlab, sarif and junit the text goes to "
+                        "standard error")  # fmt: skip
     parser.add_argument("--forecast", type=positive, metavar="R", help="say how long the pipeline takes with R runners")
     parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
                         help="results or report with times; repeatable (default: the history here)")  # fmt: skip
@@ -102,15 +104,26 @@ def _fixed(checked: Checked, options: argparse.Namespace, out: TextIO) -> Checke
     return checked
 
 
-def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: TextIO) -> None:
+def _log(style: str, stdout: TextIO, stderr: TextIO) -> TextIO | None:
+    """Where people read what is wrong: a report is for a file, and the log of its job tells the same as text.
+
+    None for JSON, which a program reads, and where the report itself is on the terminal.
+    """
+    if style == "text":
+        return stdout
+    return None if style == "json" or stdout.isatty() else stderr
+
+
+def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: TextIO, stderr: TextIO) -> None:
     if style != "text":
         stdout.write(rendered(style, diagnostics, [str(spec.path) for spec in checked.specs]))
-    elif diagnostics:
-        write_diagnostics(stdout, diagnostics[:_MOST_PROBLEMS])
+    log = _log(style, stdout, stderr)
+    if diagnostics and log:
+        write_diagnostics(log, diagnostics[:_MOST_PROBLEMS])
         if len(diagnostics) > _MOST_PROBLEMS:
-            stdout.write(f"... {len(diagnostics) - _MOST_PROBLEMS} more problems\n")
+            log.write(f"... {len(diagnostics) - _MOST_PROBLEMS} more problems\n")
         rules = {diagnostic.rule for diagnostic in diagnostics}
-        stdout.write(f"dodo explain {rules.pop() if len(rules) == 1 else 'RULE'} says more\n")
+        log.write(f"dodo explain {rules.pop() if len(rules) == 1 else 'RULE'} says more\n")
 
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -120,17 +133,17 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)
-    _show(diagnostics, options.format, checked, stdout)
+    _show(diagnostics, options.format, checked, stdout, stderr)
     if has_errors(diagnostics):
         return Exit.USAGE
     outdated = f"{options.output} is stale; dodo compile brings it up to date"
-    if options.format == "text":
-        stdout.write(_difference(stale, options.output, options.diff))
+    if log := _log(options.format, stdout, stderr):
+        log.write(_difference(stale, options.output, options.diff))
         warnings = [_count(len(diagnostics), "warning")] if diagnostics else []
         state = ", ".join([*warnings, *([outdated] if stale else [])])
-        _list(options, stdout, "checked", [(spec.title, shown_path(str(spec.path))) for spec in checked.specs])
+        _list(options, log, "checked", [(spec.title, shown_path(str(spec.path))) for spec in checked.specs])
         if options.verbosity is not Verbosity.QUIET or stale:
-            stdout.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
+            log.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
     elif stale:
         stderr.write(f"{outdated}\n")
     return Exit.PROBLEMS if stale else Exit.OK
@@ -159,14 +172,14 @@ def _names(names: Sequence[str]) -> str:
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     jobs = job_options.job_options(options)
     if not checked.ok:
-        _show(list(checked.diagnostics), options.format, checked, stdout)
+        _show(list(checked.diagnostics), options.format, checked, stdout, stderr)
         return Exit.USAGE
     try:
         made = plan(checked, options.output, _searches(options), jobs)
     except NoApplication:
         raise UsageError(NO_APPLICATION) from None
     diagnostics = ordered([*checked.diagnostics, *made.problems])
-    _show(diagnostics, options.format, checked, stdout)
+    _show(diagnostics, options.format, checked, stdout, stderr)
     if has_errors(diagnostics):
         return Exit.USAGE
     expected = _forecast(made.compiled.suite, jobs, options)

@@ -1,6 +1,8 @@
 """Formats of diagnostics, as their readers read them."""
 
 import json
+import shutil
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,9 @@ from junitparser import JUnitXml
 
 from dodo_dsl.check import catalogue
 from dodo_dsl.cli.compile.formats import FORMATS
+from dodo_dsl.cli.main import main
 from tests.check import examples
+from tests.cli.terminal import Terminal
 from tests.emit.readers import run
 
 WRONG = examples.SPEC.replace("name: example", "name: bad one").replace(
@@ -32,8 +36,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def sarif() -> dict[str, Any]:
-    code, out, err = run("compile", "--check", "--format", "sarif")
-    assert (code, err) == (2, "")
+    code, out, _ = run("compile", "--check", "--format", "sarif")
+    assert code == 2
     (found,) = json.loads(out)["runs"]
     assert isinstance(found, dict)
     return found
@@ -68,8 +72,8 @@ def test_fingerprints_stay_when_lines_move(folder: Path) -> None:
 
 
 def test_junit(folder: Path) -> None:
-    code, out, err = run("compile", "--check", "--format", "junit")
-    assert (code, err) == (2, "")
+    code, out, _ = run("compile", "--check", "--format", "junit")
+    assert code == 2
     document = JUnitXml.fromstring(out.encode())
     assert (document.tests, document.failures) == (4, 1)
     cases = {case.name: case for suite in document for case in suite}
@@ -87,6 +91,38 @@ def test_nothing_else_is_on_standard_output(folder: Path, style: str) -> None:
     _, out, _ = run("compile", "--check", "--format", style)
     assert out[0] in "<[{"
     assert out.rstrip()[-1] in ">]}"
+
+
+REPORTS = ("gitlab", "sarif", "junit")
+
+
+@pytest.mark.parametrize("style", REPORTS)
+def test_a_report_s_text_is_in_the_log(folder: Path, style: str) -> None:
+    """The standard output of a job goes into the report's file, so that the log would be empty."""
+    code, text, _ = run("compile", "--check")
+    assert "error[unknown-parameter]" in text
+    assert "warning[matrix-unused]" in text
+    assert run("compile", "--check", "--format", style)[::2] == (code, text)
+    assert run("compile", "--format", style)[2] == run("compile")[1]
+
+
+@pytest.mark.parametrize("style", REPORTS)
+def test_what_is_stale_is_in_the_log(folder: Path, style: str) -> None:
+    shutil.rmtree(folder / "tests/bad one")
+    assert run("compile")[0] == 0
+    spec = folder / "tests/example/example.dodo.yml"
+    spec.write_text(spec.read_text().replace("goal: finish", "goal: finish, max-time: 30 s"))
+    code, text, _ = run("compile", "--check")
+    assert code == 1
+    assert "generated is stale; dodo compile brings it up to date\n" in text
+    assert run("compile", "--check", "--format", style)[::2] == (1, text)
+
+
+def test_a_report_on_a_terminal_stands_there_alone(folder: Path) -> None:
+    stdout, stderr = Terminal(), StringIO()
+    assert main(["compile", "--check", "--format", "gitlab"], stdout, stderr) == 2
+    assert json.loads(stdout.getvalue())
+    assert stderr.getvalue() == ""
 
 
 def test_every_rule_has_a_page(folder: Path) -> None:
