@@ -214,6 +214,25 @@ def test_each_situation_has_its_jobs(
     assert found == of_application - {"dodo-images"}
 
 
+@pytest.mark.parametrize("language", ["python", "cpp"])
+@pytest.mark.parametrize("situation", [MERGE_REQUEST, DEFAULT, BRANCH], ids=["merge request", "default", "branch"])
+def test_the_first_push_of_a_new_application_runs_its_tests(
+    language: str, situation: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "--application", "--language", language], StringIO(), StringIO()) == 0
+    entries = yaml.safe_load((tmp_path / ".gitlab-ci.yml").read_text())["include"]
+    names = [Path(entry["local"]).name.partition(".")[0] for entry in entries]
+    folder = package_data.templates()
+    configs = [
+        included(folder / name / "template.yml", **entry["inputs"]) for name, entry in zip(names, entries, strict=True)
+    ]
+    variables = {key: value for config in configs for key, value in config["variables"].items()}
+    found = {name for name, job in jobs(*configs).items() if is_run(job, {**variables, **situation})}
+    images = {"dodo-images"} if language == "cpp" and situation is not BRANCH else set()
+    assert found == CHILD | images
+
+
 @pytest.mark.parametrize(
     ("situation", "there"), [(MERGE_REQUEST, True), (DEFAULT, True), (BRANCH, True), (REVIEWED, False)]
 )

@@ -63,9 +63,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         if options.level or options.kind or options.extends or options.rec:
             words = "--level, --kind, --extends and --rec"
             raise UsageError(f"{words} apply to a test, not to --deployment and --application")
-        return (
-            new_deployment(stdout) if options.deployment else new_application(options.language or LANGUAGES[0], stdout)
-        )
+        if options.deployment:
+            return new_deployment(stdout, stderr)
+        return new_application(options.language or LANGUAGES[0], stdout, stderr)
     return _test(options, stdout)
 
 

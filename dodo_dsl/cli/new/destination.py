@@ -12,7 +12,10 @@ from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import Diagnostic, format_text, shown_path
 from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment
 
-_NO_APPLICATION = f"write your application's compose file, and name it in {FILE_NAME}: application: {COMPOSE_FILES[0]}"
+_NO_APPLICATION = (
+    f"write your application's compose file, and name it in {FILE_NAME}: application: {COMPOSE_FILES[0]}\n"
+    "      (dodo new --application, in an empty folder, writes an application to begin with, and a test)"
+)
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,11 @@ def application_files(root: Path, language: str) -> list[New]:
     return [*files, New(root / COMPOSE_FILES[0], compose)]
 
 
+def included(images: bool) -> tuple[str, ...]:
+    """The templates that a repository's pipeline includes to run its tests, and with ``images`` to build them first."""
+    return ("deployment", "application") if images else ("deployment",)
+
+
 def deployment_files(root: Path, *, images: bool = False) -> list[New]:
     """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas.
 
@@ -69,7 +74,7 @@ def deployment_files(root: Path, *, images: bool = False) -> list[New]:
         dodo_yml(root, application),
         New(root / application, filled("deployment/docker-compose.yml")),
         New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
-        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", images=images)),
+        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", templates=included(images))),
         *(New(root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml", pipeline_template(name)) for name in PIPELINES),
         *_schemas(root),
         New(root / ".gitignore", filled("deployment/gitignore", builds=images)),

@@ -132,6 +132,7 @@ def test_an_empty_folder_becomes_a_repository(empty: Path) -> None:
         "tests/maps/straight/map.json",
     } < written
     assert "name it in dodo.yml: application: docker-compose.yml\n" in out
+    assert "dodo new --application, in an empty folder, writes an application to begin with" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     assert dodo("new", "second")[0] == 0
     assert dodo("run", "first")[2] == f"dodo run: {NO_APPLICATION}\n"
@@ -366,6 +367,67 @@ def test_a_deployment_takes_the_compose_file_that_is_there(empty: Path) -> None:
     assert not (empty / "docker-compose.yml").exists()
     assert yaml.safe_load((empty / "dodo.yml").read_text())["application"] == "compose.yml"
     assert "include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml" in out
+
+
+OWN_PIPELINE = """\
+stages: [build, deploy]
+.build: {before_script: [!reference [.tools, script], make tools]}
+compile:
+  stage: build
+  script: [!reference [.build, before_script], make]
+"""
+
+
+@pytest.mark.parametrize("what", ["--deployment", "--application"])
+def test_what_meets_the_pipeline_that_is_there_is_told(empty: Path, what: str) -> None:
+    (empty / ".gitlab-ci.yml").write_text(OWN_PIPELINE)
+    (empty / ".gitignore").write_text("*.o\n/generated\n")
+    code, out, err = dodo("new", what)
+    told = "GitLab merges this job 'compile' with DoDo's job of the same name; give yours another name"
+    assert (code, err) == (0, f"warning: .gitlab-ci.yml:3:1: {told}\n")
+    assert "kept: .gitignore, which lacks dodo-report/, gl-code-quality-report.json\n" in out
+    assert (
+        "include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml, with 'inputs: {stage: build}', "
+        "as 'test' is not among its stages: build, deploy\n"
+    ) in out
+    assert ("name your services in docker-compose.yml" in out) is (what == "--deployment")
+    assert (empty / ".gitlab-ci.yml").read_text() == OWN_PIPELINE
+
+
+def test_images_need_both_templates_in_the_pipeline_that_is_there(empty: Path) -> None:
+    (empty / ".gitlab-ci.yml").write_text("lint: {script: [make lint]}\n")
+    _, out, err = dodo("new", "--application", "--language", "cpp")
+    files = ".gitlab/dodo/deployment.gitlab-ci.yml and .gitlab/dodo/application.gitlab-ci.yml"
+    assert (f"include {files} in .gitlab-ci.yml\n" in out, err) == (True, "")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "compile: {before_script: [make], artifacts: {paths: [generated/, build/]}}\n",
+        "compile:stages: [\n",
+        "spec: {}\n---\ncompile: {script: [make]}\n",
+        "stages: !reference [.all, stages]\ncompile: !reference [.build]\n",
+        "stages: [!reference [.all, stages], deploy]\n",
+        "",
+    ],
+    ids=["a change to DoDo's job", "no YAML", "two documents", "references", "a reference to some", "empty"],
+)
+def test_a_pipeline_without_such_a_job_is_fine(empty: Path, text: str) -> None:
+    (empty / ".gitlab-ci.yml").write_text(text)
+    code, out, err = dodo("new", "--deployment")
+    assert (code, err) == (0, "")
+    assert "include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml\n" in out
+
+
+def test_who_has_included_the_templates_is_not_told_to(repository: Path) -> None:
+    shutil.rmtree(repository / ".gitlab")
+    (repository / "docker-compose.yml").write_text("services: {app: {image: example, command: --cid=111}}\n")
+    out = dodo("new", "--deployment")[1]
+    assert "wrote .gitlab/dodo/deployment.gitlab-ci.yml\n" in out
+    assert "kept: .gitignore\n" in out
+    assert "include " not in out
+    assert "name your services" not in out
 
 
 def test_the_image_of_a_pipeline_reaches_the_compose_file(repository: Path) -> None:
