@@ -1,5 +1,7 @@
 """From what happened in a test to its outcome: failed is the application's fault, error is anyone else's."""
 
+import errno
+import os
 import signal
 import traceback
 from collections.abc import Iterable, Sequence
@@ -121,6 +123,15 @@ def system_error(error: OSError) -> str:
     """File and meaning of a system error, without its number."""
     place = f"{error.filename}: " if error.filename else ""
     return f"{place}{error.strerror or error}"
+
+
+def unstartable(plan: Plan, service: str, why: str) -> str:
+    """A sentence on a service that could not be started; one by its path in the application's folder is built there."""
+    programs = {own.name: own.process[0] for own in plan.application.services if own.process}
+    program = programs.get(service, "")
+    is_missing = why == f"{program}: {os.strerror(errno.ENOENT)}"
+    hint = "; build it first" if is_missing and "/" in program and not Path(program).is_absolute() else ""
+    return f"service '{service}' could not be started: {why}{hint}"
 
 
 def lost_messages(service: PlannedService, messages: int) -> str:

@@ -10,7 +10,17 @@ from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.recorder_service import RECORDER
 from dodo_dsl.run.load.judgement import consider
 from dodo_dsl.run.load.response import judged
-from dodo_dsl.run.outcomes import Facts, Finding, decide, flooded, how_it_ended, lost_messages, memory_taken, outcome_of
+from dodo_dsl.run.outcomes import (
+    Facts,
+    Finding,
+    decide,
+    flooded,
+    how_it_ended,
+    lost_messages,
+    memory_taken,
+    outcome_of,
+    unstartable,
+)
 from dodo_dsl.run.protocol import (
     Backend,
     Event,
@@ -104,7 +114,7 @@ class RunState:
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Unstartable(service, why):
-                self.end("error", f"service '{service}' could not be started: {why}", service)
+                self.end("error", unstartable(self.plan, service, why), service)
             case Lost(why):
                 self.end("error", why)
             case Flooded():

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.outcome import Result
-from dodo_dsl.plan.model import Flag, PlannedService
+from dodo_dsl.plan.model import Application, ApplicationService, Flag, PlannedService
 from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
@@ -17,6 +17,7 @@ from dodo_dsl.run.outcomes import (
     error_reason,
     how_it_ended,
     lost_messages,
+    unstartable,
     worst,
 )
 from dodo_dsl.run.protocol import BackendError, VerdictEvent
@@ -86,6 +87,23 @@ PLAIN = PlannedService("environment", "a", "x", "x", ())
 )
 def test_what_losses_mean(service: PlannedService, meaning: str) -> None:
     assert lost_messages(service, 2) == f"service 'a' lost 2 messages, as its receive buffer was full: {meaning}"
+
+
+@pytest.mark.parametrize(
+    ("program", "why", "hint"),
+    [
+        ("build/lane", "build/lane: No such file or directory", "; build it first"),
+        ("./lane", "./lane: No such file or directory", "; build it first"),
+        ("build/lane", "build/lane: Permission denied", ""),
+        ("build/lane", "own.env: No such file or directory", ""),
+        ("lane", "lane: No such file or directory", ""),
+        ("/opt/lane", "/opt/lane: No such file or directory", ""),
+    ],
+)
+def test_a_program_that_is_not_there_has_to_be_built(program: str, why: str, hint: str) -> None:
+    application = Application(".", (ApplicationService("app", (program, "--fast")),))
+    sentence = unstartable(replace(plan(), application=application), "app", why)
+    assert sentence == f"service 'app' could not be started: {why}{hint}"
 
 
 def test_errors_of_the_system_and_of_the_backend_are_sentences(tmp_path: Path) -> None:
