@@ -1,6 +1,7 @@
 """What the documentation shows is true: its specs compile, its commands exist, its examples run."""
 
 import contextlib
+import json
 import re
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from jsonschema import Draft202012Validator
 
 from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.cli.selection import select
@@ -162,3 +164,17 @@ def test_the_readme_has_a_table_of_the_services() -> None:
         if not about.get("automatic")
     ]
     assert "\n".join(["|---|---|---|", *rows, ""]) in README
+
+
+def test_the_page_has_every_key_that_a_service_may_have_for_dodo() -> None:
+    """Its table names those of the schema, each with an example that the schema takes."""
+    page = (ROOT / "docs/reference/applications.md").read_text()
+    rows = re.findall(r"^\| `(x-dodo[\w-]*)(?:: (\w+))?` \| .+ \| .+ \| `(.+)` \|$", page, re.MULTILINE)
+    schema = json.loads((ROOT / "schemas/application.schema.json").read_text())
+    keys = {key: node for key, node in schema["$defs"]["service"]["properties"].items() if key.startswith("x-dodo")}
+    own = keys.pop("x-dodo")["properties"]
+    assert {(key, part) for key, part, _ in rows} == {("x-dodo", part) for part in own} | {(key, "") for key in keys}
+    for key, part, example in rows:
+        value = yaml.safe_load(example)
+        service = {"image": "example", key: {part: value} if part else value}
+        Draft202012Validator(schema).validate({"services": {"app": service}})
