@@ -325,6 +325,26 @@ def test_an_application_in_c_plus_plus_has_what_builds_it(empty: Path) -> None:
     assert all(definition.same_layout(standard[name]) for name, definition in own.items())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("is_there", [True, False])
+def test_libcluon_is_the_header_beside_the_program_or_is_fetched(
+    empty: Path, is_there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which way CMake goes, with a header and a repository that hold nothing."""
+    if not shutil.which("cmake"):
+        pytest.skip("cmake is not installed")
+    assert dodo("new", "--application", "--language", "cpp")[0] == 0
+    if is_there:
+        (empty / "cluon-complete.hpp").write_text("#pragma once\n")
+    for name in ("CMAKE_GENERATOR", "CXX"):
+        monkeypatch.delenv(name, raising=False)
+    command = ["cmake", "-B", "build", f"-DLIBCLUON={empty / 'nowhere.git'}"]
+    result = subprocess.run(command, cwd=empty, capture_output=True, text=True, check=False, timeout=120)
+    said = result.stdout + result.stderr
+    assert (result.returncode == 0, "nowhere.git" in said) == (is_there, not is_there), said
+    assert (empty / "build/cluon-msc.cpp").exists() is is_there
+
+
 def test_a_language_is_that_of_an_application(empty: Path) -> None:
     assert dodo("new", "first", "--language", "cpp") == (2, "", "dodo new: --language applies to --application\n")
 

@@ -1,7 +1,11 @@
 // Drives between yellow cones on the left and blue ones on the right.
+#if __has_include("cluon-complete.hpp")
+#include "cluon-complete.hpp"
+#else
 #include "cluon/OD4Session.hpp"
 #include "cluon/SharedMemory.hpp"
 #include "cluon/cluon.hpp"
+#endif
 
 #include "messages.hpp"
 
