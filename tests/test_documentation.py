@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from io import StringIO
 from pathlib import Path
 
@@ -178,3 +179,16 @@ def test_the_page_has_every_key_that_a_service_may_have_for_dodo() -> None:
         value = yaml.safe_load(example)
         service = {"image": "example", key: {part: value} if part else value}
         Draft202012Validator(schema).validate({"services": {"app": service}})
+
+
+def test_pages_install_dodo_in_the_same_place_and_from_a_checkout() -> None:
+    """It is on no package index; its name alone is enough only where it is installed already."""
+    tutorial = (ROOT / "docs/tutorial/python.md").read_text()
+    (block,) = re.findall(r"```text\n(python3 -m venv .*?)```", tutorial, re.DOTALL)
+    assert block in README
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for page in (ROOT / "README.md", *(ROOT / "docs/tutorial").glob("*.md"), *(ROOT / "docs/how-to").glob("*.md")):
+        text = page.read_text()
+        assert "dodo-dsl[" not in text, page
+        named = re.findall(r"PATH-OF-THE-CHECKOUT\[([\w,]+)\]", text)
+        assert {extra for names in named for extra in names.split(",")} <= extras.keys(), page
