@@ -402,7 +402,9 @@ def test_the_page_s_inputs_are_those_of_the_templates() -> None:
     blocks = [yaml.safe_load(b) for b in re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)]
     includes = [entry for block in blocks for entry in block.get("include", [])]
     assert len(includes) >= len(TEMPLATES)
+    assert "`compile`" in PAGE.read_text().partition("## One job")[0], "the one name that others may have"
     for entry in includes:
+        assert entry["inputs"]["stage"] == "test", "who has stages of their own has to see where one goes"
         name = re.search(r"(\w+)(\.gitlab-ci\.yml|@[\d.]+)$", entry.get("local", entry.get("component")))
         included(package_data.templates() / name[1] / "template.yml", **entry.get("inputs", {}))  # type: ignore[index]
     rows = re.findall(
