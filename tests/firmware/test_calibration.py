@@ -1,47 +1,131 @@
-"""The emulated rig with wrong constants: what its readings give, and where it goes with that."""
+"""``dodo rig measure`` of the emulated firmware with wrong constants: the dialogue, and where the rig goes then."""
 
+import json
 import math
+import re
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
-from dodo_dsl.calibration.axis_line import AXES, Reading, fit
-from services.gantry.conversion import AxisConstants, Conversion
-from services.gantry.protocol import Position
-from services.gantry.rig_table import MICROSTEP
-from tests.firmware.programs import Rig
+from dodo_dsl.calibration.axis_line import AXES, AxisLine, Reading, fit
+from dodo_dsl.cli.main import main
+from services.gantry.rig_table import MICROSTEP, OFFSETS, STEPS
+from tests.firmware.programs import ROOT, Rig
 
-SCALE, SHIFT = (1.03, 0.97, 1.01), (0.007, -0.005, 2.0)
+SCALE, SHIFT = {"x": 1.03, "y": 0.97, "yaw": 1.01}, {"x": 0.007, "y": -0.005, "yaw": 2.0}
+SHOWN = {"x": 0.001, "y": 0.001, "yaw": 0.5}
+"""What a ruler and a protractor show (m, m, degrees)."""
+EDGES = {"x": 0.95, "y": 0.7, "yaw": 170.0}
+HEARD = 0.3
+"""s of the rig since its last answer in which its time passes as fast as it can: before its watchdog barks."""
 
 
-def words(numbers: "tuple[float, ...]") -> str:
-    return ",".join(map(str, numbers))
+class Running:
+    """A rig whose time passes, faster than in reality as long as somebody asks it."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig, self._lock, self._ended = rig, threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> "Running":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        heard, sent = 0.0, 0
+        while not self._ended.is_set():
+            with self._lock:
+                self.rig.run(0.005)
+            heard, sent = (0.0, self.rig.sent) if self.rig.sent != sent else (heard + 0.005, sent)
+            if heard > HEARD:
+                time.sleep(0.01)
+
+    def pose(self) -> dict[str, float]:
+        """Where it truly is (m, m, degrees)."""
+        with self._lock:
+            pose = self.rig.pose()
+        return {"x": pose["x"], "y": pose["y"], "yaw": math.degrees(pose["yaw"])}
 
 
-def test_constants_from_readings_are_true_to_a_microstep(firmware: None) -> None:
-    readings: dict[str, list[Reading]] = {name: [] for name in AXES}
-    with Rig("--scale", words(SCALE), "--shift", words(SHIFT)) as rig:
-        rig.open()
-        rig.calibrate()
-        for share in (-0.75, -0.25, 0.25, 0.75):
-            rig.go(0.9 * share, 0.7 * share, 2.6 * share)
-            steps, pose = Conversion().steps(Position(*rig.position())), rig.pose()
-            pose["yaw"] = math.degrees(pose["yaw"])
-            for name, found in readings.items():
-                found.append(Reading(steps[name], pose[name]))
-        lines = {name: fit(AXES[name], found) for name, found in readings.items()}
-        per_rad = {"x": 1.0, "y": 1.0, "yaw": math.degrees(1)}
-        measured = Conversion({n: AxisConstants(line.steps * per_rad[n], line.offset) for n, line in lines.items()})
-        for place in (Position(0.9, 0.6, 2.9), Position(-0.9, -0.65, -2.5)):
-            told = measured.to_firmware(place)
-            rig.go(told.x, told.y, told.yaw)
-            pose = rig.pose()
-            off = {name: abs(pose[name] - getattr(place, name)) for name in AXES}
-            assert all(off[name] <= MICROSTEP[name] * scale + 1e-6 for name, scale in zip(AXES, SCALE, strict=True)), (
-                off
-            )
-            assert math.degrees(off["yaw"]) < 0.1
-    constants = {name: (line.steps, line.offset) for name, line in lines.items()}
-    for (name, (c, offset)), scale, shift in zip(constants.items(), SCALE, SHIFT, strict=True):
-        built_in = Conversion().steps(Position(0, 0, 0))[name]
-        assert c == pytest.approx({"x": 3320, "y": 3320, "yaw": 0.55}[name] / scale, rel=3e-5)
-        assert offset == pytest.approx(built_in - shift * c, abs=0.01)
+class Operator:
+    """Answers each question with the true place of the axis that it names."""
+
+    def __init__(self, rig: Running, asked: StringIO) -> None:
+        self.rig, self.asked = rig, asked
+
+    def readline(self) -> str:
+        names = re.findall(r"(\w+), \d of \d: the rig stands", self.asked.getvalue())
+        return f"{self.rig.pose()[names[-1]]:.9f} {AXES[names[-1]].unit}\n" if names else "\n"
+
+
+@pytest.fixture
+def crooked(firmware: None, tmp_path: Path, cid: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Running]:
+    """A rig that differs from the firmware's constants, as ``crooked`` of the dodo.yml of this folder."""
+    monkeypatch.chdir(tmp_path)
+    variables = {"PYTHONPATH": ROOT, "DODO_RIGS": tmp_path / "state", "DODO_LEASES": tmp_path / "leases"}
+    for name, value in variables.items():
+        monkeypatch.setenv(name, str(value))
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    scale, shift = (",".join(map(str, one.values())) for one in (SCALE, SHIFT))
+    with Rig("--scale", scale, "--shift", shift) as rig, Running(rig) as running:
+        entry = {"kind": "dynamic", "cid": cid, "serial": rig.path}
+        (tmp_path / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "rigs": {"crooked": entry}}))
+        yield running
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def dodo(*words: str, said: StringIO | None = None) -> str:
+    """What `dodo rig` prints; what it says and asks beside that goes to ``said``."""
+    output, beside = StringIO(), said or StringIO()
+    assert main(["rig", *words], output, beside) == 0, output.getvalue() + beside.getvalue()
+    return output.getvalue()
+
+
+def assert_constants(rig: dict[str, Any]) -> None:
+    """What was written are the true constants."""
+    for name, axis in AXES.items():
+        steps, offset = (float(rig["axes"][name][what].split()[0]) for what in ("steps", "offset"))
+        assert rig["axes"][name]["steps"].endswith(axis.density)
+        assert steps == pytest.approx(STEPS[name] / SCALE[name], rel=3e-5)
+        assert offset == pytest.approx(OFFSETS[name] - SHIFT[name] * steps, abs=0.01)
+
+
+def missed(line: AxisLine, name: str, place: float) -> float:
+    """How far from a true place the rig goes by these constants (m, degrees)."""
+    firmware = (line.steps * place + line.offset - OFFSETS[name]) / STEPS[name]
+    return abs(firmware * SCALE[name] + SHIFT[name] - place)
+
+
+@pytest.mark.realtime
+def test_a_rig_with_other_constants_is_measured_and_then_goes_where_it_is_told(
+    crooked: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Readings that are exact are enough for a microstep, those of a ruler and a protractor for what these show."""
+    said = StringIO()
+    monkeypatch.setattr(sys, "stdin", Operator(crooked, said))
+    measured = json.loads(dodo("measure", "crooked", "--places", "4", "--json", said=said))
+    assert said.getvalue().count("Its true place, such as") == 12
+    assert_constants(yaml.safe_load(Path("dodo.yml").read_text())["rigs"]["crooked"])
+    for place in ({"x": 0.9, "y": 0.6, "yaw": 166.0}, {"x": -0.9, "y": -0.65, "yaw": -143.0}):
+        dodo("goto", "crooked", *map(str, place.values()))
+        off = {name: abs(found - place[name]) for name, found in crooked.pose().items()}
+        microsteps = {**MICROSTEP, "yaw": math.degrees(MICROSTEP["yaw"])}
+        assert all(off[name] <= microsteps[name] * SCALE[name] + 1e-6 for name in AXES), off
+        assert off["yaw"] < 0.1
+    for name, axis in AXES.items():
+        found = [(one["steps"], one["reads"]) for one in measured["axes"][name]["readings"]]
+        line = fit(axis, [Reading(steps, round(reads / SHOWN[name]) * SHOWN[name]) for steps, reads in found])
+        assert max(missed(line, name, place) for place in (EDGES[name], -EDGES[name])) < SHOWN[name]
