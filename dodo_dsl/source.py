@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest
 from dodo_dsl.slips import slip
 from dodo_dsl.slips.failure import Failure
 
@@ -27,8 +27,12 @@ Plain = str | int | float | bool | None
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INT = re.compile(r"[-+]?[0-9]{1,300}\Z|0o[0-7]{1,300}\Z|0x[0-9a-fA-F]{1,300}\Z")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
-_DASHES = re.compile(r"-[^-\s]\S*(\s+-[^-\s]\S*)+")
+_DASHES = re.compile(r"-[^-\s]\S*(\s+- ?[^-\s]\S*)+")
 """Items of a list that would be one text."""
+_NAME = re.compile(r"(matrix|vary)\.[a-z][a-z0-9-]*")
+"""What a placeholder names."""
+_SECOND = "remove the line, or write what stands below into a file of its own"
+_CONTROL = {0: "NUL", 8: "backspace", 0xB: "vertical tab", 0xC: "form feed", 0x1B: "escape", 0x7F: "delete"}
 _SPECIAL: dict[str, Plain] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -111,9 +115,9 @@ def resolve(text: str) -> Plain:
 
 
 class _Stop(Exception):
-    def __init__(self, span: Span, rule: str, message: str, hint: str = "") -> None:
+    def __init__(self, span: Span, rule: str, message: str, hint: str = "", fix: Fix | None = None) -> None:
         super().__init__(message)
-        self.diagnostic = Diagnostic(span, rule, message, hint)
+        self.diagnostic = Diagnostic(span, rule, message, hint, fix=fix)
 
 
 @dataclass
@@ -164,7 +168,7 @@ class _Builder:
         elif isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
-                raise _Stop(self.span(event), "yaml-syntax", "a second YAML document, expected one per file")
+                raise _Stop(self.span(event), "yaml-syntax", "a second YAML document, expected one per file", _SECOND)
 
     def _grow(self, span: Span, weight: int) -> None:
         self.count += weight
@@ -187,7 +191,10 @@ class _Builder:
         span = self.span(event)
         if event.anchor not in self.anchors:
             message = f"alias '*{event.anchor}' refers to an anchor that is missing or incomplete"
-            raise _Stop(span, "yaml-syntax", message, "a text that begins with '*' needs quotes")
+            near = [f"*{name}" for name in closest(event.anchor, self.anchors)]
+            hint = f"did you mean '{near[0]}'?" if near else "a text that begins with '*' needs quotes"
+            fix = Fix(f"*{event.anchor}", near[0]) if len(near) == 1 else None
+            raise _Stop(span, "yaml-syntax", message, hint, fix)
         node, weight, depth = self.anchors[event.anchor]
         self._check_depth(span, len(self.stack) + depth)
         self._add(node, weight, None, span, depth)
@@ -244,9 +251,13 @@ class _Builder:
             top.key = None
 
     def _as_key(self, node: Node, span: Span) -> Scalar:
-        if not isinstance(node, Scalar):
-            raise _Stop(span, "yaml-syntax", "this key is a list or a mapping, expected a string")
-        return node
+        if isinstance(node, Scalar):
+            return node
+        message, hint = "this key is a list or a mapping, expected a string", "remove the '?' or the brackets"
+        if isinstance(node, Mapping) and len(node.entries) == 1 and (name := _NAME.fullmatch(next(iter(node.entries)))):
+            message = f"'{{{{ {name[0]} }}}}' is not a placeholder, and braces mean something else in YAML"
+            hint = f"write ${{{name[0]}}}"
+        raise _Stop(span, "yaml-syntax", message, hint)
 
     def _entry(self, top: _Open, key: Scalar, node: Node) -> None:
         if key.text == "<<" and key.value == "<<":
@@ -254,25 +265,34 @@ class _Builder:
         elif key.text in top.entries:
             first = top.entries[key.text].key
             message = f"duplicate key '{key.text}', first defined in line {first.line}"
-            self.report(key.span, "duplicate-key", message)
+            self.report(key.span, "duplicate-key", message, "remove one of the two")
         else:
             top.entries[key.text] = Entry(key.span, node)
+
+
+def _unreadable(file: str, text: str, error: Exception, problem: str) -> Diagnostic:
+    """About a character that YAML does not allow, the first of its kind in the text."""
+    code = int(getattr(error, "character", 0) or 0)
+    position = max(text.find(chr(code)), 0)
+    before = text[:position]
+    span = Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
+    if "control characters" not in problem:
+        return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}")
+    message = f"a control character is not allowed here: {_CONTROL.get(code, 'unnamed')} (U+{code:04X})"
+    return Diagnostic(span, "yaml-syntax", message, "remove it")
 
 
 def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     problem = str(getattr(error, "problem", "") or getattr(error, "reason", "") or error).splitlines()[0]
     if mark is None:
-        position = int(getattr(error, "position", 0) or 0)
-        before = text[:position]
-        span = Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
-        return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}")
+        return _unreadable(file, text, error, problem)
     begin, context = getattr(error, "context_mark", None), getattr(error, "context", None) or ""
     began = (begin.line, begin.column) if begin else None
     failure = Failure(text, problem, (mark.line, mark.column), context, began, _LOADER)
     if found := slip(failure):
         rule = "yaml-tab" if found.is_tab else "yaml-syntax"
-        place = Span(file, found.line + 1, found.column + 1)
+        place = Span(file, found.line + 1, found.column + 1, found.length)
         return Diagnostic(place, rule, found.message, found.hint, fix=found.fix)
     if begin and mark.line >= len(failure.lines):  # what is never closed is shown where it is opened
         mark = begin

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from dodo_dsl.slips import blocks, brackets, characters, quotes
+from dodo_dsl.slips import blocks, brackets, characters, lists, quotes, signs, texts
 from dodo_dsl.slips.failure import Failure, Slip
 
 _DETECTORS: tuple[Callable[[Failure], Iterator[Slip]], ...] = (
@@ -12,13 +12,20 @@ _DETECTORS: tuple[Callable[[Failure], Iterator[Slip]], ...] = (
     quotes.unclosed,
     quotes.text_behind,
     quotes.escape,
+    lists.no_blank_after_dash,
+    lists.other_dash,
+    signs.other_colon,
+    texts.bare_alias,
+    texts.not_indented,
     blocks.no_blank_after_colon,
-    blocks.colon_in_text,
+    texts.colon_in_text,
     blocks.no_colon,
+    texts.colon_further_down,
     blocks.too_deep,
-    blocks.dash,
-    blocks.list_with_key,
-    blocks.list_behind_key,
+    lists.item_too_shallow,
+    lists.dash,
+    lists.list_with_key,
+    lists.list_behind_key,
     characters.comment,
     brackets.one_too_many,
     blocks.between_levels,
@@ -26,7 +33,7 @@ _DETECTORS: tuple[Callable[[Failure], Iterator[Slip]], ...] = (
     brackets.wrong_kind,
     brackets.no_comma,
     brackets.no_value,
-    characters.first_character,
+    signs.first_character,
     characters.block_text,
     characters.behind_the_end,
     blocks.unexpected,

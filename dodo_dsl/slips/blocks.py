@@ -1,40 +1,28 @@
-"""Slips with keys, indentation and lists."""
+"""Slips with keys and indentation."""
 
 import re
 from collections.abc import Iterator
 
 from dodo_dsl.diagnostics import Fix
-from dodo_dsl.slips.failure import Failure, Slip, indent, shortened
+from dodo_dsl.slips.failure import KEY, PLAIN_KEY, VALUES, Failure, Slip, indent, shortened, spaces
 
 _NO_BLANK = re.compile(r"\s*(?:- )?(?P<key>[A-Za-z_][\w.-]*):(?P<value>(?!//)[^\s:].*)")
 _NO_COLON = re.compile(r"\s*(?:- )?(?P<key>[A-Za-z_][\w.-]*)(?P<sign>\s*=|\s+|$)(?P<value>.*)")
-_KEY = re.compile(r"\s*(?:- )?(?P<key>[A-Za-z_][\w.-]*):(?:\s+(?P<value>.*))?$")
-_PLAIN_KEY = re.compile(r"[a-z][a-z0-9-]*")
-_VALUES = "mapping values are not allowed"
-
-
-def _suspect(failure: Failure) -> int:
-    """The line that is not as its author meant it: where a key was expected, or above an unexpected colon."""
-    if "simple key" in failure.context and failure.begin:
-        return failure.begin[0]
-    if _VALUES in failure.problem and ": " not in failure.before:
-        return failure.above(failure.mark[0])
-    return -1
 
 
 def no_blank_after_colon(failure: Failure) -> Iterator[Slip]:
-    number = _suspect(failure)
+    number = failure.suspect
     found = _NO_BLANK.fullmatch(failure.line(number))
     if found and ": " not in failure.line(number):
         key, value = found["key"], found["value"].strip()
         hint = f"write '{key}: {shortened(value)}'"
-        is_clear = not value.startswith("#") and _PLAIN_KEY.fullmatch(key)  # and no text that goes on: 'Note:this'
+        is_clear = not value.startswith("#") and PLAIN_KEY.fullmatch(key)  # and no text that goes on: 'Note:this'
         fix = Fix(":", ": ") if is_clear else None
         yield Slip(number, found.end("key"), f"a space is missing after the colon of '{key}'", hint, fix=fix)
 
 
 def no_colon(failure: Failure) -> Iterator[Slip]:
-    number = _suspect(failure)
+    number = failure.suspect
     line = failure.line(number)
     if line.lstrip().startswith("//"):
         yield Slip(number, indent(line), "'//' does not begin a comment", "comments begin with '#'")
@@ -52,57 +40,19 @@ def no_colon(failure: Failure) -> Iterator[Slip]:
 
 def _goes_on(failure: Failure, number: int) -> bool:
     """Whether the line above ends with a text of several words, which a line may go on with."""
-    above = _KEY.fullmatch(failure.line(failure.above(number)))
+    above = KEY.fullmatch(failure.line(failure.above(number)))
     return bool(above and " " in (above["value"] or "").strip() and above["value"][0] not in "\"'[{|>")
-
-
-def colon_in_text(failure: Failure) -> Iterator[Slip]:
-    if _VALUES not in failure.problem or ": " not in failure.before:
-        return
-    key, _, rest = failure.before.strip().removeprefix("- ").partition(": ")
-    value = shortened(f"{rest}{failure.here}".strip())
-    if _PLAIN_KEY.fullmatch(rest.strip()):
-        hint = f"write a mapping in braces, '{key}: {{{value}}}', or into the next lines"
-    else:
-        hint = "write the text in quotes"
-    yield Slip(*failure.mark, f"a second colon in the value of '{key}', which has to be one text", hint)
 
 
 def too_deep(failure: Failure) -> Iterator[Slip]:
     number = failure.mark[0]
     above = failure.above(number)
-    found = _KEY.fullmatch(failure.line(above))
+    found = KEY.fullmatch(failure.line(above))
     deep, usual = indent(failure.line(number)), indent(failure.line(above))
-    if _VALUES in failure.problem and found and found["value"] and deep > usual:
+    if VALUES in failure.problem and found and found["value"] and deep > usual:
         message = f"indented deeper than '{found['key']}' above, which has its value already"
-        where = f"indent it by {_spaces(usual)}" if usual else "begin it in the first column"
+        where = f"indent it by {spaces(usual)}" if usual else "begin it in the first column"
         yield Slip(number, deep, message, f"{where}, as line {above + 1}")
-
-
-def _spaces(number: int) -> str:
-    return f"{number} space{'' if number == 1 else 's'}"
-
-
-def dash(failure: Failure) -> Iterator[Slip]:
-    """A list item among keys."""
-    begins = not failure.before.strip()
-    if "expected key" in failure.problem and begins and re.match(r"-(\s|$)", failure.here):
-        message = "'- ' begins an item of a list, expected a key as in the lines above"
-        yield Slip(*failure.mark, message, "remove the '- '")
-
-
-def list_with_key(failure: Failure) -> Iterator[Slip]:
-    """Keys that go on where a list began."""
-    if "'-' indicator" in failure.problem and failure.begin:
-        other = failure.mark[0] + 1
-        message = f"'- ' begins a list here, but line {other} goes on with a key"
-        yield Slip(*failure.begin, message, "remove the '- ' for a mapping of keys")
-
-
-def list_behind_key(failure: Failure) -> Iterator[Slip]:
-    if "block sequence entries are not allowed" in failure.problem:
-        hint = "write the list in brackets, or each item into its own line"
-        yield Slip(*failure.mark, "a list with '- ' cannot begin behind its key", hint)
 
 
 def between_levels(failure: Failure) -> Iterator[Slip]:
@@ -116,14 +66,14 @@ def between_levels(failure: Failure) -> Iterator[Slip]:
         return
     near = [*[level for level in levels if level < deep][:1], *[level for level in levels if level > deep][-1:]]
     expected = " or ".join(str(level) for level in sorted(near))
-    message = f"indented by {_spaces(deep)}, but the lines above by {expected}"
+    message = f"indented by {spaces(deep)}, but the lines above by {expected}"
     yield Slip(number, deep, message, "keys of one mapping begin in the same column")
 
 
 def unexpected(failure: Failure) -> Iterator[Slip]:
     """What no other slip explains, in general words."""
     above = failure.above(failure.mark[0])
-    if _VALUES in failure.problem and above >= 0:
+    if VALUES in failure.problem and above >= 0:
         key = failure.before.strip() or "key"
         hint = f"is line {above + 1} complete, and is this line indented as it is meant?"
         yield Slip(failure.mark[0], indent(failure.before), f"the key '{shortened(key)}' is not expected here", hint)

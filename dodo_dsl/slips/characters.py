@@ -4,6 +4,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 
+from dodo_dsl.diagnostics import Fix
 from dodo_dsl.slips.failure import Failure, Slip
 
 _CONFLICT = re.compile(r"(<{7}|>{7}|\|{7}) |={7}$")
@@ -40,7 +41,9 @@ def foreign_blank(failure: Failure) -> Iterator[Slip]:
             blank = found["blank"]
             name = unicodedata.name(blank, "unnamed").lower()
             message = f"this blank is not a space but a {name} (U+{ord(blank):04X})"
-            yield Slip(number, found.start("blank"), message, "write a space")
+            is_nothing = "zero width" in name
+            fix = Fix(blank, "" if is_nothing else " ")
+            yield Slip(number, found.start("blank"), message, "remove it" if is_nothing else "write a space", fix=fix)
 
 
 def comment(failure: Failure) -> Iterator[Slip]:
@@ -64,16 +67,6 @@ def behind_the_end(failure: Failure) -> Iterator[Slip]:
         ends = [number for number in range(failure.mark[0]) if failure.line(number).rstrip() == "..."]
         message = "'...' ends the document, and text stands behind it"
         yield Slip(ends[-1] if ends else failure.mark[0], 0, message, "remove this line")
-
-
-def first_character(failure: Failure) -> Iterator[Slip]:
-    """Characters that mean something else, or nothing, at the begin of a value."""
-    reasons = {"&": "begins an anchor", "*": "begins an alias", "!": "begins a tag", "%": "begins a directive"}
-    sign = failure.before[-1:] if "anchor" in failure.context or "alias" in failure.context else failure.here[:1]
-    column = failure.mark[1] - (sign != failure.here[:1])
-    if sign and ("cannot start any token" in failure.problem or sign in "&*"):
-        why = f", which {reasons[sign]}" if sign in reasons else ""
-        yield Slip(failure.mark[0], column, f"a text cannot begin with '{sign}'{why}", "write the text in quotes")
 
 
 def block_text(failure: Failure) -> Iterator[Slip]:

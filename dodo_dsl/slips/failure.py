@@ -1,12 +1,19 @@
 """Where a parser gave up, and what that means."""
 
 import functools
+import re
 from dataclasses import dataclass
 from typing import Any
 
 import yaml
 
 from dodo_dsl.diagnostics import Fix
+
+KEY = re.compile(r"\s*(?:- )?(?P<key>[A-Za-z_][\w.-]*):(?:\s+(?P<value>.*))?$")
+PLAIN_KEY = re.compile(r"[a-z][a-z0-9-]*")
+BLOCK_STYLES = ("|", ">")
+VALUES = "mapping values are not allowed"
+"""The words about a colon where a value cannot have one."""
 
 Mark = tuple[int, int]
 """Line and column, from 0."""
@@ -16,7 +23,7 @@ Mark = tuple[int, int]
 class Slip:
     """A mistake in a text: its place, counted from 0, and words about it; ``is_tab`` for indentation with a tab.
 
-    ``fix`` is for the one character at the place, where there is exactly one fix.
+    ``fix`` is for the ``length`` characters at the place, where there is exactly one fix.
     """
 
     line: int
@@ -25,6 +32,7 @@ class Slip:
     hint: str = ""
     is_tab: bool = False
     fix: Fix | None = None
+    length: int = 1
 
 
 @dataclass(frozen=True)
@@ -40,7 +48,14 @@ class Failure:
 
     @functools.cached_property
     def lines(self) -> list[str]:
-        return self.text.splitlines()
+        """The lines of the text, empty within a block text, below ``|`` or ``>``, where anything may stand."""
+        found = self.text.splitlines()
+        for token in self.tokens:
+            if isinstance(token, yaml.ScalarToken) and token.style in BLOCK_STYLES:
+                end = token.end_mark.line + bool(token.end_mark.column)
+                for number in range(token.start_mark.line + 1, min(end, len(found))):
+                    found[number] = ""
+        return found
 
     def line(self, number: int) -> str:
         return self.lines[number] if 0 <= number < len(self.lines) else ""
@@ -64,6 +79,19 @@ class Failure:
                 return number
         return -1
 
+    def below(self, number: int) -> str:
+        """The nearest line below that is neither empty nor a comment; empty when there is none."""
+        return next((line for line in self.lines[number + 1 :] if line.strip() and line.strip()[0] != "#"), "")
+
+    @functools.cached_property
+    def suspect(self) -> int:
+        """The line that is not as meant: where a key was expected, or above an unexpected colon; -1 for none."""
+        if "simple key" in self.context and self.begin:
+            return self.begin[0]
+        if VALUES in self.problem and ": " not in self.before:
+            return self.above(self.mark[0])
+        return -1
+
     @functools.cached_property
     def tokens(self) -> list[Any]:
         """The tokens up to the mark, as far as there are any."""
@@ -81,6 +109,10 @@ class Failure:
 def indent(line: str) -> int:
     """The number of spaces that a line begins with."""
     return len(line) - len(line.lstrip(" "))
+
+
+def spaces(number: int) -> str:
+    return f"{number} space{'' if number == 1 else 's'}"
 
 
 def shortened(text: str) -> str:

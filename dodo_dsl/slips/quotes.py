@@ -7,6 +7,7 @@ import yaml
 
 from dodo_dsl.slips.failure import Failure, Slip
 
+QUOTES = ("'", '"')
 _KEY_LINE = re.compile(r"^\s*(?:- )?[\w.-]+:(?:\s|$)", re.MULTILINE)
 
 
@@ -27,7 +28,11 @@ def _start(token: yaml.Token) -> tuple[int, int]:
 
 def _swallows_keys(failure: Failure, token: yaml.Token) -> bool:
     """Whether a text in quotation marks goes over lines that look like keys."""
-    if not isinstance(token, yaml.ScalarToken) or token.plain or token.start_mark.line == token.end_mark.line:
+    if (
+        not isinstance(token, yaml.ScalarToken)
+        or token.style not in QUOTES
+        or token.start_mark.line == token.end_mark.line
+    ):
         return False
     inner = failure.lines[token.start_mark.line + 1 : token.end_mark.line + 1]
     return any(_KEY_LINE.match(line) for line in inner)
@@ -36,7 +41,7 @@ def _swallows_keys(failure: Failure, token: yaml.Token) -> bool:
 def text_behind(failure: Failure) -> Iterator[Slip]:
     """Text behind the closing quotation mark, which is often an apostrophe."""
     quote = failure.before.rstrip()[-1:]
-    if "did not find expected" not in failure.problem or quote not in ("'", '"') or not failure.here.strip():
+    if "did not find expected" not in failure.problem or quote not in QUOTES or not failure.here.strip():
         return
     if failure.here[0] in ",]}:":
         return

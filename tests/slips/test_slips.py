@@ -60,6 +60,31 @@ def test_it_is_told_at_the_line_that_is_wrong(name: str) -> None:
     assert lines[int(place[1]) - 1] not in GOOD.splitlines()
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "alias-misspelt",
+        "block-above-colon",
+        "block-above-percent",
+        "char-byte-order-mark",
+        "char-nbsp",
+        "char-percent-share",
+        "colon-full-width",
+        "colon-semicolon",
+        "list-dash-no-blank-second",
+        "list-dash-other",
+    ],
+)
+def test_its_fix_makes_it_yaml(name: str) -> None:
+    text = (FOLDER / f"{name}.dodo.yml").read_text()
+    _, (problem,) = parse(text, name)
+    assert problem.fix is not None
+    lines, at = text.split("\n"), problem.span
+    line, start, end = lines[at.line - 1], at.column - 1, at.column - 1 + at.length
+    lines[at.line - 1] = line[:start] + problem.fix.mended(line[start:end]) + line[end:]
+    assert parse("\n".join(lines), name)[1] == []
+
+
 def test_there_are_more_than_thirty() -> None:
     assert len(SLIPS) > 30
     assert sorted(path.stem for path in FOLDER.glob("*.out")) == SLIPS
