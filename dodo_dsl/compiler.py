@@ -12,6 +12,7 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.check import manifest_messages
+from dodo_dsl.check.consequences import without_consequences
 from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.resolve import ResolvedTest, resolve
 from dodo_dsl.check.unchanged import Findings, Surroundings, check_again
@@ -118,7 +119,7 @@ def load(
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
     again = check_again(specs, corners, Surroundings(manifests, deployment, source), before)
     found.extend(itertools.chain.from_iterable(again.by_rules.values()))
-    diagnostics, by_rules = tuple(ordered(found)), again.by_rules
+    diagnostics, by_rules = tuple(ordered(without_consequences(found, again.by_rules))), again.by_rules
     return Checked(deployment, manifests, again.tests, diagnostics, settings, source, tuple(empty), by_rules)
 
 

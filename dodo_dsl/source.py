@@ -256,7 +256,7 @@ class _Builder:
         message, hint = "this key is a list or a mapping, expected a string", "remove the '?' or the brackets"
         if isinstance(node, Mapping) and len(node.entries) == 1 and (name := _NAME.fullmatch(next(iter(node.entries)))):
             message = f"'{{{{ {name[0]} }}}}' is not a placeholder, and braces mean something else in YAML"
-            hint = f"write ${{{name[0]}}}"
+            hint = f'write "${{{name[0]}}}"'
         raise _Stop(span, "yaml-syntax", message, hint)
 
     def _entry(self, top: _Open, key: Scalar, node: Node) -> None:

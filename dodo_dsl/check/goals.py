@@ -8,6 +8,7 @@ from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Scalar
 from dodo_dsl.spec import quantity
+from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.goals import Goal
 
 _OF_THE_TEST = {"slow-answers": "", "uncopied-sample-times": ""}
@@ -63,14 +64,21 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal:
 def _unit(test: ResolvedTest, name: str, entry: Entry) -> str | None:
     """The unit of a check, None where no manifest has it but one does not tell; raises _WrongGoal."""
     known = dict(_OF_THE_TEST)
-    judges = [service.manifest for service in test.services if service.use.layer == "evaluation"]
+    judges = [service.manifest for service in test.services if _judges(service)]
     for manifest in judges:
         known.update(manifest.checks)
     unit = next((unit for pattern, unit in known.items() if fnmatchcase(name, pattern)), None)
-    if unit is None and test.is_complete and all(manifest.checks for manifest in judges):
+    if unit is None and all(manifest.checks for manifest in judges):
+        if not test.is_complete or not test.spec.is_whole:
+            raise _WrongGoal  # a service that is not known may have the check
         hint = did_you_mean(name, known)
         raise _WrongGoal(Diagnostic(entry.key, "unknown-check", f"no evaluator of the test has a check '{name}'", hint))
     return unit
+
+
+def _judges(service: ResolvedService) -> bool:
+    """Whether it is an evaluator, or in a wrong layer, where it may be one."""
+    return service.use.layer == "evaluation" or service.use.layer not in service.manifest.layers
 
 
 def _scalar(goal: Mapping, key: str) -> Scalar | None:

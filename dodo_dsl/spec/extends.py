@@ -15,20 +15,21 @@ _USES = "uses"
 def resolve(node: Node, file: Path, root: Path, reader: Reader = read) -> tuple[Node, list[Diagnostic]]:
     """The spec merged over everything that it extends; spans keep the file that each value was written in.
 
+    It stays as it is, with its key ``extends``, where one of the files that it is built on cannot be read.
+
     ``root`` is the registry's folder, which holds all files of the chain.
     """
     return _resolve(node, (file,), root.resolve(), reader)
 
 
-def is_text(node: Node) -> bool:
-    """Whether the spec extends nothing, or a string that could be a path."""
-    written = node.get(KEY) if isinstance(node, Mapping) else None
-    return written is None or (isinstance(written, Scalar) and isinstance(written.value, str))
+def is_open(node: Node) -> bool:
+    """Whether a spec that ``resolve`` returned is not merged over what it extends."""
+    return isinstance(node, Mapping) and KEY in node.entries
 
 
 def _resolve(node: Node, chain: tuple[Path, ...], root: Path, reader: Reader) -> tuple[Node, list[Diagnostic]]:
     written = node.get(KEY) if isinstance(node, Mapping) else None
-    if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not is_text(node):
+    if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not isinstance(written.value, str):
         return node, []  # reported by the schema
     path = path_of(chain[-1].parent, written.text)
     if path is None:
@@ -44,6 +45,8 @@ def _resolve(node: Node, chain: tuple[Path, ...], root: Path, reader: Reader) ->
     below, deeper = _resolve(base, (*chain, path), root, reader)
     problems = [*found, *deeper]
     assert isinstance(below, Mapping), "a mapping resolves to one"
+    if KEY in below.entries:
+        return node, problems
     inherited = Mapping(base.span, {key: entry for key, entry in below.entries.items() if key not in _OWN})
     own = Mapping(node.span, {key: entry for key, entry in node.entries.items() if key != KEY}, node.tag)
     return _merge(inherited, own, problems), problems

@@ -1,9 +1,10 @@
 """A file's tests: read, merged over what it extends, and made into instances."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Mapping, Node, Reader, read
+from dodo_dsl.source import Mapping, Node, Reader, Scalar, read
 from dodo_dsl.spec import extends
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.instances.matrix import Choice
@@ -25,8 +26,10 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
             found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
         return [Spec(location)], found
     node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root, reader)
-    is_whole = not has_errors(problems) and extends.is_text(node)
+    is_whole = not has_errors(problems)
     found = [*found, *problems]
+    if extends.is_open(node):
+        return [_by_name(location, node)], [*found, *_surely_wrong(node)]
     choices, problems = matrix.choices(node)
     found.extend(problems)
     if not isinstance(node, Mapping):
@@ -48,6 +51,21 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         found.extend(problems)
         specs.append(replace(spec, corners=corners))
     return specs, found
+
+
+def _by_name(location: Location, node: Node) -> Spec:
+    """All that is certain of a test without the one that it extends."""
+    name = node.get("name") if isinstance(node, Mapping) else None
+    if not isinstance(name, Scalar) or not isinstance(name.value, str):
+        return Spec(location, is_whole=False)
+    return Spec(location, name=name.value, spans={"name": name.span}, is_whole=False)
+
+
+def _surely_wrong(node: Node) -> Iterator[Diagnostic]:
+    """The problems that a test has whatever the one holds that it extends."""
+    entry = node.entries.get(extends.KEY) if isinstance(node, Mapping) else None
+    places = (entry.key, entry.value.span) if entry else ()
+    return (d for d in validate(node, "dodo") if d.rule in ("unknown-key", "yaml-tag") or d.span in places)
 
 
 def varied(spec: Spec, values: vary.Values, choice: Choice) -> Spec:

@@ -22,7 +22,7 @@ messages: {in: ["opendlv.proxy.GroundSteeringRequest"]}
 
 def resolved(folder: Path, example: str) -> tuple[tuple[Goal, ...], list[tuple[str, str]]]:
     examples.write(example, folder)
-    (test,) = load([folder / "tests" / "example"]).tests
+    (test,) = load([folder / "tests" / "example"], start=folder).tests
     found = resolved_goals(test)
     return found.goals, [(problem.rule, problem.message) for problem in found.problems]
 

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.source import Mapping, plain, read
-from dodo_dsl.spec.extends import MAX_CHAIN, is_text, resolve
-from tests.source.nodes import mapping
+from dodo_dsl.spec.extends import MAX_CHAIN, is_open, resolve
 
 BASE = "name: base\nlevel: sil\nmatrix: {a: [1, 2]}\naction: {car: {uses: model, with: {x: 1 m, y: 2 m}}}\n"
 
@@ -93,6 +92,21 @@ def test_a_key_that_cannot_be_removed(tmp_path: Path) -> None:
     assert message.startswith("'matrx' is empty, which would remove it, but ")
 
 
-@pytest.mark.parametrize(("text", "expected"), [("a: 1", True), ("extends: x", True), ("extends: [x]", False)])
-def test_what_can_be_read_as_a_path(text: str, expected: bool) -> None:
-    assert is_text(mapping(text)) is expected
+@pytest.mark.parametrize(
+    ("text", "base", "expected"),
+    [
+        ("a: 1", "", False),
+        ("extends: base.dodo.yml", "a: 1", False),
+        ("extends: base.dodo.yml", "a: [", True),
+        ("extends: base.dodo.yml", "extends: none.dodo.yml", True),
+        ("extends: none.dodo.yml", "", True),
+        ("extends: [x]", "", True),
+    ],
+)
+def test_a_spec_on_what_cannot_be_read_stays_open(tmp_path: Path, text: str, base: str, expected: bool) -> None:
+    (tmp_path / "base.dodo.yml").write_text(base)
+    file = tmp_path / "spec.dodo.yml"
+    file.write_text(text)
+    node, _ = read(file)
+    assert node is not None
+    assert is_open(resolve(node, file, tmp_path)[0]) is expected

@@ -59,8 +59,8 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters or parameter.name in misspelt:
             continue
-        if parameter.rig and context.rig and context.rig.entry(parameter.rig):
-            continue
+        if parameter.rig and context.spec.rig and (not context.rig or context.rig.entry(parameter.rig)):
+            continue  # an unknown rig may give it, too
         if parameter.shared and not context.spec.is_whole:
             continue  # a service that could not be read may give it
         givers = _givers(context, parameter.name) if parameter.shared else {}

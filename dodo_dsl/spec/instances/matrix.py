@@ -103,7 +103,10 @@ def problems(node: Mapping) -> Iterator[Diagnostic]:
     """Placeholders of unknown dimensions, and dimensions without placeholders."""
     entry = node.entries.get(KEY)
     dimensions = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
-    yield from PLACEHOLDERS.unknown(node, dimensions, "matrix-unknown")
+    wrong = list(PLACEHOLDERS.unknown(node, dimensions, "matrix-unknown"))
+    yield from wrong
+    if wrong:
+        return  # which may be meant to use any dimension
     used = PLACEHOLDERS.used(node)
     for name, dimension in dimensions.items():
         if name not in used:

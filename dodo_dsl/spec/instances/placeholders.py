@@ -10,10 +10,21 @@ from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
 
 MATRIX = "matrix"
+_TYPOGRAPHIC = "\u2018\u2019\u201a\u201c\u201d\u201e\u00ab\u00bb\u2039\u203a"
 
 
 def without(node: Mapping, key: str) -> Mapping:
     return Mapping(node.span, {name: entry for name, entry in node.entries.items() if name != key}, node.tag)
+
+
+def _written(node: Node) -> str:
+    """A scalar, or what is meant as one: ``{vary.light}`` is a mapping with an empty value; empty for other nodes."""
+    if isinstance(node, Scalar):
+        return node.text
+    if isinstance(node, Mapping) and len(node.entries) == 1:
+        ((key, entry),) = node.entries.items()
+        return f"{{{key}}}" if isinstance(entry.value, Scalar) and not entry.value.text else ""
+    return ""
 
 
 @dataclass(frozen=True)
@@ -35,6 +46,11 @@ class Placeholders:
         return re.compile(rf"\$\{{{self.key}\.(?P<name>[a-z][a-z0-9-]*)\}}")
 
     @functools.cached_property
+    def _near(self) -> re.Pattern[str]:
+        """A name, with the key or signs around it."""
+        return re.compile(rf"(?P<begin>\W*)(?P<key>{self.key}\.)?(?P<name>[a-z][a-z0-9-]*)(?P<end>\W*)")
+
+    @functools.cached_property
     def _attempt(self) -> re.Pattern[str]:
         return re.compile(rf"\$\{{\s*{self.key}\b[^}}]*\}}?")
 
@@ -50,9 +66,23 @@ class Placeholders:
     def unknown(self, node: Mapping, known: Collection[str], rule: str) -> Iterator[Diagnostic]:
         """Placeholders of a spec with names that are not ``known``, or without one."""
         for key, part in node.entries.items():
-            for scalar in walk(part.value) if key != self.key else ():
-                if isinstance(scalar, Scalar) and "${" in scalar.text:
-                    yield from self._unknown(scalar, known, rule)
+            for one in walk(part.value) if key != self.key else ():
+                if name := self._meant(one, known):
+                    right = f"${{{self.key}.{name}}}"
+                    message = f"'{_written(one)[:60]}' is not a placeholder, expected {right}"
+                    yield Diagnostic(one.span, rule, message, f'write "{right}"')
+                elif isinstance(one, Scalar) and "${" in one.text:
+                    yield from self._unknown(one, known, rule)
+
+    def _meant(self, node: Node, known: Collection[str]) -> str:
+        """The known name in a value that is nothing but an attempt at its placeholder; empty for any other value."""
+        match = self._near.fullmatch(_written(node)) if known else None
+        if match is None or match["name"] not in known:
+            return ""
+        around = match["begin"] + match["end"]
+        if self._one.search(match[0]):  # the signs around it may be meant, but for quotation marks as in books
+            return match["name"] if around.strip("${}") and not around.strip(_TYPOGRAPHIC + "${}") else ""
+        return match["name"] if match["key"] or "$" in around else ""
 
     def _unknown(self, scalar: Scalar, known: Collection[str], rule: str) -> Iterator[Diagnostic]:
         for attempt in self._attempt.finditer(scalar.text):

@@ -134,7 +134,10 @@ def problems(node: Mapping) -> Iterator[Diagnostic]:
     """Placeholders of unknown ranges, and ranges without placeholders, unless they come from an extended test."""
     entry = node.entries.get(KEY)
     ranges = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
-    yield from PLACEHOLDERS.unknown(node, ranges, "vary-unknown")
+    wrong = list(PLACEHOLDERS.unknown(node, ranges, "vary-unknown"))
+    yield from wrong
+    if wrong:
+        return  # which may be meant to use any range
     used = PLACEHOLDERS.used(node)
     for name, one in ranges.items():
         if name not in used and one.key.file == node.span.file:

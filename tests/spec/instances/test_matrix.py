@@ -62,9 +62,12 @@ def test_placeholders_and_their_problems() -> None:
     assert PLACEHOLDERS.names(node) == {"a", "c"}
     assert [(problem.rule, problem.message) for problem in problems(node)] == [
         ("matrix-unknown", "the matrix has no dimension 'c'"),
-        ("matrix-unknown", "'${ matrix.a }' is not a placeholder, expected one such as ${matrix.light}"),
+        ("matrix-unknown", "'${ matrix.a }' is not a placeholder, expected ${matrix.a}"),
         ("matrix-unknown", "'${matrix}' is not a placeholder, expected one such as ${matrix.light}"),
-        ("matrix-unused", "nothing uses ${matrix.b}, so its instances are all the same"),
+    ]
+    unused = mapping("matrix: {a: [1], b: [2]}\nx: ${matrix.a}\n")
+    assert [(problem.rule, problem.message) for problem in problems(unused)] == [
+        ("matrix-unused", "nothing uses ${matrix.b}, so its instances are all the same")
     ]
 
 

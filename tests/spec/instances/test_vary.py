@@ -92,10 +92,43 @@ def test_placeholders_and_their_problems() -> None:
     node = mapping(f"vary: {RANGES}\nx: ${{vary.light}}\ny: ['at ${{vary.c}}', '${{ vary.start }}', '${{matrix.b}}']\n")
     assert [(problem.rule, problem.message) for problem in problems(node)] == [
         ("vary-unknown", "'vary' has no range 'c'"),
-        ("vary-unknown", "'${ vary.start }' is not a placeholder, expected one such as ${vary.light}"),
+        ("vary-unknown", "'${ vary.start }' is not a placeholder, expected ${vary.start}"),
+    ]
+    unused = mapping(f"vary: {RANGES}\nx: ${{vary.light}}\n")
+    assert [(problem.rule, problem.message) for problem in problems(unused)] == [
         ("vary-unused", "nothing uses ${vary.start}, so a search would vary nothing by it"),
         ("vary-unused", "nothing uses ${vary.map}, so a search would vary nothing by it"),
     ]
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "${light}",
+        "{vary.light}",
+        "'{vary.light}'",
+        "$(vary.light)",
+        "${{ vary.light }}",
+        "${vary.light",
+        "$vary.light",
+        "vary.light",
+        "\u201c${vary.light}\u201d",
+    ],
+)
+def test_what_is_meant_as_a_placeholder(written: str) -> None:
+    (problem,) = problems(mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n"))
+    assert (problem.rule, problem.hint) == ("vary-unknown", 'write "${vary.light}"')
+
+
+@pytest.mark.parametrize("written", ["-${vary.light}", "(${vary.light})", "'${vary.light} %'", "'${vary.light}'"])
+def test_signs_beside_a_placeholder(written: str) -> None:
+    assert list(problems(mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n"))) == []
+
+
+@pytest.mark.parametrize("written", ["light", "$HOME", "${HOME}", "{light}", "${light} lux", "varying.light"])
+def test_what_is_no_placeholder(written: str) -> None:
+    (problem,) = problems(mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n"))
+    assert problem.rule == "vary-unused"
 
 
 def test_a_value_keeps_the_place_where_it_is_written() -> None:
