@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from firmware.drawings import part_views, side_view, top_view, yaw_views
+from firmware.drawings import part_views, side_view, top_view, wiring, yaw_views
 
 DRAWINGS = {
     "top": top_view.drawing,
@@ -10,6 +10,7 @@ DRAWINGS = {
     "yaw-dynamic": yaw_views.dynamic,
     "yaw-circle": yaw_views.circle,
     "holder": part_views.drawing,
+    "wiring": wiring.drawing,
 }
 
 

@@ -11,7 +11,7 @@ import trimesh
 import yaml
 
 from firmware.drawings import measures as of
-from firmware.drawings import parts, side_view, top_view, yaw_views
+from firmware.drawings import parts, side_view, top_view, wiring, yaw_views
 from firmware.drawings.drawings import DRAWINGS
 from tests.firmware.programs import ROOT
 
@@ -89,11 +89,11 @@ def box(text: ET.Element) -> tuple[float, float, float, float]:
 def test_texts_are_on_the_sheet_and_not_on_one_another(name: str) -> None:
     svg = DRAWINGS[name]()
     sheet = ET.fromstring(svg).attrib
-    boxes = {text.text: box(text) for text in texts(svg)}
-    for words_, (left, top, right, bottom) in boxes.items():
+    boxes = [(text.text, box(text)) for text in texts(svg)]
+    for words_, (left, top, right, bottom) in boxes:
         assert left >= 0 and right <= float(sheet["width"]), words_
         assert top >= 0 and bottom <= float(sheet["height"]), words_
-    for (one, a), (other, b) in itertools.combinations(boxes.items(), 2):
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
         assert a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1], f"'{one}' is on '{other}'"
 
 
@@ -144,3 +144,15 @@ def test_files_are_the_same_each_time_and_small(tmp_path: Path) -> None:
     for file, again in zip(files, parts.write(tmp_path / "two"), strict=True):
         assert file.read_bytes() == again.read_bytes() and len(file.read_bytes()) < 100_000
         assert trimesh.load_mesh(file).is_watertight
+
+
+def test_the_wiring_is_that_of_the_table_of_the_firmware() -> None:
+    rows = re.findall(r"^\| (D\d+) \| (P[BD]\d)", (ROOT / "firmware" / "README.md").read_text(), re.MULTILINE)
+    source = (ROOT / "firmware" / "gantry" / "avr" / "main.c").read_text()
+    assert {(pin, port) for port, pin in re.findall(r"#define \w+ (P[BD]\d+) +/\* (D\d+)", source)} == set(rows)
+    assert sorted(wiring.pins().values()) == sorted(pin for pin, _ in rows)
+    said = words(wiring.drawing())
+    assert [word for word in said if word.startswith("L6470 ")] == [
+        f"L6470 {name}" for name in TABLE["drivers"]["motors"]
+    ]
+    assert {pin for pin, _ in rows} <= set(said)
