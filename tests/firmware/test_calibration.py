@@ -19,13 +19,11 @@ from dodo_dsl.calibration.axis_line import AXES, AxisLine, Reading, fit
 from dodo_dsl.cli.main import main
 from services.gantry.rig_table import MICROSTEP, OFFSETS, STEPS
 from tests.firmware.programs import ROOT, Rig
+from tests.firmware.reached import SHOWN, edges
 
 SCALE, SHIFT = {"x": 1.03, "y": 0.97, "yaw": 1.01}, {"x": 0.007, "y": -0.005, "yaw": 2.0}
-SHOWN = {"x": 0.001, "y": 0.001, "yaw": 0.5}
-"""What a ruler and a protractor show (m, m, degrees)."""
-EDGES = {"x": 0.95, "y": 0.7, "yaw": 170.0}
-HEARD = 0.3
-"""s of the rig since its last answer in which its time passes as fast as it can: before its watchdog barks."""
+STEP, HEARD = 0.01, 0.3
+"""s of the rig: a step, and how long after its last answer its time passes as fast as it can: no watchdog barks."""
 
 
 class Running:
@@ -47,10 +45,10 @@ class Running:
         heard, sent = 0.0, 0
         while not self._ended.is_set():
             with self._lock:
-                self.rig.run(0.005)
-            heard, sent = (0.0, self.rig.sent) if self.rig.sent != sent else (heard + 0.005, sent)
+                self.rig.run(STEP)
+            heard, sent = (0.0, self.rig.sent) if self.rig.sent != sent else (heard + STEP, sent)
             if heard > HEARD:
-                time.sleep(0.01)
+                time.sleep(2 * STEP)
 
     def pose(self) -> dict[str, float]:
         """Where it truly is (m, m, degrees)."""
@@ -128,4 +126,4 @@ def test_a_rig_with_other_constants_is_measured_and_then_goes_where_it_is_told(
     for name, axis in AXES.items():
         found = [(one["steps"], one["reads"]) for one in measured["axes"][name]["readings"]]
         line = fit(axis, [Reading(steps, round(reads / SHOWN[name]) * SHOWN[name]) for steps, reads in found])
-        assert max(missed(line, name, place) for place in (EDGES[name], -EDGES[name])) < SHOWN[name]
+        assert max(missed(line, name, place) for place in edges(name)) < SHOWN[name]

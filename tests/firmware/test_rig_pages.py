@@ -6,10 +6,13 @@ import math
 import re
 import subprocess
 from io import StringIO
+from pathlib import Path
 
 import pytest
 
+from dodo_dsl.cli import doctor
 from dodo_dsl.cli.main import main
+from dodo_dsl.spec.deployment.deployment import load_deployment
 from firmware.drawings import measures as of
 from firmware.drawings import side_view
 from services.gantry.protocol import Status
@@ -22,6 +25,7 @@ PAGES = {page.stem: page.read_text() for page in sorted(FOLDER.glob("*.md"))}
 SAID = sorted(
     {line.strip() for page in PAGES.values() for line in re.findall(r"(?:`|^    )(dodo [^`\n]+)", page, re.MULTILINE)}
 )
+BLOCKS = re.findall(r"```yaml\n(.*?)```", "".join(PAGES.values()), re.DOTALL)
 
 
 def test_every_page_is_listed_and_says_that_nothing_was_built() -> None:
@@ -53,6 +57,17 @@ def test_sentences_of_the_rig_are_those_that_it_says() -> None:
     for words in ("gave no answer", "the place is out of the rig's ranges"):
         assert words in page
         assert any(words in file.read_text() for file in (ROOT / "services" / "gantry").glob("*.py")), words
+
+
+def test_doctor_says_problem_where_the_page_looks_for_it() -> None:
+    assert f"begins with `{doctor._SIGNS['problem']}`" in PAGES["assembly"]
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_deployments_are_valid(block: str, tmp_path: Path) -> None:
+    (tmp_path / "dodo.yml").write_text(block if block.startswith("dodo: 1") else f"dodo: 1\n{block}")
+    deployment, problems = load_deployment(tmp_path / "dodo.yml")
+    assert not problems and "kiwi-dynamic" in deployment.rigs
 
 
 def test_rails_have_the_lengths_of_the_constants() -> None:
