@@ -14,8 +14,8 @@ _ASIDE = 105.0
 def drawing() -> str:
     sheet = Sheet(900, 440, 3.2, (430, 200))
     sheet.text((0, 0), f"The camera's holder, two plates of {mm(PLATE)}; measures in mm", (-410, -176))
-    _outline(sheet, parts.hub_plate(), 0.0, 0.0)
-    _outline(sheet, parts.camera_plate(), _ASIDE, -20.0)
+    _outline(sheet, parts.hub_outline(), 0.0, 0.0)
+    _outline(sheet, parts.camera_outline(), _ASIDE, -20.0)
     sheet.text((parts.HUB_BACK, parts.HUB_HALF), "hub plate, from above; forward is right", (0, -8))
     sheet.text((_ASIDE, 24), "camera plate, from its back", (0, -6), "middle")
     _hub_measures(sheet)
@@ -23,14 +23,10 @@ def drawing() -> str:
     return sheet.svg()
 
 
-def _outline(sheet: Sheet, mesh: Any, right: float, up: float) -> None:
-    """The edges of a plate's upper face, as the printed mesh has them."""
-    top = mesh.bounds[1][2]
-    for facet, normal in zip(mesh.facets_boundary, mesh.facets_normal, strict=True):
-        if normal[2] > 0.5:
-            for begin, end in mesh.vertices[facet]:
-                assert begin[2] == end[2] == top
-                sheet.path([(begin[0] + right, begin[1] + up), (end[0] + right, end[1] + up)])
+def _outline(sheet: Sheet, outline: Any, right: float, up: float) -> None:
+    """The edges of the plate that is printed."""
+    for ring in (outline.exterior, *outline.interiors):
+        sheet.path([(x + right, y + up) for x, y in ring.coords[:-1]], closed=True)
 
 
 def _hub_measures(sheet: Sheet) -> None:

@@ -60,7 +60,7 @@ def finish_cone() -> Any:
     return cone("finish-cone.obj")
 
 
-def hub_plate() -> Any:
+def hub_outline() -> Any:
     """Below the yaw's motor: it carries the Raspberry Pi, and the camera's plate in two slots."""
     holes = [_circle(0, 0, SHAFT)]
     holes += [_circle(FLANGE / 2 * c, FLANGE / 2 * s, FLANGE_HOLE) for c, s in _corners(math.sqrt(0.5), math.sqrt(0.5))]
@@ -68,10 +68,14 @@ def hub_plate() -> Any:
     holes += [_circle(middle + x, y, PI_HOLE) for x, y in _corners(PI_HOLES[0] / 2, PI_HOLES[1] / 2)]
     back, front, half = -1 - PLATE - FIT, -1 + FIT, TAB / 2 + FIT
     holes += [shapely.box(back, y - half, front, y + half) for y in (TAB_AT, -TAB_AT)]
-    return _extruded(shapely.box(HUB_BACK, -HUB_HALF, HUB_FRONT, HUB_HALF), holes, PLATE)
+    return _without(shapely.box(HUB_BACK, -HUB_HALF, HUB_FRONT, HUB_HALF), holes)
 
 
-def camera_plate() -> Any:
+def hub_plate() -> Any:
+    return _extruded(hub_outline(), PLATE)
+
+
+def camera_outline() -> Any:
     """Lies on its front, its lower edge at y = 0: the camera's board is screwed to it from behind."""
     height = LENS_MARGIN + LENS_DROP
     outline = shapely.box(-CAMERA_HALF, 0, CAMERA_HALF, height)
@@ -80,7 +84,11 @@ def camera_plate() -> Any:
     holes = [_circle(x, LENS_MARGIN + y, CAMERA_HOLE) for x in (-width / 2, width / 2) for y in (0, up)]
     side = WINDOW / 2
     holes.append(shapely.box(-side, LENS_MARGIN - side, side, LENS_MARGIN + side))
-    return _extruded(shapely.union_all([outline, *tabs]), holes, PLATE)
+    return _without(shapely.union_all([outline, *tabs]), holes)
+
+
+def camera_plate() -> Any:
+    return _extruded(camera_outline(), PLATE)
 
 
 def index_cam() -> Any:
@@ -88,7 +96,7 @@ def index_cam() -> Any:
     ends = math.radians(180 - INDEX_WIDTH), math.pi
     high = [(CAM * math.cos(a), CAM * math.sin(a)) for a in np.linspace(*ends, 9)]
     low = [(CAM_LOW * math.cos(a), CAM_LOW * math.sin(a)) for a in np.linspace(ends[1], ends[0] + math.tau, SIDES)]
-    return _extruded(shapely.Polygon(high + low), [_circle(0, 0, CAM_BORE)], CAM_HEIGHT)
+    return _extruded(_without(shapely.Polygon(high + low), [_circle(0, 0, CAM_BORE)]), CAM_HEIGHT)
 
 
 PARTS: dict[str, Part] = {
@@ -117,9 +125,14 @@ def _circle(x: float, y: float, diameter: float) -> Any:
     return shapely.Point(x, y).buffer(diameter / 2, quad_segs=SIDES // 8)
 
 
-def _extruded(outline: Any, holes: list[Any], height: float) -> Any:
-    """A plate of an outline without the holes, on z = 0."""
-    triangles = shapely.constrained_delaunay_triangles(outline.difference(shapely.union_all(holes))).geoms
+def _without(outline: Any, holes: list[Any]) -> Any:
+    """Whose corners are always in one order."""
+    return outline.difference(shapely.union_all(holes)).normalize()
+
+
+def _extruded(outline: Any, height: float) -> Any:
+    """A plate on z = 0."""
+    triangles = shapely.constrained_delaunay_triangles(outline).geoms
     corners = np.array([triangle.exterior.coords[:3] for triangle in triangles])
     vertices, faces = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
     return trimesh.creation.extrude_triangulation(vertices, faces.reshape(-1, 3), height)
