@@ -8,6 +8,7 @@ from dodo_dsl.diagnostics import Fix, closest
 from dodo_dsl.slips.failure import shortened
 
 _COLON = re.compile(r"(?P<key>[^:\s]+):(?P<value>.*)", re.DOTALL)
+_CLOSING = {"{": "}", "[": "]"}
 _BLANK = re.compile(r"(?P<key>[^\s=]+)[\s=]+(?P<value>.+)", re.DOTALL)
 
 
@@ -38,6 +39,9 @@ def slip_in_key(word: str, known: Collection[str], *, is_empty: bool) -> KeySlip
 
 
 def _write(key: str, value: str) -> str:
+    closing = _CLOSING.get(value[0], "")
+    if closing not in value:  # the key ends at the first colon within the brackets
+        value = f"{value[0]}...{closing}"
     return f"write '{key}: {shortened(value)}'"
 
 

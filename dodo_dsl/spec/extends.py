@@ -27,6 +27,11 @@ def is_open(node: Node) -> bool:
     return isinstance(node, Mapping) and KEY in node.entries
 
 
+def nothing_in(file: Path) -> Diagnostic:
+    """About a test's file without content, in the same words for itself and for those that extend it."""
+    return Diagnostic(Span(str(file)), "missing-key", "the file is empty, expected a test")
+
+
 def _resolve(node: Node, chain: tuple[Path, ...], root: Path, reader: Reader) -> tuple[Node, list[Diagnostic]]:
     written = node.get(KEY) if isinstance(node, Mapping) else None
     if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not isinstance(written.value, str):
@@ -39,7 +44,9 @@ def _resolve(node: Node, chain: tuple[Path, ...], root: Path, reader: Reader) ->
         return node, [problem]
     base, found = reader(path)
     if not isinstance(base, Mapping):
-        if not found:
+        if base is None and not found:
+            found = [nothing_in(path)]
+        elif not found:
             found = [Diagnostic(written.span, "extends-file", f"'{written.text}' does not contain a test")]
         return node, found
     below, deeper = _resolve(base, (*chain, path), root, reader)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
+from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.source import Mapping, Node, Reader, Scalar, read
 from dodo_dsl.spec import extends
 from dodo_dsl.spec.instances import matrix, vary
@@ -23,7 +23,7 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     node, found = reader(location.path)
     if node is None:
         if not found:
-            found = [Diagnostic(Span(str(location.path)), "missing-key", "the file is empty, expected a test")]
+            found = [extends.nothing_in(location.path)]
         return [Spec(location)], found
     node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root, reader)
     is_whole = not has_errors(problems)

@@ -154,7 +154,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
     spec = Spec(
         location,
         name=text("name"),
-        description=text("description"),
+        description=" ".join(description.split()) if (description := text("description")) else None,
         level=text("level"),
         kind=text("kind"),
         timeout_s=timeout,

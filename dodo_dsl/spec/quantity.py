@@ -4,6 +4,7 @@ import re
 from decimal import Decimal, InvalidOperation, localcontext
 
 from dodo_dsl.diagnostics import Fix, did_you_mean, only_fix
+from dodo_dsl.spec.quantity_slips import repaired, unit_meant
 
 SHARE = "1"
 """The unit of shares, which need none: 0.5 is 50 %."""
@@ -75,11 +76,12 @@ def convert(value: object, unit: str) -> Decimal:
         raise QuantityError(f"'{text[:20]}...' is not a quantity in {unit}", _example("1", unit))
     match = _QUANTITY.fullmatch(text)
     if unit == SHARE and (not match or _DIMENSION.get(match["unit"] or SHARE) != "share"):
-        raise QuantityError(f"'{text}' is not a share", "write for example 0.5 or 50 %")
+        hint, fix = repaired(text, lambda other: _is_quantity(other, unit))
+        raise QuantityError(f"'{text}' is not a share", hint or "write for example 0.5 or 50 %", fix)
     if not match:
-        point = text.replace(",", ".", 1)
-        hint = f"write '{point}', with a point" if _QUANTITY.fullmatch(point) else _example("1", unit)
-        raise QuantityError(f"'{text}' is not a quantity in {unit}", hint)
+        hint, fix = repaired(text, lambda other: _is_quantity(other, unit))
+        hint = hint or with_point(text) or _example("1", unit)
+        raise QuantityError(f"'{text}' is not a quantity in {unit}", hint, fix)
     if match["unit"] is None and unit == SHARE:
         return _converted(match["number"], SHARE, unit)
     if match["unit"] is None:
@@ -87,11 +89,27 @@ def convert(value: object, unit: str) -> Decimal:
     written = match["unit"]
     if written not in _DIMENSION:
         siblings = _FACTORS[_DIMENSION[unit]]
+        if fix := unit_meant(written, text, siblings):
+            raise QuantityError(f"unknown unit '{written}'", f"did you mean '{fix.new.strip()}'?", fix)
         raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings), only_fix(written, siblings))
     if _DIMENSION[written] != _DIMENSION[unit]:
         message = f"'{text}' is {_a(_DIMENSION[written])}, expected {_a(_DIMENSION[unit])} in {unit}"
         raise QuantityError(message, _example(match["number"], unit))
     return _converted(match["number"], written, unit)
+
+
+def _is_quantity(text: str, unit: str) -> bool:
+    try:
+        convert(text, unit)
+    except QuantityError:
+        return False
+    return True
+
+
+def with_point(text: str) -> str:
+    """A hint about a decimal comma; empty where there is none."""
+    point = text.replace(",", ".", 1)
+    return f"write '{point}', with a point" if point != text and _QUANTITY.fullmatch(point) else ""
 
 
 def written_unit(text: str) -> str | None:

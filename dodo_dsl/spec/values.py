@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Literal
 
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
-from dodo_dsl.source import Mapping, Node, Scalar, Sequence, path_of
+from dodo_dsl.source import Mapping, Node, Scalar, Sequence, path_of, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Parameter
+from dodo_dsl.spec.quantity_slips import boolean_meant, repaired
 
 Kind = Literal["text", "path", "memory"]
 
@@ -91,7 +92,8 @@ def _bare_number(parameter: Parameter, scalar: Scalar) -> Decimal:
         expected = "a whole number" if whole else "a number"
         rule = "wrong-unit" if re.match(r"[-+.]*\d[.\d]*\s*[A-Za-z%]", scalar.text) else "wrong-type"
         message = f"{_name(parameter)} is '{scalar.text}', expected {expected} without a unit"
-        raise ValueProblem(scalar.span, rule, message)
+        hint, fix = repaired(scalar.text, lambda text: type(resolve(text.strip())) in (int, float))
+        raise ValueProblem(scalar.span, rule, message, hint, fix)
     number = Decimal(str(scalar.value))
     if not number.is_finite():
         raise ValueProblem(
@@ -108,7 +110,10 @@ def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:
             expected = f"{low:g} to {high:g}{unit}"
         else:
             expected = f"at least {low:g}{unit}" if low is not None else f"at most {high:g}{unit}"
-        raise ValueProblem(scalar.span, "out-of-range", f"{_name(parameter)} is {scalar.text}, expected {expected}")
+        is_percent = parameter.unit == quantity.SHARE and high == 1 and 1 < number <= 100 and "%" not in scalar.text
+        hint = f"write '{scalar.text} %'" if is_percent else ""
+        message = f"{_name(parameter)} is {scalar.text}, expected {expected}"
+        raise ValueProblem(scalar.span, "out-of-range", message, hint)
     return Value(quantity.decimal_text(number))
 
 
@@ -132,7 +137,7 @@ def _boolean(parameter: Parameter, node: Node, _: Path) -> Value:
     scalar = _scalar(parameter, node, "true or false")
     if not isinstance(scalar.value, bool):
         message = f"{_name(parameter)} is '{scalar.text}', expected true or false"
-        raise ValueProblem(scalar.span, "wrong-type", message)
+        raise ValueProblem(scalar.span, "wrong-type", message, *boolean_meant(scalar.text))
     return Value("true" if scalar.value else "false")
 
 

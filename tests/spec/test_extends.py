@@ -68,7 +68,7 @@ def test_spans_keep_their_files(tmp_path: Path) -> None:
         ("none.dodo.yml", ("extends-file", "there is no file 'none.dodo.yml' to extend")),
         ("folder", ("extends-file", "'folder' is a folder, expected a test's file")),
         ("list.dodo.yml", ("extends-file", "'list.dodo.yml' does not contain a test")),
-        ("empty.dodo.yml", ("extends-file", "'empty.dodo.yml' does not contain a test")),
+        ("empty.dodo.yml", ("missing-key", "the file is empty, expected a test")),
         ("../up.dodo.yml", ("path-escape", "'../up.dodo.yml' leaves the registry")),
         ("own.dodo.yml", ("extends-cycle", "the test extends itself: own.dodo.yml extends own.dodo.yml")),
         ('"a\\0b"', ("extends-file", "'a\0b' is not a path")),

@@ -88,3 +88,9 @@ def test_specs_with_problems(old: str, new: str, rules: list[str], whole: bool, 
 def test_what_is_no_spec(text: str, rule: str, tmp_path: Path) -> None:
     (spec,), problems = loaded(tmp_path, text)
     assert (spec.title, problems) == ("example", [rule])
+
+
+def test_a_description_is_one_line(tmp_path: Path) -> None:
+    text = examples.SPEC.replace("description: Drive to", "description: >\n  Drive\n\n  to")
+    (spec,), problems = loaded(tmp_path, text)
+    assert (spec.description, problems) == ("Drive to the finish line.", [])

@@ -128,3 +128,11 @@ def test_paths_that_are_refused(text: str, rule: str, message: str, registry: Pa
         path(registry, text)
     found = problem.value.diagnostic
     assert (found.rule, found.message) == (rule, f"parameter 'p': {message}")
+
+
+@pytest.mark.parametrize(("text", "hint"), [("90", "write '90 %'"), ("150", ""), ("-1", ""), ("120 %", "")])
+def test_a_share_beyond_one_may_be_in_percent(text: str, hint: str) -> None:
+    with pytest.raises(ValueProblem) as problem:
+        convert(parameter("number", unit="1", minimum=0, maximum=1), value(text), ROOT)
+    assert problem.value.diagnostic.rule == "out-of-range"
+    assert problem.value.diagnostic.hint == hint

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import __version__, package_data
-from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Reader, Scalar, Sequence, path_of, plain, read
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, has_errors
+from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec.deployment import rig, service_folders
 from dodo_dsl.spec.deployment.given_limits import sandbox_limits
 from dodo_dsl.spec.deployment.rig import Rig
@@ -196,10 +196,18 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
             owner = f"rig '{taken[raw['cid']]}'" if raw["cid"] in taken else "real cars"
             message = f"CID {raw['cid']} is taken by {owner}, expected one that only this rig has"
             problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
+        problems.extend(_octal(written.value.get("cid")))
         taken.setdefault(raw["cid"], name)
         rigs[name] = found
         problems.extend(_tags(found))
     return rigs
+
+
+def _octal(cid: Node | None) -> Iterator[Diagnostic]:
+    if isinstance(cid, Scalar) and cid.text.startswith("0") and cid.text.isdecimal():
+        message = f"'cid' is {cid.text}, which other readers of YAML take for an octal number"
+        hint = f"write {cid.value}"
+        yield Diagnostic(cid.span, "wrong-value", message, hint, fix=Fix(cid.text, str(cid.value)))
 
 
 def _tags(found: Rig) -> Iterator[Diagnostic]:

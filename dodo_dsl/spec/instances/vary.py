@@ -43,7 +43,7 @@ def _number(text: str, unit: str) -> Decimal:
     if unit:
         return quantity.convert(text, unit)
     if quantity.written_unit(text) != "":
-        raise quantity.QuantityError(f"'{text[:60]}' is not a number without a unit")
+        raise quantity.QuantityError(f"'{text[:60]}' is not a number without a unit", quantity.with_point(text[:60]))
     return Decimal(text.strip())
 
 
@@ -101,7 +101,8 @@ def _range(name: str, entry: Entry, node: Mapping, middle: Scalar) -> tuple[Rang
     unit = quantity.written_unit(low.text)
     if unit is None:
         message = f"'from' is '{low.text[:60]}', expected a number or a quantity"
-        return none, [Diagnostic(low.span, "vary-range", message, "for other values write 'among: [plain, wood]'")]
+        hint = quantity.with_point(low.text) or "for other values write 'among: [plain, wood]'"
+        return none, [Diagnostic(low.span, "vary-range", message, hint)]
     return Range(name, middle, (low, high), unit), list(_of_numbers(middle, low, high, unit))
 
 

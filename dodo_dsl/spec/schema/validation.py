@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from dodo_dsl import __version__
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix, shown_path
 from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain
 from dodo_dsl.spec import quantity
+from dodo_dsl.spec.quantity_slips import boolean_meant
 from dodo_dsl.spec.schema.consequences import unindented, without_consequences
 from dodo_dsl.spec.schema.validity import OF_COMPOSE, UNIT, WORDS, check_quantity, is_valid, is_whole, schema_of
 
@@ -104,6 +105,8 @@ class _Place:
         self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
         self.name = name
         self.about: dict[str, Any] = {}
+        self.extended: dict[str, Entry] = {}
+        """What stands beside it in a file that its own extends."""
 
     @property
     def entries(self) -> dict[str, Entry]:
@@ -116,13 +119,17 @@ class _Place:
 
 def _locate(root: Node, path: Iterable[str | int]) -> _Place:
     node, key, name = root, None, "the file"
+    beside: dict[str, Entry] = {}
     for step in path:
         if isinstance(node, Mapping) and str(step) in node.entries:
-            entry = node.entries[str(step)]
+            entry, beside = node.entries[str(step)], node.entries
             node, key, name = entry.value, entry.key, f"'{step}'"
         elif isinstance(node, Sequence) and isinstance(step, int):
             node, key, name = node.items[step], None, f"item {step + 1} of {name}"
-    return _Place(node, key, name)
+    place = _Place(node, key, name)
+    if key is not None:
+        place.extended = {other: entry for other, entry in beside.items() if entry.key.file != key.file}
+    return place
 
 
 def _shown(value: object) -> str:
@@ -165,6 +172,8 @@ def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
     about = known.get(missing, {})
     about = about if isinstance(about, dict) else {}
     hint = f"write '{missing}: {about['const']}'" if "const" in about else about.get("description", "")
+    if near := closest(place.name.strip("'"), place.extended):
+        hint = f"did you mean '{near[0]}' of {shown_path(place.extended[near[0]].key.file)}?"
     yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
 
 
@@ -185,17 +194,31 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     message = f"{place.name} {found}, expected {' or '.join(names)}"
     is_scalar = isinstance(error.instance, int | float)
     in_quotes = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
-    hint = error.schema.get(_HINT, in_quotes)
+    hint, fix = error.schema.get(_HINT, in_quotes), None
     if not hint and wanted == "array" and "examples" in error.schema:
         hint = f"write for example {place.name[1:-1]}: [{', '.join(error.schema['examples'][0])}]"
     if wanted == "string" and place.name.endswith(_PAIRS) and isinstance(error.instance, dict) and error.instance:
         name, value = next((key, entry.value) for key, entry in place.entries.items())
         text = value.text if isinstance(value, Scalar) else "value"
         hint = f'write {name}: "{text}" without the dash, or - {name}={text}'
+    if not hint:
+        hint, fix = _meant(error.instance, wanted, place.name)
     span = place.span
     if isinstance(place.node, Sequence) and wanted == "object":
         span, hint = place.node.span, hint or "write 'key: value' in place of list items"
-    yield Diagnostic(span, "wrong-type", message, hint)
+    yield Diagnostic(span, "wrong-type", message, hint, fix=fix)
+
+
+def _meant(value: object, wanted: object, name: str) -> tuple[str, Fix | None]:
+    """A hint how to write a value of another type, and the only fix; empty and None for most values."""
+    if wanted == "boolean" and isinstance(value, str):
+        return boolean_meant(value)
+    if wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
+        return f"write {value}, without quotation marks", None
+    names = [value] if isinstance(value, str) else list(value)[:3] if isinstance(value, dict) else []
+    if wanted == "array" and names and name.startswith("'"):
+        return f"write {name[1:-1]}: [{', '.join(names)}]", None
+    return "", None
 
 
 def _kind(value: object) -> str:

@@ -1,0 +1,45 @@
+"""What values mean that are no quantities as they are written."""
+
+import pytest
+
+from dodo_dsl.spec.quantity import QuantityError, convert
+from dodo_dsl.spec.quantity_slips import boolean_meant
+
+MENDED = [
+    ("0.8 m/s# as on the car", "m/s", "0.8 m/s # as on the car"),
+    ("48.8 deg,", "deg", "48.8 deg"),
+    ("50 %;", "1", "50 %"),
+    ("\u221290 deg", "deg", "-90 deg"),
+    ("10 hz", "Hz", "10 Hz"),
+    ("1gb", "B", "1 GB"),
+    ("1 kb", "B", "1 kB"),
+    ("90\u00b0", "deg", "90 deg"),
+    ("90 \u00b0/s", "rad/s", "90 deg/s"),
+    ("2 m/s\u00b2", "m/s2", "2 m/s2"),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "mended"), MENDED)
+def test_a_value_with_exactly_one_fix(text: str, unit: str, mended: str) -> None:
+    with pytest.raises(QuantityError) as problem:
+        convert(text, unit)
+    assert problem.value.fix is not None
+    assert problem.value.hint
+    assert problem.value.fix.mended(text) == mended
+    convert(mended.partition(" #")[0], unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("5 x,", "m"), ("a# b", "m"), ("\u2212", "deg"), (",", "1"), ("10 q", "Hz")]
+)
+def test_values_without_one(text: str, unit: str) -> None:
+    with pytest.raises(QuantityError) as problem:
+        convert(text, unit)
+    assert problem.value.fix is None
+
+
+@pytest.mark.parametrize(("text", "meant"), [("Yes", "true"), ("on", "true"), ("NO", "false"), ("maybe", None)])
+def test_words_for_true_and_false(text: str, meant: str | None) -> None:
+    hint, fix = boolean_meant(text)
+    assert (fix.new if fix else None) == meant
+    assert bool(hint) == bool(meant)
