@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dodo_dsl.diagnostics import Fix
 from dodo_dsl.slips.failure import KEY, PLAIN_KEY, VALUES, Failure, Slip, indent, shortened
 
-_OPEN = re.compile(r" *(?:- )?(?P<key>[A-Za-z_][\w.-]*):\s*(?P<sign>[|>][-+\d]*)?\s*(?:#.*)?")
+_OPEN = re.compile(r" *(?:- )?(?P<key>[A-Za-z_][\w.-]*):(?:\s+(?P<sign>[|>][-+\d]*))?\s*(?:#.*)?")
 """A key whose value is in the lines below."""
 _ALIAS = re.compile(r"\s*(?P<alias>\*[\w.-]+)\s*(?:#.*)?")
 _FEW_WORDS = 4
@@ -20,6 +20,8 @@ def not_indented(failure: Failure) -> Iterator[Slip]:
     deep = indent(line := failure.line(number))
     if not found or deep > indent(failure.line(above)) or ": " in line or line.rstrip().endswith(":"):
         return
+    if any(written.strip() for written in failure.text.splitlines()[above + 1 : number]):
+        return  # the text of a block, or a comment
     if found["sign"] or indent(failure.below(number)) <= deep:
         message = f"this text begins in the column of '{found['key']}' above"
         yield Slip(number, deep, message, f"indent it: it is the value of '{found['key']}'")
@@ -29,8 +31,9 @@ def bare_alias(failure: Failure) -> Iterator[Slip]:
     """An alias among keys, which was meant to give more of them."""
     for number in (failure.suspect, failure.above(failure.mark[0]) if "expected key" in failure.problem else -1):
         if found := _ALIAS.fullmatch(failure.line(number)):
-            message = f"'{found['alias']}' stands among keys, expected a key before it"
-            yield Slip(number, found.start("alias"), message, f"write '<<: {found['alias']}'", fix=Fix("*", "<<: *"))
+            alias = shortened(found["alias"])
+            message = f"'{alias}' stands among keys, expected a key before it"
+            yield Slip(number, found.start("alias"), message, f"write '<<: {alias}'", fix=Fix("*", "<<: *"))
 
 
 def colon_further_down(failure: Failure) -> Iterator[Slip]:

@@ -10,6 +10,7 @@ from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
 
 MATRIX = "matrix"
+_MAX_ATTEMPT = 200
 _TYPOGRAPHIC = "\u2018\u2019\u201a\u201c\u201d\u201e\u00ab\u00bb\u2039\u203a"
 
 
@@ -76,7 +77,8 @@ class Placeholders:
 
     def _meant(self, node: Node, known: Collection[str]) -> str:
         """The known name in a value that is nothing but an attempt at its placeholder; empty for any other value."""
-        match = self._near.fullmatch(_written(node)) if known else None
+        written = _written(node)
+        match = self._near.fullmatch(written) if known and len(written) <= _MAX_ATTEMPT else None
         if match is None or match["name"] not in known:
             return ""
         around = match["begin"] + match["end"]
