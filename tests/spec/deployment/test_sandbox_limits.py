@@ -39,8 +39,3 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str, told: str) -> None:
     limits, (problem,) = deployed(tmp_path, f"sandbox:\n  {text}\n")
     assert problem.startswith("3: ") and told in problem
     assert limits == SandboxLimits()
-
-
-def test_a_whole_number_may_have_an_exponent(tmp_path: Path) -> None:
-    limits, problems = deployed(tmp_path, "sandbox: {processes: 1e3}\n")
-    assert (limits.processes, problems) == (1000, [])
