@@ -12,7 +12,7 @@ import pytest
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run import engine
 from tests.run.desk import processes_with
-from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
+from tests.run.helpers import AFTER_START, BEGUN, PASS, READY, STARTED, WAIT, Bench
 
 pytestmark = pytest.mark.slow
 
@@ -99,11 +99,11 @@ session = Session(int(sys.argv[1].removeprefix("--cid=")))
 
 
 def test_it_begins_when_the_application_has_joined_the_bus(bench: Bench) -> None:
-    plan = bench.plan(application=JOINS + STARTED + WAIT, judge=READY + AFTER_START + PASS)
+    plan = bench.plan(application=JOINS + STARTED + WAIT, judge=READY + BEGUN + PASS)
     (app,) = plan.application.services
     consuming = replace(app, inputs=("opendlv.sim.Frame",))
     (outcome,) = bench.run(replace(plan, application=replace(plan.application, services=(consuming,))))
-    assert (outcome.outcome, outcome.notes) == ("passed", ())
+    assert (outcome.outcome, outcome.notes) == ("passed", ()), outcome.reason
     assert outcome.setup_s is not None and outcome.setup_s > 0.5
 
 
