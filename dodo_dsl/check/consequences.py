@@ -1,4 +1,4 @@
-"""Leaves out what only follows from another problem, so that each mistake is told once."""
+"""Leaves out what only follows from another problem, so that each mistake is reported once."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

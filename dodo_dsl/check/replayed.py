@@ -17,7 +17,7 @@ _NO_STAMP = -1
 def may_send(service: ResolvedService, port: Port, ids: frozenset[tuple[str, int]]) -> bool:
     """Whether a service of which the manifest only says that it may send anything can send what a port consumes.
 
-    ``ids`` are names and numbers of messages. Of a recording that is too large or damaged, nobody knows.
+    ``ids`` are names and numbers of messages. A recording that is too large or damaged may hold any.
     """
     recordings = [a.value.path for a in service.arguments.values() if a.parameter.format == FORMAT and a.value]
     path = recordings[0] if len(recordings) == 1 else None

@@ -43,7 +43,7 @@ def _is_produced(context: RuleContext, end: End) -> bool:
 
 
 def _is_unknown(end: End, known: Collection[str]) -> bool:
-    """Whether it is a message that nobody knows, which is reported where it is written."""
+    """Whether it is an unknown message, which is reported where it is written."""
     return end.port.kind == "message" and end.port.name not in known
 
 
