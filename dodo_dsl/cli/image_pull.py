@@ -71,7 +71,8 @@ def _tests(options: argparse.Namespace) -> tuple[Checked, Rig]:
     checked = selection.select([], (), options.application)
     tests = tuple(test for test in checked.tests if test.spec.rig == options.rig)
     if not tests:
-        raise UsageError(f"no test runs on rig '{options.rig}'")
+        unread = "" if checked.ok else " of those without problems; dodo compile --check shows the others"
+        raise UsageError(f"no test runs on rig '{options.rig}'{unread}")
     if any(d.severity == "error" for test in tests for d in checked.by_rules.get(test.spec.path, ())):
         raise UsageError(f"tests of rig '{options.rig}' have problems; dodo compile --check shows them")
     return replace(checked, tests=tests), rigs[options.rig]

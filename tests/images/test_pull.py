@@ -143,6 +143,17 @@ def test_rigs_without_tests(tmp_path: Path, words: tuple[str, ...], said: str) -
     assert pull(tmp_path, "one:1", "", *words) == (Exit.USAGE, f"dodo images: {said}\n")
 
 
+def test_tests_that_cannot_be_read_may_be_the_rigs(tmp_path: Path) -> None:
+    pull(tmp_path, "one:1", "")
+    for spec in (tmp_path / "tests").rglob("*.dodo.yml"):
+        spec.write_text(spec.read_text() + "extends: ../nowhere.dodo.yml\n")
+    stdout = StringIO()
+    with contextlib.chdir(tmp_path):
+        assert main(["images", "pull", "--for", "desk"], stdout, stdout) == Exit.USAGE
+    said = "no test runs on rig 'desk' of those without problems; dodo compile --check shows the others"
+    assert stdout.getvalue() == f"dodo images: {said}\n"
+
+
 @pytest.fixture(scope="module")
 def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a registry of its own."""
