@@ -16,20 +16,20 @@ from benchmarks.ledger import budget, row
 from benchmarks.ledger.ledger import Bench
 
 SECONDS = {
-    "bench_bus": 36,
-    "bench_camera": 37,
-    "bench_compile": 68,
-    "bench_docker": 54,
+    "bench_bus": 33,
+    "bench_camera": 33,
+    "bench_compile": 58,
+    "bench_docker": 48,
     "bench_editor": 26,
-    "bench_lockstep": 62,
-    "bench_parallel": 62,
+    "bench_lockstep": 55,
+    "bench_parallel": 55,
     "bench_pull": 25,
     "bench_rec": 34,
-    "bench_recorder": 36,
-    "bench_replay": 36,
+    "bench_recorder": 33,
+    "bench_replay": 33,
     "bench_report": 20,
-    "bench_services": 37,
-    "bench_setup": 50,
+    "bench_services": 33,
+    "bench_setup": 46,
     "bench_startup": 16,
 }
 """Budgets of the benchmarks; of ten minutes they leave some for those that have to be ended."""

@@ -141,7 +141,8 @@ class Compose:
         log = self.report / "logs" / "build.log"
         code, _, problem = await self._run("build", *names, log=log, project=project)
         if code:
-            raise BackendError(f"the application's images cannot be built: {problem}; see {log.parent.name}/{log.name} of the test in the report")
+            where = f"{log.parent.name}/{log.name} of the test in the report"
+            raise BackendError(f"the application's images cannot be built: {problem}; see {where}")
         return ""
 
     async def create(self, subnets: Iterable[str], key: bytes) -> None:
