@@ -59,8 +59,8 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters or parameter.name in misspelt:
             continue
-        if parameter.rig and context.spec.rig and (not context.rig or context.rig.entry(parameter.rig)):
-            continue  # an unknown rig may give it, too
+        if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else _wants_rig(context)):
+            continue  # a rig that is unknown or missing may give it, too
         if parameter.shared and not context.spec.is_whole:
             continue  # a service that could not be read may give it
         givers = _givers(context, parameter.name) if parameter.shared else {}
@@ -73,6 +73,10 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
         if len(givers) > 1:
             hint = f"{' and '.join(givers.values())} give different values, so write the one to use"
         yield Diagnostic(use.span, "missing-parameter", message, hint)
+
+
+def _wants_rig(context: RuleContext) -> bool:
+    return bool(context.spec.rig) or context.spec.level == "hil"
 
 
 def _givers(context: RuleContext, name: str) -> dict[str, str]:

@@ -20,9 +20,9 @@ def members(pool: Pool, rigs: Known[str, Rig]) -> list[Rig]:
 
 
 def on_each(spec: Spec, rigs: Known[str, Rig]) -> list[Spec]:
-    """A spec with a pool on each of its rigs, any other as it is."""
+    """A spec with a pool on each of its rigs, any other as it is; rigs of another kind than the first are mistakes."""
     found = members(spec.pool, rigs) if spec.pool else []
-    return [_on(spec, rig) for rig in found] or [spec]
+    return [_on(spec, rig) for rig in found if rig.kind == found[0].kind] or [spec]
 
 
 def of_test(spec: Spec) -> Spec:
