@@ -12,7 +12,7 @@ from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec.deployment import rig, service_folders
-from dodo_dsl.spec.deployment.given_limits import sandbox_limits
+from dodo_dsl.spec.deployment.given_limits import sandbox_limits, size_problems
 from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.schema.validation import validate
@@ -106,7 +106,7 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
         sandbox=sandbox_limits(node.entries.get("sandbox")),
     )
     _odvd(node.entries.get("messages"), deployment.messages, problems)
-    problems += service_folders.problems(path.parent, node.get("services"))
+    problems += [*size_problems(node.get("sandbox")), *service_folders.problems(path.parent, node.get("services"))]
     return deployment, [*found, *problems]
 
 
@@ -200,6 +200,7 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
         taken.setdefault(raw["cid"], name)
         rigs[name] = found
         problems.extend(_tags(found))
+        problems.extend(size_problems(written.value))
     return rigs
 
 

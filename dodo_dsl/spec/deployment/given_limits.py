@@ -1,8 +1,24 @@
-"""The key ``sandbox`` of ``dodo.yml``."""
+"""The key ``sandbox`` of ``dodo.yml``, and whether the sizes there can be."""
 
+from collections.abc import Iterator
+
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Entry, Mapping, Scalar, Sequence
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.quantity import convert
+
+_LEAST = {"memory": "6 MB", "file-size": "1 kB", "disk": "1 MB"}
+"""The least sizes; Docker takes no limit of memory below 6 MB."""
+_MOST = "1000000 GB"
+
+
+def size_problems(node: object) -> Iterator[Diagnostic]:
+    """Sizes in ``sandbox`` or a rig that are too small or beyond any computer; ``node`` is a valid one, or None."""
+    for key, least in _LEAST.items() if isinstance(node, Mapping) else ():
+        size = node.get(key) if isinstance(node, Mapping) else None
+        if isinstance(size, Scalar) and not convert(least, "B") <= convert(size.text, "B") <= convert(_MOST, "B"):
+            message = f"'{key}' is {size.text}, expected {least} to {_MOST}"
+            yield Diagnostic(size.span, "out-of-range", message)
 
 
 def sandbox_limits(entry: Entry | None) -> SandboxLimits:
