@@ -85,7 +85,10 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _copied(service: ComposeService, node: Node, setting: Setting, changes: list[str]) -> dict[str, Any]:
-    kept = {key: value for key, value in plain(node).items() if key not in KEYS}
+    """The service rewritten, without keys that have no value, most of which compose refuses."""
+    kept = {key: value for key, value in plain(node).items() if key not in KEYS and value is not None}
+    if isinstance(build := kept.get("build"), dict):
+        kept["build"] = {key: value for key, value in build.items() if value is not None}
     copy = ServiceCopy(service.name, kept, setting, changes)
     cid_and_image.assign_cid(copy, service.cid_variables)
     for step in _STEPS:

@@ -89,3 +89,11 @@ def test_processes(tmp_path: Path) -> None:
     assert steering.process is None
     assert (steering.takes_cid, steering.takes_memory) == (True, False)
     assert steering.environment == {"OD4SESSION_CID": "140", "GAIN": "2"}
+
+
+def test_keys_without_a_value_are_left_out(tmp_path: Path) -> None:
+    build = "{context: ., target: , args: {A: }}"
+    text = f"services: {{a: {{image: a, command: --cid=111, environment: , env_file: , platform: , build: {build}}}}}"
+    service = planned(tmp_path, text).compose["services"]["a"]
+    assert not {"environment", "env_file", "platform"} & set(service)
+    assert service["build"] == {"context": "../../team", "args": {"A": None}}
