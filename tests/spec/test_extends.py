@@ -110,3 +110,23 @@ def test_a_spec_on_what_cannot_be_read_stays_open(tmp_path: Path, text: str, bas
     node, _ = read(file)
     assert node is not None
     assert is_open(resolve(node, file, tmp_path)[0]) is expected
+
+
+@pytest.mark.parametrize(
+    ("written", "hint"),
+    [
+        ("first", "did you mean '../first/first.dodo.yml'?"),
+        ("../frist/first.dodo.yml", "did you mean '../first/first.dodo.yml'?"),
+        ("dodo:first", "'dodo new NAME --extends TEST' copies a test that ships with DoDo"),
+        ("../first/frist.dodo.yml", "did you mean 'first.dodo.yml'?"),
+        ("other.dodo.yml", ""),
+    ],
+)
+def test_hints_for_what_is_not_there(written: str, hint: str, tmp_path: Path) -> None:
+    for name, text in (("first", BASE), ("own", f"extends: {written}\n")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{name}.dodo.yml").write_text(text)
+    file = tmp_path / "own" / "own.dodo.yml"
+    node, _ = read(file)
+    assert node is not None
+    assert [problem.hint for problem in resolve(node, file, tmp_path)[1]] == [hint]
