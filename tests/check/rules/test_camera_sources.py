@@ -24,6 +24,8 @@ def example(rig: str, source: str, width: int = 640) -> str:
         ("kiwi", "rpicam", 600, 1),
         ("kiwi", "emulated", 640, 1),
         ("kiwi", "webcam", 640, 1),
+        ("kiwi", "file", 640, 1),
+        ("kiwi", "rpicam", 641, 1),
     ],
 )
 def test_sources(rig: str, source: str, width: int, count: int, tmp_path: Path) -> None:
@@ -35,3 +37,33 @@ def test_ways_out(tmp_path: Path) -> None:
     assert (problem.message, problem.hint) == ("'rpicm' is not a source of pictures", "did you mean 'rpicam'?")
     (problem,) = check(context(example("kiwi", "rpicam", 600), tmp_path))
     assert problem.hint == "write a width of 576"
+
+
+@pytest.mark.parametrize(
+    ("source", "written", "said"),
+    [
+        ("rpicam", "freq: 10 Hz", []),
+        ("rpicam", "freq: 30 Hz, exposure: 33 ms", []),
+        ("drive.rec", "freq: 30 Hz", []),
+        ("/dev/video0", "freq: 30 Hz", ["an exposure of 100 ms does not fit into the 33.3 ms between two pictures"]),
+        ("rpicam", "exposure: 0.2 s", ["an exposure of 200 ms does not fit into the 100 ms between two pictures"]),
+    ],
+)
+def test_exposures(source: str, written: str, said: list[str], tmp_path: Path) -> None:
+    test = example("kiwi", source).replace("{uses: camera}", f"{{uses: camera, with: {{{written}}}}}")
+    assert [message for _, message in found(check, test, tmp_path)] == said
+
+
+@pytest.mark.parametrize(("level", "camera"), [("sil", "virtual-camera"), ("hil\nrig: kiwi", "camera")])
+def test_odd_sizes(level: str, camera: str, tmp_path: Path) -> None:
+    test = f"level: {level}\nenvironment:\n  camera: {{uses: {camera}, with: {{width: 641, height: 479}}}}\n"
+    test += "# dodo.yml\nrigs: {kiwi: {kind: static, cid: 121, camera: {source: /dev/video0}}}\n"
+    assert found(check, test, tmp_path) == [
+        ("out-of-range", "parameter 'width' is 641, expected an even number"),
+        ("out-of-range", "parameter 'height' is 479, expected an even number"),
+    ]
+
+
+def test_an_odd_height_of_a_raspberry_pi_s_camera(tmp_path: Path) -> None:
+    test = example("kiwi", "rpicam").replace("height: 480", "height: 479")
+    assert [rule for rule, _ in found(check, test, tmp_path)] == ["out-of-range"]
