@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Entry
@@ -64,7 +64,15 @@ def argument(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Arg
     try:
         return Argument(parameter, entry, convert(parameter, entry.value, spec.location.root))
     except ValueProblem as problem:
-        return Argument(parameter, entry, None, problem.diagnostic)
+        return Argument(parameter, entry, None, _where_written(problem.diagnostic, entry, parameter, rig))
+
+
+def _where_written(problem: Diagnostic, entry: Entry, parameter: Parameter, rig: Rig | None) -> Diagnostic:
+    """The problem of a value that the rig gives, under the key that it has there."""
+    if rig is None or not parameter.rig or entry is not rig.entry(parameter.rig):
+        return problem
+    own, given = f"parameter '{parameter.name}'", f"'{parameter.rig}' of rig '{rig.name}'"
+    return replace(problem, message=problem.message.replace(own, given, 1))
 
 
 def resolved(
