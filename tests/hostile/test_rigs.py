@@ -339,8 +339,8 @@ def test_places_come_from_the_operator_and_not_from_variables(
             "an absolute path|absolute path",
         ),
         ("dodo: 1\nleases: here\n", 0o644, "an absolute path"),
-        ("dodo: [\n", 0o644, "error"),
-        ("\xff", 0o644, "error|cannot be read"),
+        ("dodo: [\n", 0o644, "not YAML"),
+        ("\xff", 0o644, "cannot be read"),
     ],
 )
 def test_a_file_of_the_operator_that_cannot_be_used_stops_everything(
@@ -357,6 +357,22 @@ def test_a_file_of_the_operator_that_cannot_be_used_stops_everything(
     rig(repository)
     code, output = dodo("rig", "home", "fake")
     assert code in (2, 3) and "Traceback" not in output and "internal error" not in output
+
+
+def test_a_mistake_of_the_operator_is_told_once_with_its_place_and_its_fix(
+    repository: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = repository / "rigs.yml"
+    path.write_text("dodo: 1\nrigs:\n  ours: {devices: [/dev/null], limits: {x: 1.5, z: 1 m}}\n")
+    path.chmod(0o644)
+    monkeypatch.setattr(operator, "FILE", path)
+    with pytest.raises(MachineError) as caught:
+        machine()
+    said = f"{path}:3:44: 'x': '1.5' has no unit, expected a length in m; write for example '1.5 m'"
+    assert str(caught.value) == said
+    with pytest.raises(RigProblem) as refused:
+        permission.refuse_forbidden([], {}, [repository])
+    assert str(refused.value) == said
 
 
 def test_without_a_file_there_is_nothing_to_permit(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:

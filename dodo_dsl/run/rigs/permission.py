@@ -27,7 +27,7 @@ def refuse_forbidden(devices: Iterable[str], motion: Motion, roots: Sequence[Pat
     try:
         known = operator.machine()
     except operator.MachineError as error:
-        raise RigProblem(f"{error.filename}: {error.strerror}") from None
+        raise RigProblem(str(error)) from None
     if known is None:
         return
     for device in devices:

@@ -32,10 +32,8 @@ def folder(is_hardware: bool = False) -> Path:
         if operators is not None and operators.quarantine is not None:
             return operators.quarantine
         return account_path("rigs") if is_hardware else state_path(FOLDER_VARIABLE, "rigs")
-    except NoStateFolder as error:
+    except (NoStateFolder, MachineError) as error:
         raise RigProblem(f"quarantines cannot be kept: {error}") from error
-    except MachineError as error:
-        raise RigProblem(f"quarantines cannot be kept: {error.filename}: {error.strerror}") from error
 
 
 def _files(rig: str, devices: Sequence[str]) -> list[Path]:

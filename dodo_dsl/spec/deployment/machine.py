@@ -7,10 +7,11 @@ repositories whose tests may move them. A repository's ``dodo.yml`` can only be 
 import functools
 import os
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dodo_dsl.diagnostics import format_text
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Mapping, parse, plain
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.deployment.rig import LIMIT_UNITS
@@ -25,6 +26,9 @@ DENSITIES = {"x": "steps/m", "y": "steps/m", "yaw": "steps/deg"}
 
 class MachineError(OSError):
     """The operator's file cannot be used; one sentence."""
+
+    def __str__(self) -> str:
+        return f"{self.filename}: {self.strerror}"
 
 
 @dataclass(frozen=True)
@@ -73,11 +77,19 @@ def _read(path: Path, _changed: int) -> Machine:
     node, found = parse(text, str(path))
     problems = [*found, *(validate(node, "machine") if node is not None else ())]
     if problems or not isinstance(node, Mapping):
-        said = format_text(problems[:1]).splitlines()
-        raise MachineError(None, said[0] if said else "is empty, expected 'dodo: 1'", str(path))
+        raise MachineError(None, *_first(problems, path))
     raw = plain(node)
     places = {key: Path(raw[key]) if key in raw else None for key in ("leases", "quarantine")}
     return Machine(tuple(_rig(path, name, rig) for name, rig in (raw.get("rigs") or {}).items()), **places)
+
+
+def _first(problems: Sequence[Diagnostic], path: Path) -> tuple[str, str]:
+    """The first problem of a file in its order, with its hint, and its place."""
+    if not problems:
+        return "is empty, expected 'dodo: 1'", str(path)
+    first = min(problems, key=lambda d: (d.span.line, d.span.column))
+    hint = f"; {first.hint}" if first.hint else ""
+    return f"{first.message}{hint}", f"{path}:{first.span.line}:{first.span.column}"
 
 
 def _rig(path: Path, name: str, raw: dict[str, object]) -> PermittedRig:
