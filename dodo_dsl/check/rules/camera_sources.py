@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import PurePath
 
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
 
@@ -35,7 +35,8 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
 def _problems(context: RuleContext, service: ResolvedService, argument: Argument) -> Iterator[Diagnostic]:
     source, span = argument.text or "", _span(service, argument)
     if source not in _NAMES and not source.startswith("/dev/") and not PurePath(source).suffix:
-        hint = did_you_mean(source, list(_NAMES)) or "write a device such as /dev/video0, rpicam or file"
+        known = "write a device such as /dev/video0, rpicam or file"
+        hint = did_you_mean(source, _NAMES) if closest(source, _NAMES) else known
         yield Diagnostic(span, "camera-source", f"'{source}' is not a source of pictures", hint)
     elif source == EMULATED and context.rig is not None and not context.rig.is_emulated:
         message = f"rig '{context.rig.name}' is hardware, and an emulated camera sees nothing of it"
