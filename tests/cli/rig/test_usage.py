@@ -54,6 +54,23 @@ def test_constants_of_the_rig_are_flags_of_the_gantry(folder: Path) -> None:
     assert flags == ["--steps-x=3300", "--offset-x=2990.5", "--steps-yaw=0.549778714378214"]
 
 
+@pytest.mark.parametrize(
+    ("about", "said"),
+    [
+        ("limits: {x: 2 m}", "dodo.yml:2:52: parameter 'limits.x' is 2 m, expected 0.01 to 1.9 m"),
+        ("limits: {speed: 5 m/s}", "dodo.yml:2:56: parameter 'limits.speed' is 5 m/s, expected 0.01 to 1 m/s"),
+        ("axes: {x: {steps: 5000 steps/m}}",
+         "dodo.yml:2:58: parameter 'axes.x.steps' is 5000 steps/m, expected 2988 to 3652 steps/m"),
+    ],
+)  # fmt: skip
+def test_a_limit_that_the_gantry_refuses_is_named_as_it_is_written(folder: Path, about: str, said: str) -> None:
+    (folder / "dodo.yml").write_text(
+        f"dodo: 1\nrigs: {{desk: {{kind: dynamic, cid: 120, {about}, serial: /dev/none}}}}\n"
+    )
+    assert rig("calibrate", "desk") == (2, "", f"dodo rig: {said}\n")
+    assert rig("status", "desk") == (3, f"desk: {said}\n", "")
+
+
 def test_a_result_in_words() -> None:
     result = {"rig": "desk", "quarantine": "", "says": "ready", "x": 0.1, "y": -0.25, "yaw": 90.0}
     assert command._sentence(result) == "desk: ready, x = 0.100 m, y = -0.250 m, yaw = 90.0 degrees"
