@@ -1,7 +1,9 @@
 """The serial port to the rig's Arduino."""
 
 import contextlib
+import errno
 import fcntl
+import grp
 import logging
 import os
 import re
@@ -53,6 +55,10 @@ class SerialPort:
             )
         except termios.error as error:
             raise OSError(f"{target} is not a serial port: {error.args[-1]}") from None
+        except serial.SerialException as error:
+            if error.errno == errno.EACCES:
+                raise OSError(_refusal(Path(target).stat())) from None
+            raise
         _keep(target, self._port)
 
     def write(self, data: bytes) -> None:
@@ -93,6 +99,20 @@ def _as_os_errors() -> Iterator[None]:
         yield
     except (termios.error, TypeError, ValueError) as error:
         raise OSError(f"the port is gone: {error}") from None
+
+
+def _refusal(device: os.stat_result) -> str:
+    """Why a device is not opened, and the group that may, where there is one beside root's."""
+    may = device.st_mode & 0o060 == 0o060 and device.st_gid != 0
+    way = f"; add it to the group '{_group_name(device.st_gid)}'" if may else ""
+    return f"this user may not open it{way}"
+
+
+def _group_name(number: int) -> str:
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)
 
 
 def _keep(target: str, port: serial.SerialBase) -> None:

@@ -1,12 +1,14 @@
 """The serial port on a pseudo terminal."""
 
 import contextlib
+import errno
 import fcntl
 import os
 import pty
 import termios
 import tty
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -36,6 +38,27 @@ def test_a_port_is_ours_alone_and_resets_nothing_when_it_is_closed(terminal: tup
         held = bytearray(4)
         fcntl.ioctl(slave, 0x80045440, held)  # TIOCGEXCL
         assert int.from_bytes(held, "little") == 1
+
+
+@pytest.mark.parametrize(
+    ("mode", "group", "said"),
+    [
+        (0o660, 0, "this user may not open it"),
+        (0o600, 54321, "this user may not open it"),
+        (0o660, 54321, "this user may not open it; add it to the group '54321'"),
+    ],
+)
+def test_a_port_without_permission_names_the_group_that_has_it(
+    terminal: tuple[int, str], monkeypatch: pytest.MonkeyPatch, mode: int, group: int, said: str
+) -> None:
+    def refuse(*_: Any) -> int:
+        raise PermissionError(errno.EACCES, "Permission denied", terminal[1])
+
+    device = os.stat_result((mode, 0, 0, 1, 0, group, 0, 0, 0, 0))
+    monkeypatch.setattr(os, "open", refuse)
+    monkeypatch.setattr(Path, "stat", lambda _: device)
+    with pytest.raises(OSError, match=f"^{said}$"):
+        SerialPort(terminal[1])
 
 
 def test_what_cannot_be_kept_is_said(
