@@ -1,6 +1,7 @@
 """dodo rig: operate a rig manually: its status, motion, calibration, quarantine and camera."""
 
 import argparse
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
@@ -137,7 +138,9 @@ def _limits_sentence(limits: Mapping[str, Any]) -> list[str]:
     if limits.get("from", "built") == "built":
         return []
     what = "its memory is damaged, and these limits hold" if limits["from"] == "damaged" else "limits in its memory"
-    return [f"{what}: " + ", ".join(f"{name} {limits[name]:g} {unit}" for name, unit in LIMIT_UNITS.items())]
+    shown = {name: f"{limits[name]:g} {unit}" for name, unit in LIMIT_UNITS.items()}
+    shown["yaw"] = f"{math.degrees(limits['yaw']):.4g} deg"
+    return [f"{what}: " + ", ".join(f"{name} {text}" for name, text in shown.items())]
 
 
 def _sentence(result: dict[str, Any]) -> str:

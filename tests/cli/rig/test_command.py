@@ -40,7 +40,7 @@ def test_calibrate_writes_the_limits_of_the_file_into_the_rig_and_status_shows_t
     said = place.dodo("rig", "goto", "fake", "0", "0", "0", code=3)
     assert "has other limits than its file: y 1.4 m, expected y 1 m; calibrate it" in said
     place.dodo("rig", "calibrate", "fake", code=0)
-    assert "limits in its memory: x 1.85 m, y 1 m, yaw 2.96706 rad, speed 1 m/s" in place.dodo("rig", "status", code=0)
+    assert "limits in its memory: x 1.85 m, y 1 m, yaw 170 deg, speed 1 m/s" in place.dodo("rig", "status", code=0)
     place.rig.source = 2
     assert "its memory is damaged" in place.dodo("rig", "status", code=0)
 
