@@ -57,16 +57,21 @@ def _of_folder(folder: Path, say: Callable[[str], None]) -> list[View]:
     files = sorted(file for file in folder.iterdir() if file.suffix.lower() in (".png", ".jpg", ".jpeg"))
     if not files:
         raise UsageError(f"--pictures: {folder} has no .png or .jpg")
-    found = [(file, _seen(file.read_bytes())) for file in files]
-    for file, seen in found:
-        if seen is None:
-            say(f"{file}: not used, as it shows fewer than {FEWEST_CORNERS} corners of the board")
-    return [seen for _, seen in found if seen]
+    views = []
+    for file in files:
+        picture = _picture(file.read_bytes())
+        seen = None if picture is None else view(picture)
+        if seen is not None:
+            views.append(seen)
+        else:
+            reason = "is no picture" if picture is None else f"shows fewer than {FEWEST_CORNERS} corners of the board"
+            say(f"{file}: not used, as it {reason}")
+    return views
 
 
-def _seen(data: bytes) -> View | None:
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
-    return None if picture is None else view(picture)
+def _picture(data: bytes) -> Any:
+    """The grey picture of a file's bytes; None where they are none."""
+    return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
 
 
 def _of_camera(
@@ -89,7 +94,8 @@ def _of_camera(
         while len(views) < PICTURES:
             ask(f"picture {len(views) + 1} of {PICTURES}: hold the board still, and press Enter ")
             query((snapshot.program, [*snapshot.words, f"--output={path}"]))
-            seen = _seen(path.read_bytes())
+            picture = _picture(path.read_bytes())
+            seen = None if picture is None else view(picture)
             if seen is None:
                 say(f"it shows fewer than {FEWEST_CORNERS} corners of the board: once more")
             else:

@@ -40,7 +40,7 @@ def test_a_camera_is_measured_by_pictures_and_written(tmp_path: Path, monkeypatc
     assert json.loads(dodo("measure", "desk", "--pictures", "seen", "--dry-run", "--json", code=0).split("\n", 1)[1])
     assert (tmp_path / "dodo.yml").read_text() == RIGS
     said = dodo("measure", "desk", "--pictures", "seen", code=0)
-    assert "none.jpg: not used" in said and "desk: 9 pictures of 640 x 480: focal-x " in said
+    assert "none.jpg: not used, as it is no picture" in said and "desk: 9 pictures of 640 x 480: focal-x " in said
     text = (tmp_path / "dodo.yml").read_text()
     assert text.endswith("}}}  # mine\n")
     found = yaml.safe_load(text)["rigs"]["desk"]["camera"]
