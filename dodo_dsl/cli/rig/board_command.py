@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from dodo_dsl import atomic
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.rec.outputs import refuse_existing
 
 SUMMARY = "write the board by which a camera is measured, to be printed"
@@ -18,9 +19,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def make(options: argparse.Namespace) -> str:
-    """Writes the board; a sentence about it. Raises OutputExists and OSError."""
+    """Writes the board; a sentence about it. Raises UsageError, OutputExists and OSError."""
     from dodo_dsl.calibration import board  # OpenCV takes a second to import
 
+    if options.output.suffix.lower() != ".svg":
+        raise UsageError(f"'{options.output}' is no name of an SVG file, expected one that ends in .svg")
     refuse_existing([options.output], options.force)
     atomic.write_text(options.output, board.svg())
     squares = f"{board.COLUMNS} x {board.ROWS} squares of {board.SQUARE:g} mm"

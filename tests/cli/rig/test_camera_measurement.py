@@ -99,3 +99,9 @@ def test_the_board_is_written_once(tmp_path: Path) -> None:
     assert "9 x 6 squares of 28 mm on A4" in dodo("board", "-o", str(file), code=0)
     assert file.read_text().startswith("<svg ")
     assert "exists" in dodo("board", "-o", str(file), code=2)
+
+
+def test_the_board_is_an_svg_file(tmp_path: Path) -> None:
+    said = dodo("board", "-o", str(tmp_path / "board.png"), code=2)
+    assert "is no name of an SVG file, expected one that ends in .svg" in said
+    assert not (tmp_path / "board.png").exists()
