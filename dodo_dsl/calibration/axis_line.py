@@ -88,7 +88,8 @@ def fit(axis: Axis, readings: Sequence[Reading]) -> AxisLine:
     axis' tolerance.
     """
     if len(readings) < FEWEST:
-        raise CalibrationProblem(f"{axis.name} has {len(readings)} readings, expected at least {FEWEST}")
+        noun = "reading" if len(readings) == 1 else "readings"
+        raise CalibrationProblem(f"{axis.name} has {len(readings)} {noun}, expected at least {FEWEST}")
     places = [reading.place for reading in readings]
     if (spread := max(places) - min(places)) < axis.span:
         text = f"the readings of {axis.name} span {axis.shown(spread)}, expected at least {axis.shown(axis.span)}"

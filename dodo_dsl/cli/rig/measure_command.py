@@ -18,6 +18,7 @@ from dodo_dsl.cli.rig.asking import asker
 from dodo_dsl.cli.rig.axis_session import AxisSession
 from dodo_dsl.run.rigs.access import MANUAL, occupied
 from dodo_dsl.run.rigs.permission import refuse_forbidden
+from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.rigs.rig_leases import devices_in
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.deployment.rig import CIRCLE, Rig
@@ -85,6 +86,10 @@ def measure(options: argparse.Namespace, deployment: Deployment, rig: Rig, stdou
         if any(found.values()) and not getattr(problem, "usage", False):
             stderr.write(f"nothing is written; the readings:\n{written_readings.as_text(found)}")
         return Exit.USAGE if getattr(problem, "usage", False) else Exit.PROBLEMS
+    except (UsageError, RigProblem, KeyboardInterrupt):
+        if any(found.values()):
+            stderr.write(f"\nnothing is written; the readings until then:\n{written_readings.as_text(found)}")
+        raise
     stdout.write(_json(rig, lines, found, file) if options.json else _text(rig, lines, found, file))
     return Exit.OK
 

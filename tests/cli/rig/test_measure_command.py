@@ -83,6 +83,7 @@ def test_a_file_of_which_one_reading_is_off_is_refused_with_its_place(folder: Pa
         (["desk", "--reading", "x:1"], 2, "'x:1' is not a reading, expected AXIS:STEPS:PLACE"),
         (["desk", "--readings", "none.yml"], 2, "none.yml:1: cannot read the file"),
         (["desk", *EXACT, "--axes", "x,y"], 1, "y has 0 readings, expected at least 4"),
+        (["desk", *EXACT[:1]], 1, "x has 1 reading, expected at least 4"),
         (["desk", *(word.replace("mm", "cm") for word in EXACT)], 1, "expected 2988 to 3652: are units, signs and"),
     ],
 )
@@ -137,3 +138,11 @@ def test_others_wait_while_the_operator_reads_and_the_end_of_answers_ends_it(
     assert "standard input ended; --readings FILE, --reading or --pictures FOLDER needs no answers" in said
     assert "test 'dodo rig measure'" in others[0]
     assert not place.rig.received
+
+
+@pytest.mark.realtime
+def test_readings_are_shown_when_the_answers_end_early(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", Operator(place.rig, {1: "\n", 2: "-700 mm\n", 3: ""}.get))
+    said = place.dodo("rig", "measure", "fake", "--axes", "x", code=2)
+    assert "nothing is written; the readings until then:\nx:\n  - {steps: " in said
+    assert "reads: -700.0000 mm}\n" in said and "standard input ended" in said
