@@ -76,7 +76,7 @@ class Link:
             answers = self._answers(self._port, patience)
         except OSError as error:
             self._let_go()
-            self._miss(str(error))
+            self._miss(error.strerror or str(error))
             return LinkAnswers()
         if self._now() - self._last_state > SILENCE:
             self._miss("it does not answer")
@@ -128,7 +128,9 @@ class Link:
             self._port, self._lines = self._open(), LineReader()
         except OSError as error:
             if now - self._last_state > PATIENCE:
-                raise PortError(f"the line to the rig at {self.name} cannot be opened: {error}") from None
+                raise PortError(
+                    f"the line to the rig at {self.name} cannot be opened: {error.strerror or error}"
+                ) from None
             return False
         return True
 
