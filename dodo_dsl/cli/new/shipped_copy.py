@@ -13,6 +13,7 @@ from dodo_dsl.plan.test_files import copies
 from dodo_dsl.source import Mapping as Written
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import extends
+from dodo_dsl.spec.instances import vary
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import LAYERS, Spec
 from dodo_dsl.spec.values import ValueProblem, convert
@@ -41,6 +42,9 @@ def _text(name: str, base: Spec) -> bytes:
     if not isinstance(resolved, Written):
         raise UsageError(f"'{base.name}' cannot be read, so it cannot be copied")
     written = plain(resolved)
+    used = vary.PLACEHOLDERS.used(resolved)
+    ranges = {key: one for key, one in written.pop(vary.KEY, {}).items() if key in used}
+    written |= {vary.KEY: ranges} if ranges else {}
     rest = {key: value for key, value in written.items() if key not in ("dodo", "name", *LAYERS)}
     keys = {"dodo": 1, "name": name, **rest, **{key: written[key] for key in LAYERS if key in written}}
     text = yaml.safe_dump(keys, sort_keys=False, default_flow_style=None, width=1000, allow_unicode=True)

@@ -243,6 +243,7 @@ def test_a_shipped_test_is_copied_with_what_it_refers_to(repository: Path, shipp
     assert f"copied, because '{shipped}' ships with DoDo" in out
     code, out, err = dodo("compile", "--check")
     assert (code, err) == (0, ""), out
+    assert "vary-unused" not in out
     spec = yaml.safe_load((repository / "tests/my-own/my-own.dodo.yml").read_text())
     assert (spec["name"], "extends" in spec) == ("my-own", False)
     text = (repository / "tests/my-own/my-own.dodo.yml").read_text()
