@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+import signal
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -22,6 +23,11 @@ from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
 from dodo_dsl.run.services.service_output import ServiceOutput
+
+_KILLED = 128 + signal.SIGKILL
+"""The exit code of a container whose program was killed by a signal that it cannot refuse."""
+_MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
+"""How often, and how long each time, the engine's word is awaited that it was for memory: it may come late."""
 
 
 class DockerBackend:
@@ -97,7 +103,24 @@ class DockerBackend:
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
-        self._events.put_nowait(Exited(name, code, name in self._out_of_memory))
+        self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
+
+    async def _was_out_of_memory(self, name: str, code: int) -> bool:
+        for _ in range(_MEMORY_TURNS):
+            if code != _KILLED or name in self._out_of_memory:
+                break
+            await asyncio.sleep(_MEMORY_TURN_S)
+        else:
+            return await asyncio.to_thread(self._was_killed_for_memory, name)
+        return name in self._out_of_memory
+
+    def _was_killed_for_memory(self, name: str) -> bool:
+        from docker.errors import DockerException
+
+        with contextlib.suppress(DockerException, OSError):
+            self._containers[name].reload()
+            return bool(self._containers[name].attrs["State"].get("OOMKilled"))
+        return False
 
     async def start(self, layer: str) -> dict[str, bool]:
         names = [s.name for s in self.plan.layer(layer)]
