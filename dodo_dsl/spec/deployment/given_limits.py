@@ -14,8 +14,10 @@ _MOST = "1000000 GB"
 
 def size_problems(node: object) -> Iterator[Diagnostic]:
     """Sizes in ``sandbox`` or a rig that are too small or beyond any computer; ``node`` is a valid one, or None."""
-    for key, least in _LEAST.items() if isinstance(node, Mapping) else ():
-        size = node.get(key) if isinstance(node, Mapping) else None
+    if not isinstance(node, Mapping):
+        return
+    for key, least in _LEAST.items():
+        size = node.get(key)
         if isinstance(size, Scalar) and not convert(least, "B") <= convert(size.text, "B") <= convert(_MOST, "B"):
             message = f"'{key}' is {size.text}, expected {least} to {_MOST}"
             yield Diagnostic(size.span, "out-of-range", message)
