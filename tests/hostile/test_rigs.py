@@ -359,7 +359,7 @@ def test_a_file_of_the_operator_that_cannot_be_used_stops_everything(
     assert code in (2, 3) and "Traceback" not in output and "internal error" not in output
 
 
-def test_a_mistake_of_the_operator_is_told_once_with_its_place_and_its_fix(
+def test_a_mistake_of_the_operator_is_reported_once_with_its_line_and_its_fix(
     repository: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = repository / "rigs.yml"
