@@ -16,12 +16,13 @@ PARTS := realtime-tests engine-tests fast-tests slow-tests first second
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware format goldens schema site clean
+.PHONY: help demo check test proof dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware format goldens schema site clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
 	@echo "make check    format, lint, types, imports, and the tests that need only Python: two minutes"
 	@echo "make test     set up, then every check and every test: a quarter of an hour"
+	@echo "make proof    what takes long to prove: every fault, every mutant of the firmware, the learned driver"
 	@echo "make lint     format, lint, types, imports"
 	@echo "make bench    measure, beside a peer in the same run: ten minutes, a table in build/bench"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
@@ -60,7 +61,7 @@ fast-tests:
 	$(BEHIND) $(PYTEST) -n 2 -m "not slow" --junitxml=$(JUNIT)/fast.xml
 
 slow-tests:
-	$(PYTEST) -n $(shell nproc) --dist loadgroup -m "slow and not engine and not realtime" --junitxml=$(JUNIT)/slow.xml
+	$(PYTEST) -n $(shell nproc) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
 
 tools:
 	@scripts/install-test-tools
@@ -80,6 +81,10 @@ test:
 	@status=0; rm -f $(JUNIT)/*.xml; for part in first second; do \
 		$(MAKE) --no-print-directory -j 3 --keep-going --output-sync=target $$part || status=$$?; done; \
 		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status
+
+proof: dev
+	@scripts/install-firmware-tools
+	$(PYTEST) -m proof --durations=0 --junitxml=$(JUNIT)/proof.xml
 
 first: realtime-tests fast-tests
 
