@@ -18,6 +18,7 @@ Piece = tuple[str, str]
 """A part of a text, and its style by name; empty for none."""
 
 _MAX_FRAME_LINE = 160
+_MOST_NAMED = 3
 _MAX_FILE = 1 << 20
 _PARTS = re.compile(r"[-._]")
 
@@ -49,7 +50,10 @@ class Fix:
 
 @dataclass(frozen=True, order=True)
 class Diagnostic:
-    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` where there is exactly one."""
+    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` where there is exactly one.
+
+    ``tests`` are those that it depends on, where its place does not say so.
+    """
 
     span: Span
     rule: str
@@ -57,6 +61,21 @@ class Diagnostic:
     hint: str = ""
     severity: Severity = "error"
     fix: Fix | None = field(default=None, compare=False)
+    tests: tuple[str, ...] = field(default=(), compare=False)
+
+    @property
+    def sentence(self) -> str:
+        """The message, with the tests that have the problem, or their number where they are many."""
+        if not self.tests:
+            return self.message
+        many = f"{len(self.tests)} tests, such as {self.tests[0]}"
+        names = many if len(self.tests) > _MOST_NAMED else listed(self.tests)
+        return f"{self.message.removesuffix('.')} (in {names})"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names as in a sentence: ``a, b and c``."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
@@ -149,7 +168,7 @@ def pieces(diagnostic: Diagnostic) -> Iterator[Piece]:
     span = diagnostic.span
     yield f"{printable(shown_path(span.file))}:{span.line}:{span.column}: ", "place"
     yield f"{diagnostic.severity}[{diagnostic.rule}]", diagnostic.severity
-    yield f": {printable(diagnostic.message)}\n", ""
+    yield f": {printable(diagnostic.sentence)}\n", ""
     yield from _code_frame(span)
     for hint in filter(None, (diagnostic.hint, _deceptive(diagnostic.message))):
         yield "  hint: ", "hint"
@@ -185,6 +204,7 @@ def format_json(diagnostics: Sequence[Diagnostic]) -> str:
             "rule": d.rule,
             "message": d.message,
             "hint": d.hint,
+            "tests": list(d.tests),
         }
         for d in diagnostics
     ]
@@ -195,7 +215,7 @@ def format_gitlab(diagnostics: Sequence[Diagnostic]) -> str:
     """GitLab's code quality report."""
     rows = [
         {
-            "description": d.message + (f" ({d.hint})" if d.hint else ""),
+            "description": d.sentence + (f" ({d.hint})" if d.hint else ""),
             "check_name": d.rule,
             "fingerprint": fingerprint,
             "severity": "major" if d.severity == "error" else "minor",

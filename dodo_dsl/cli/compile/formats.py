@@ -54,7 +54,7 @@ def _uri(file: str) -> str:
 
 
 def _sentence(diagnostic: Diagnostic) -> str:
-    return diagnostic.message + (f" ({diagnostic.hint})" if diagnostic.hint else "")
+    return diagnostic.sentence + (f" ({diagnostic.hint})" if diagnostic.hint else "")
 
 
 def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -> str:
@@ -72,7 +72,7 @@ def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -
         found = by_file.get(file, [])
         errors, warnings = ([d for d in found if d.severity == severity] for severity in ("error", "warning"))
         if errors:
-            failure = Failure(xml_text(f"{errors[0].span.line}: {errors[0].message}"), errors[0].rule)
+            failure = Failure(xml_text(f"{errors[0].span.line}: {errors[0].sentence}"), errors[0].rule)
             failure.text = xml_text(format_text(errors))
             case.result = [failure]
         if warnings:
