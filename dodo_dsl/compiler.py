@@ -1,7 +1,6 @@
 """The compiler from end to end: from paths to checked tests, and on to Plans."""
 
 import functools
-import itertools
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,8 +11,8 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.check import manifest_messages
-from dodo_dsl.check.consequences import without_consequences
 from dodo_dsl.check.context import known_messages
+from dodo_dsl.check.problems import Problems
 from dodo_dsl.check.resolve import ResolvedTest, resolve
 from dodo_dsl.check.unchanged import Findings, Surroundings, check_again
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
@@ -46,8 +45,8 @@ _MOST_READ = 256  # files that are kept for the tests that extend them
 class Checked:
     """Tests with everything that was found wrong with them, sorted by place.
 
-    ``by_rules`` has what the rules found, by spec. ``unasked`` are the specs of shipped tests that were not asked for
-    by name; ``left_out`` names those among them that need what the application does not send.
+    ``problems`` are all that were found when the tests were loaded. ``unasked`` are the specs of shipped tests that
+    were not asked for by name; ``left_out`` names those among them that need what the application does not send.
     """
 
     deployment: Deployment
@@ -57,13 +56,18 @@ class Checked:
     settings: Settings = field(default_factory=Settings)
     application: ApplicationSource | None = None
     empty: tuple[Path, ...] = ()
-    by_rules: Mapping[Path, Sequence[Diagnostic]] = field(default_factory=dict)
+    problems: Problems = field(default_factory=Problems)
     unasked: frozenset[Path] = frozenset()
     left_out: tuple[str, ...] = ()
 
     @property
     def specs(self) -> tuple[Spec, ...]:
         return tuple(test.spec for test in self.tests)
+
+    @property
+    def by_rules(self) -> Mapping[Path, Sequence[Diagnostic]]:
+        """What the rules found, by spec."""
+        return self.problems.by_rules
 
     @property
     def around(self) -> Surroundings:
@@ -107,20 +111,28 @@ def load(
     own = manifest_messages.problems(deployment.services, reader, known_messages(deployment.messages))
     once = functools.lru_cache(maxsize=_MOST_READ)(reader)
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
-    loaded = [loader(location, once) for location in locations]
-    found = [*found, *manifest_problems, *own, *(d for _, problems in loaded for d in problems)]
+    loaded = {location.path: loader(location, once) for location in locations}
     source = None
     if files := application or deployment.application:
-        source, problems = read_application(files, access(deployment), deployment.sandbox, reader)
-        found.extend(problems)
-    written = (applied(spec, settings) for instances, _ in loaded for spec in instances)
+        source, of_application = read_application(files, access(deployment), deployment.sandbox, reader)
+        found = [*found, *of_application]
+    written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     before = Findings(former.around, former.tests, former.by_rules) if former else None
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
     again = check_again(specs, corners, Surroundings(manifests, deployment, source), before)
-    found.extend(itertools.chain.from_iterable(again.by_rules.values()))
-    diagnostics, by_rules = tuple(ordered(without_consequences(found, again.by_rules))), again.by_rules
-    return Checked(deployment, manifests, again.tests, diagnostics, settings, source, tuple(empty), by_rules)
+    as_read = {path: of_file for path, (_, of_file) in loaded.items()}
+    problems = Problems(tuple(found), (*manifest_problems, *own), as_read, again.by_rules)
+    return Checked(deployment, manifests, again.tests, problems.of(specs), settings, source, tuple(empty), problems)
+
+
+def narrowed(checked: Checked, specs: Collection[Spec]) -> Checked:
+    """The same with fewer tests, and the problems of these."""
+    keys = {(spec.path, spec.slug) for spec in specs}
+    tests = tuple(test for test in checked.tests if (test.spec.path, test.spec.slug) in keys)
+    problems = checked.problems.without_unused(tests)
+    diagnostics = problems.of(test.spec for test in tests)
+    return replace(checked, tests=tests, diagnostics=diagnostics, problems=problems)
 
 
 def at_values(checked: Checked, spec: Spec, values: Mapping[str, Values]) -> Checked:
@@ -165,14 +177,13 @@ def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Check
     shipped = {path for path, spec in first.items() if package_data.is_shipped(spec.location.root, root)}
     unfed = {path for path in shipped if any(d.rule in UNSATISFIED for d in checked.by_rules[path])}
     left_out = unfed - set(named)
-    kept = {d for path in first.keys() - left_out for d in checked.by_rules[path]}
-    gone = {d for path in left_out for d in checked.by_rules[path]} - kept
+    tests = tuple(test for test in checked.tests if test.spec.path not in left_out)
+    found = checked.problems.of(test.spec for test in tests)
     files = {str(path) for path in shipped}
-    gone |= {d for d in checked.diagnostics if d.severity == "warning" and d.span.file in files}
     return replace(
         checked,
-        tests=tuple(test for test in checked.tests if test.spec.path not in left_out),
-        diagnostics=tuple(d for d in checked.diagnostics if d not in gone),
+        tests=tests,
+        diagnostics=tuple(d for d in found if d.severity == "error" or d.span.file not in files),
         unasked=frozenset(shipped - set(named)),
         left_out=tuple(sorted(first[path].location.stem for path in left_out)),
     )

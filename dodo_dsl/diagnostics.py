@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from dodo_dsl.terminal import json_text, printable
+from dodo_dsl.terminal import cells, columns, excerpt, json_text, printable
 
 Severity = Literal["error", "warning"]
 Piece = tuple[str, str]
 """A part of a text, and its style by name; empty for none."""
 
-_MAX_FRAME_LINE = 160
+_MOST_NAMED = 3
 _MAX_FILE = 1 << 20
 _PARTS = re.compile(r"[-._]")
 
@@ -49,7 +49,10 @@ class Fix:
 
 @dataclass(frozen=True, order=True)
 class Diagnostic:
-    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` where there is exactly one."""
+    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` where there is exactly one.
+
+    ``tests`` are those that it depends on, where its place does not say so.
+    """
 
     span: Span
     rule: str
@@ -57,6 +60,21 @@ class Diagnostic:
     hint: str = ""
     severity: Severity = "error"
     fix: Fix | None = field(default=None, compare=False)
+    tests: tuple[str, ...] = field(default=(), compare=False)
+
+    @property
+    def sentence(self) -> str:
+        """The message, with the tests that have the problem, or their number where they are many."""
+        if not self.tests:
+            return self.message
+        many = f"{len(self.tests)} tests, such as {self.tests[0]}"
+        names = many if len(self.tests) > _MOST_NAMED else listed(self.tests)
+        return f"{self.message.removesuffix('.')} (in {names})"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names as in a sentence: ``a, b and c``."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
@@ -128,29 +146,27 @@ def _source_line(span: Span) -> str | None:
     return lines[span.line - 1] if 0 < span.line <= len(lines) else None
 
 
-def _code_frame(span: Span) -> Iterator[Piece]:
+def _code_frame(span: Span, width: int) -> Iterator[Piece]:
     line = _source_line(span) if span.length else None
-    if line is None:
+    if line is None or not 0 < span.column <= len(line) + 1:
         return
-    start = max(0, span.column - 1 - _MAX_FRAME_LINE // 2) if len(line) > _MAX_FRAME_LINE else 0
-    part = printable(line[start : start + _MAX_FRAME_LINE])
-    offset = span.column - 1 - start
     gutter = str(span.line)
+    before, place, behind = excerpt(line, span.column - 1, span.length, width - len(f"  {gutter} | "))
     yield f"  {gutter} | ", "gutter"
-    yield f"{part}\n", ""
+    yield f"{before}{place}{behind}\n", ""
     yield f"  {' ' * len(gutter)} | ", "gutter"
-    yield " " * offset, ""
-    yield "^" * max(1, min(span.length, len(part) - offset)), "mark"
+    yield " " * cells(before), ""
+    yield "^" * max(1, cells(place)), "mark"
     yield "\n", ""
 
 
-def pieces(diagnostic: Diagnostic) -> Iterator[Piece]:
-    """The lines of a diagnostic in parts."""
+def pieces(diagnostic: Diagnostic, width: int) -> Iterator[Piece]:
+    """The lines of a diagnostic in parts, with a code frame of at most ``width`` columns."""
     span = diagnostic.span
     yield f"{printable(shown_path(span.file))}:{span.line}:{span.column}: ", "place"
     yield f"{diagnostic.severity}[{diagnostic.rule}]", diagnostic.severity
-    yield f": {printable(diagnostic.message)}\n", ""
-    yield from _code_frame(span)
+    yield f": {printable(diagnostic.sentence)}\n", ""
+    yield from _code_frame(span, width)
     for hint in filter(None, (diagnostic.hint, _deceptive(diagnostic.message))):
         yield "  hint: ", "hint"
         yield f"{printable(hint)}\n", ""
@@ -171,8 +187,9 @@ def _deceptive(message: str) -> str:
     return ""
 
 
-def format_text(diagnostics: Sequence[Diagnostic]) -> str:
-    return "".join(text for d in diagnostics for text, _ in pieces(d))
+def format_text(diagnostics: Sequence[Diagnostic], width: int | None = None) -> str:
+    """With code frames of at most ``width`` columns, by default as wide as the terminal."""
+    return "".join(text for d in diagnostics for text, _ in pieces(d, width or columns()))
 
 
 def format_json(diagnostics: Sequence[Diagnostic]) -> str:
@@ -185,6 +202,7 @@ def format_json(diagnostics: Sequence[Diagnostic]) -> str:
             "rule": d.rule,
             "message": d.message,
             "hint": d.hint,
+            "tests": list(d.tests),
         }
         for d in diagnostics
     ]
@@ -195,7 +213,7 @@ def format_gitlab(diagnostics: Sequence[Diagnostic]) -> str:
     """GitLab's code quality report."""
     rows = [
         {
-            "description": d.message + (f" ({d.hint})" if d.hint else ""),
+            "description": d.sentence + (f" ({d.hint})" if d.hint else ""),
             "check_name": d.rule,
             "fingerprint": fingerprint,
             "severity": "major" if d.severity == "error" else "minor",

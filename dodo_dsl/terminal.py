@@ -5,7 +5,9 @@ and the log of CI lines such as ``::error::`` or ``##[error]``.
 """
 
 import json
+import os
 import re
+import unicodedata
 from collections.abc import Iterable
 from typing import Any, TextIO, cast
 
@@ -14,6 +16,11 @@ _COMMAND = re.compile(r"^(\s*:)(?=:)", re.MULTILINE)
 _OLD_COMMAND = re.compile(r"#(?=#(\[|vso\[))")
 """GitHub's old ones and those of Azure Pipelines, anywhere in a line."""
 _LONGEST = len("##vso")
+WIDE = 120
+"""Columns of a log or file, which no terminal shows."""
+_USUAL = 80
+_NARROWEST = 20
+_MOST_COLUMNS = 1000
 
 
 def printable(text: str) -> str:
@@ -21,6 +28,73 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else ("→" if c == "\t" else "�") for c in text)
+
+
+def columns(stream: TextIO | None = None) -> int:
+    """How many columns a line may have: COLUMNS, those of the stream's terminal, or of one beside it.
+
+    80 on a terminal that does not tell, ``WIDE`` where there is none, as in the log of CI.
+    """
+    written = os.environ.get("COLUMNS", "")
+    known = int(written) if written.isdecimal() and len(written) <= len(str(_MOST_COLUMNS)) else 0
+    is_terminal = stream is not None and stream.isatty()
+    for descriptor in () if known else _descriptors(stream):
+        try:
+            known = known or os.get_terminal_size(descriptor).columns
+            is_terminal = True
+        except OSError:
+            continue
+    return max(_NARROWEST, min(known or (_USUAL if is_terminal else WIDE), _MOST_COLUMNS))
+
+
+def _descriptors(stream: TextIO | None) -> tuple[int, ...]:
+    """Those that may be the terminal on which the stream is read in the end; none for text in memory."""
+    try:
+        return (*(() if stream is None else (stream.fileno(),)), 1, 2, 0)
+    except (OSError, ValueError):
+        return ()
+
+
+def cells(text: str) -> int:
+    """How many columns a terminal takes for printable text: none for marks on a letter, two for wide characters."""
+    if text.isascii():
+        return len(text)
+    return sum(_cells(character) for character in text)
+
+
+def _cells(character: str) -> int:
+    if unicodedata.category(character) in ("Mn", "Me"):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in "WF" else 1
+
+
+def excerpt(line: str, start: int, length: int, room: int) -> tuple[str, str, str]:
+    """The part of a line around a place that fits into so many columns: what is before the place, in it and behind it.
+
+    The place begins at character ``start`` and is cut where it is too long; ``…`` stands for what is left out.
+    """
+    begin, end = max(0, start - room), start + room
+    before, behind = printable(line[begin:start]), printable(line[start:end])
+    marked = min(length, len(behind))
+    if begin == 0 and end >= len(line) and cells(before + behind) <= room:
+        return before, behind[:marked], behind[marked:]
+    room -= 2  # for what stands for the rest
+    least = max(room // 4, (room - cells(behind[:marked])) // 2, room - cells(behind))
+    kept = _fitting(before[::-1], least)
+    shown = _fitting(behind, room - cells(before[len(before) - kept :]))
+    head = "…" if kept < start else ""
+    tail = "…" if start + shown < len(line) else ""
+    in_place = behind[: min(marked, shown)]
+    return head + before[len(before) - kept :], in_place, behind[len(in_place) : shown] + tail
+
+
+def _fitting(text: str, room: int) -> int:
+    """How many characters from the begin fit into so many columns."""
+    for number, character in enumerate(text):
+        room -= _cells(character)
+        if room < 0:
+            return number
+    return len(text)
 
 
 def harmless(text: str) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from dodo_dsl.terminal import WIDE
 from tests.faults import Book
 
 settings.register_profile("dodo", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -20,6 +21,7 @@ settings.load_profile("dodo")  # how fast a machine is decides no test; `make ch
 
 for variable in ("NO_COLOR", "FORCE_COLOR"):  # tests say themselves when there are colours
     os.environ.pop(variable, None)
+os.environ["COLUMNS"] = str(WIDE)  # whatever terminal the tests are started in
 
 REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"

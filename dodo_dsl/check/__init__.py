@@ -85,26 +85,20 @@ def check(
 
 
 def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[Diagnostic]:
-    """The problems of a file's instances, each once; those that only some instances have name one of them."""
+    """The problems of a file's instances, each once and with all instances that have it."""
     having: dict[Diagnostic, dict[str, None]] = {}
     for spec, found in group:
         for diagnostic in found:
             having.setdefault(diagnostic, {})[spec.title] = None
     for diagnostic, titles in having.items():
-        if len(titles) == len(group) or files.is_own(diagnostic):
-            yield diagnostic
-        else:
-            others = f" and {len(titles) - 1} more" if len(titles) > 1 else ""
-            yield replace(diagnostic, message=f"{diagnostic.message} (in {next(iter(titles))}{others})")
+        yield replace(diagnostic, tests=tuple(titles))
 
 
 def _of_corners(group: Sequence[tuple[Spec, list[Diagnostic]]], known: set[Diagnostic]) -> Iterator[Diagnostic]:
-    """The problems that are not ``known``, each once; one that is not shown at the end itself names the corner."""
+    """The problems that are not ``known``, each once."""
     seen = set(known)
     for spec, found in group:
-        ends = {end.span for one in spec.ranges for end in one.ends}
         for diagnostic in found:
             if diagnostic not in seen:
                 seen.add(diagnostic)
-                at_end = diagnostic.span in ends
-                yield diagnostic if at_end else replace(diagnostic, message=f"{diagnostic.message} (in {spec.title})")
+                yield replace(diagnostic, tests=(spec.title,))

@@ -4,16 +4,15 @@ import argparse
 import fnmatch
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl import package_data
 from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.compiler import Checked, load, without_unsatisfied
+from dodo_dsl.compiler import Checked, load, narrowed, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, format_text, has_errors
 from dodo_dsl.spec import parameters
 from dodo_dsl.spec.deployment.deployment import FILE_NAME, SHIPPED, Deployment, find_deployment, load_deployment
-from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.model import LEVELS, Spec
 from dodo_dsl.spec.registry import SUFFIX, locate
 from dodo_dsl.spec.settings import Settings
 from dodo_dsl.terminal import printable
@@ -81,13 +80,15 @@ def select(
         except NoSuchTest:
             checked_deployment()  # its problems come first: without them there may be such a test
             raise
-        checked = _narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
+        checked = narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
         given |= {spec.path for spec in others if any(_is_meant(word, spec) for word in names)}
+    elif paths:
+        checked = narrowed(checked, checked.specs)
     if levels:
-        kept = tuple(s for s in checked.specs if s.level in levels)
-        if not kept:
+        if not any(spec.level in levels for spec in checked.specs):
             raise NoSuchTest(f"no test has level {' or '.join(levels)}")
-        checked = _narrowed(checked, kept)
+        kept = tuple(spec for spec in checked.specs if spec.level in levels or spec.level not in LEVELS)
+        checked = narrowed(checked, kept)
     return without_unsatisfied(checked, given)
 
 
@@ -152,14 +153,3 @@ def _matches(spec: Spec, pattern: str) -> bool:
 def _matches_title(spec: Spec, pattern: str) -> bool:
     """Whether a pattern fits that of an instance, such as ``name[light=dark]``, whose brackets mean themselves."""
     return fnmatch.fnmatchcase(spec.title, pattern.replace("[", "[[]"))
-
-
-def _narrowed(checked: Checked, specs: Sequence[Spec]) -> Checked:
-    """The same with fewer tests; problems of other specs no longer count, those of other files do."""
-    slugs, files = {s.slug for s in specs}, {str(s.path) for s in specs}
-    dropped = {str(s.path) for s in checked.specs} - files
-    return replace(
-        checked,
-        tests=tuple(test for test in checked.tests if str(test.spec.path) in files and test.spec.slug in slugs),
-        diagnostics=tuple(d for d in checked.diagnostics if d.span.file not in dropped),
-    )

@@ -132,7 +132,7 @@ def _shown(lines: Lines, diagnostic: Diagnostic) -> ShownDiagnostic:
     hint = f"\n{printable(diagnostic.hint)}" if diagnostic.hint else ""
     return ShownDiagnostic(
         lines.range(diagnostic.span),
-        printable(diagnostic.message) + hint,
+        printable(diagnostic.sentence) + hint,
         _SEVERITIES[diagnostic.severity],
         diagnostic.rule,
         source="dodo",

@@ -12,9 +12,7 @@ evaluation: {{track: {{uses: collision, with: {{goal: "${{matrix.goal}}"}}}}}}
 
 
 def messages(goals: str, folder: Path) -> list[str]:
-    found = checked(MATRIX.format(goals=goals), folder)
-    problems = check(found.tests, found.manifests, found.deployment, found.application)
-    return [problem.message for problem in problems[folder / "tests/example/example.dodo.yml"]]
+    return [problem.sentence for problem in checked(MATRIX.format(goals=goals), folder).diagnostics]
 
 
 def test_a_problem_of_some_instances_names_one(tmp_path: Path) -> None:
@@ -33,7 +31,7 @@ def test_a_problem_of_all_instances_is_reported_once(tmp_path: Path) -> None:
 
 def of_ranges(text: str, folder: Path) -> list[tuple[int, str]]:
     found = checked(text, folder)
-    return [(d.span.column, d.message) for d in found.diagnostics if d.span.file.endswith("example.dodo.yml")]
+    return [(d.span.column, d.sentence) for d in found.diagnostics if d.span.file.endswith("example.dodo.yml")]
 
 
 def test_the_ends_of_a_range_are_checked_where_they_are_written(tmp_path: Path) -> None:

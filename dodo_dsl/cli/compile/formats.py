@@ -9,7 +9,7 @@ from urllib.parse import quote
 from dodo_dsl import __version__
 from dodo_dsl.check import catalogue
 from dodo_dsl.diagnostics import Diagnostic, fingerprints, format_gitlab, format_json, format_text, shown_path
-from dodo_dsl.terminal import json_text
+from dodo_dsl.terminal import WIDE, json_text
 
 _SARIF = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
@@ -54,7 +54,7 @@ def _uri(file: str) -> str:
 
 
 def _sentence(diagnostic: Diagnostic) -> str:
-    return diagnostic.message + (f" ({diagnostic.hint})" if diagnostic.hint else "")
+    return diagnostic.sentence + (f" ({diagnostic.hint})" if diagnostic.hint else "")
 
 
 def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -> str:
@@ -72,11 +72,11 @@ def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -
         found = by_file.get(file, [])
         errors, warnings = ([d for d in found if d.severity == severity] for severity in ("error", "warning"))
         if errors:
-            failure = Failure(xml_text(f"{errors[0].span.line}: {errors[0].message}"), errors[0].rule)
-            failure.text = xml_text(format_text(errors))
+            failure = Failure(xml_text(f"{errors[0].span.line}: {errors[0].sentence}"), errors[0].rule)
+            failure.text = xml_text(format_text(errors, WIDE))
             case.result = [failure]
         if warnings:
-            case.system_out = xml_text(format_text(warnings))
+            case.system_out = xml_text(format_text(warnings, WIDE))
         suite.add_testcase(case)
     document = JUnitXml("dodo")
     document.add_testsuite(suite)

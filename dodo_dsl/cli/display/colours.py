@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import TextIO
 
 from dodo_dsl.diagnostics import Diagnostic, Piece, pieces
-from dodo_dsl.terminal import unescaped
+from dodo_dsl.terminal import columns, unescaped
 
 _CODES = {
     "passed": "32",
@@ -58,4 +58,5 @@ def write(stream: TextIO, parts: Iterable[Piece]) -> None:
 
 def write_diagnostics(stream: TextIO, diagnostics: Iterable[Diagnostic]) -> None:
     """As ``format_text`` has them."""
-    write(stream, (piece for diagnostic in diagnostics for piece in pieces(diagnostic)))
+    width = columns(stream)
+    write(stream, (piece for diagnostic in diagnostics for piece in pieces(diagnostic, width)))

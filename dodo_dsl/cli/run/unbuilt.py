@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.compiler import Checked
+from dodo_dsl.compiler import Checked, narrowed
 from dodo_dsl.spec.deployment.rig import EMULATED, PORT
 from dodo_dsl.terminal import printable
 
@@ -15,10 +15,11 @@ def without_unbuilt(checked: Checked, backend: str | None) -> tuple[Checked, str
     left_out = {test.spec.path for test in checked.tests if test.spec.path in checked.unasked and _is_emulated(test)}
     if not left_out or _is_built():
         return checked, ""
-    tests = tuple(test for test in checked.tests if test.spec.path not in left_out)
-    names = printable(", ".join(sorted({test.spec.location.stem for test in checked.tests if test not in tests})))
+    known, kept = set(checked.diagnostics), [spec for spec in checked.specs if spec.path not in left_out]
+    fewer = narrowed(checked, kept)
+    names = printable(", ".join(sorted({spec.location.stem for spec in checked.specs if spec.path in left_out})))
     said = f"skipped shipped tests on the emulated rig, which is not built: {names} (see dodo doctor)\n"
-    return replace(checked, tests=tests), said
+    return replace(fewer, diagnostics=tuple(d for d in fewer.diagnostics if d in known)), said
 
 
 def _runs_processes(checked: Checked, backend: str | None) -> bool:

@@ -77,10 +77,12 @@ def _picture(file: Path) -> Iterator[InputError]:
 def _obstacles(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
     file = map_file.find_map(path)
     try:
-        slips = list(obstacles.slips(Node.load(file)))
+        found = list(map_file.unread_keys(Node.load(file)))
     except MapError as error:
-        slips = [error]
-    yield from slips or _raised(path, lambda: obstacles.read(path))
+        found = [error]
+    yield from found
+    if all(problem.is_slip for problem in found):
+        yield from _raised(path, lambda: obstacles.read(path))
 
 
 def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -94,6 +96,7 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
             yield error
         return
     yield from truth_file.corners(path)
+    yield from truth_file.unread_keys(path)
     labels = {label for boxes in pictures.values() for label, _ in boxes}
     missing = [name for name in settings["classes"].split(",") if name and name not in labels]
     known = truth_file.categories(path) if missing else ()

@@ -3,7 +3,7 @@
 import difflib
 import functools
 import json
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn, Self
@@ -138,15 +138,26 @@ class Node:
             self.fail("a file in the map's folder", near(path.name, beside))
         return path
 
-    def slips(self, known: Collection[str], needed: Collection[str] = ()) -> Iterator[MapError]:
-        """Keys that are spelt almost like known ones, and so mean nothing; an error where one ``needed`` is meant."""
-        values = self.value if isinstance(self.value, dict) else {}
-        for key in values:
-            hint = near(key, known) if key not in known else ""
-            if hint:
-                is_slip = not any(f"'{name}'" in hint for name in needed if name not in values)
-                where = f"{self.place}.{key}"
-                yield MapError(self.file, f"nothing reads '{key}'", where, hint=hint, is_slip=is_slip, is_of_key=True)
+
+def unread(entries: Iterable[Node], known: Collection[str], needed: Collection[str] = ()) -> Iterator[MapError]:
+    """Keys of objects of one kind that nothing reads, each once; an error where a ``needed`` one is meant."""
+    found: dict[str, list[Node]] = {}
+    for entry in entries:
+        for key in entry.value if isinstance(entry.value, dict) else ():
+            if key not in known:
+                found.setdefault(key, []).append(entry)
+    for key, those in found.items():
+        hint, values = near(key, known), those[0].value
+        lacking = [name for name in needed if isinstance(values, dict) and name not in values]
+        is_slip = not any(f"'{name}'" in hint for name in lacking)
+        yield of_keys(those, key, f"nothing reads '{key}'", hint or f"known: {', '.join(known)}", is_slip)
+
+
+def of_keys(entries: Sequence[Node], key: str, what: str, hint: str = "", is_slip: bool = True) -> MapError:
+    """The problem of a key that these objects have, at the first."""
+    more = f" (and in {len(entries) - 1} more)" if len(entries) > 1 else ""
+    place = f"{entries[0].place}.{key}"
+    return MapError(entries[0].file, what + more, place, hint=hint, is_slip=is_slip, is_of_key=True)
 
 
 def _line(error: UnicodeDecodeError) -> int:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from dodo_dsl.opendlv.inputs.json_node import MAX_NUMBER, MapError, Node
+from dodo_dsl.opendlv.inputs.json_node import MAX_NUMBER, MapError, Node, of_keys, unread
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
@@ -174,21 +174,45 @@ def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
         read = _collected(file, root, found.append)
     except MapError as error:
         return None, [error]
-    found.extend(root.slips(_KEYS, ("obstacles",)))
-    for key, known in _KEYS.items():
-        entries = root.member(key)
-        if entries is not None and isinstance(entries.value, list):
-            needed = known if key == "obstacles" else ()
-            found.extend(slip for entry in root.items(key) for slip in entry.slips(known, needed))
+    found.extend(unread_keys(root))
+    found.extend(_without_effect(root))
     found.extend(_degrees(read, root))
     return read, found
+
+
+def unread_keys(root: Node) -> Iterator[MapError]:
+    """Keys of a map that nothing reads; errors where those of an obstacle are meant."""
+    yield from unread([root], _KEYS, ("obstacles",))
+    for key, known in _KEYS.items():
+        yield from unread(_listed(root, key), known, known if key == "obstacles" else ())
+
+
+def _without_effect(root: Node) -> Iterator[MapError]:
+    """Keys of the format that change nothing in a picture, each once."""
+    models, blocks = list(_listed(root, "model")), list(_listed(root, "block"))
+    if moving := [model for model in models if _has(model, "frames")]:
+        yield of_keys(moving, "frames", "a model at the frame of a vehicle is not drawn yet", _NOT_YET)
+    for entries in (models, blocks):
+        if both := [entry for entry in entries if _has(entry, "color") and _has(entry, "textureFile")]:
+            yield of_keys(both, "color", "'color' is not used beside 'textureFile'", "remove one of them")
+    if sizes := [block for block in blocks if _has(block, "textureSize") and not _has(block, "textureFile")]:
+        yield of_keys(sizes, "textureSize", "'textureSize' is not used without 'textureFile'", "remove it")
+
+
+def _listed(root: Node, key: str) -> Iterator[Node]:
+    """The entries of a list; none where it is no list, which is told elsewhere."""
+    value = root.value.get(key) if isinstance(root.value, dict) else None
+    yield from root.items(key) if isinstance(value, list) else ()
+
+
+def _has(entry: Node, key: str) -> bool:
+    return isinstance(entry.value, dict) and key in entry.value
 
 
 def _degrees(read: MapFile, root: Node) -> Iterator[MapError]:
     """The first angle of more than a turn, which is hardly in radians."""
     for key in ("model", "block"):
-        value = root.value.get(key) if isinstance(root.value, dict) else None
-        for item in root.items(key) if isinstance(value, list) else ():
+        for item in _listed(root, key):
             rows = item.value.get("instances") if isinstance(item.value, dict) else None
             for index, row in enumerate(rows if isinstance(rows, list) else ()):
                 angle = row[3] if isinstance(row, list) and len(row) == 4 else 0
@@ -201,12 +225,13 @@ def _degrees(read: MapFile, root: Node) -> Iterator[MapError]:
 
 
 _KEYS = {
-    "model": ("name", "file", "color", "textureFile", "instances"),
+    "model": ("name", "file", "color", "textureFile", "instances", "frames"),
     "block": ("name", "dimension", "color", "textureFile", "textureSize", "instances"),
     "overlay": ("name", "dimension", "textureFile", "instances"),
     "obstacles": ("name", "lines"),
 }
-"""What is read of each list."""
+"""What OpenDLV's maps have in each list."""
+_NOT_YET = "give it 'instances', where it stands still"
 Entry = TypeVar("Entry")
 Report = Callable[[MapError], None]
 

@@ -1,7 +1,5 @@
 """The obstacles of an OpenDLV map as an evaluator needs them: each with a name and lines on the ground."""
 
-import itertools
-from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl.opendlv.inputs.json_node import MapError, Node
@@ -9,18 +7,6 @@ from dodo_dsl.opendlv.inputs.json_node import MapError, Node
 Line = tuple[tuple[float, float], tuple[float, float]]
 NUMBERS = 4
 FARTHEST = 1e300
-
-
-KEYS = ("name", "lines")
-
-
-def slips(root: Node) -> Iterator[MapError]:
-    """Misspelt keys of a map without which there would be an obstacle, or its lines."""
-    yield from (slip for slip in root.slips(("obstacles",), ("obstacles",)) if not slip.is_slip)
-    value = root.value if isinstance(root.value, dict) else {}
-    if isinstance(value.get("obstacles"), list):
-        found = itertools.chain.from_iterable(entry.slips(KEYS, KEYS) for entry in root.items("obstacles"))
-        yield from (slip for slip in found if not slip.is_slip)
 
 
 def read(path: Path) -> dict[str, list[Line]]:

@@ -15,9 +15,18 @@ Area = tuple[float, float, float, float]
 """x, y, width and height as fractions of the picture."""
 
 LARGEST = 2**63
+_MOST_NAMED = 10
 _FAR, _FARTHER = 1.1, 1.5
 """Times the image, up to which boxes may go on outside it: those that could be corners, and others."""
 PREFIX = "color:"
+_KEYS: Mapping[str, frozenset[str]] = {
+    "": frozenset(("info", "licenses", "images", "annotations", "categories")),
+    "images": frozenset(("id", "width", "height", "file_name", "license", "sample_time"))
+    | {"flickr_url", "coco_url", "date_captured"},
+    "annotations": frozenset(("id", "image_id", "category_id", "segmentation", "area", "bbox", "iscrowd")),
+    "categories": frozenset(("id", "name", "supercategory")),
+}
+"""The format's keys at the top and in the entries of each list, and DoDo's ``sample_time``."""
 
 
 class TruthFileError(InputError):
@@ -74,6 +83,32 @@ def corners(path: Path) -> Iterator[TruthFileError]:
             hint += f": the one with these corners is {[x, y, wide - x, high - y]}" if is_corners else ""
             yield TruthFileError(path, what, f"annotations[{index}].bbox", hint=hint, is_slip=True)
             return
+
+
+def unread_keys(path: Path) -> Iterator[TruthFileError]:
+    """Keys that are none of the format: those near one that is read, and the others together; the file is read."""
+    document = _document(path)
+    others: dict[str, str] = {}
+    for kind, known in _KEYS.items():
+        entries = document[kind] if kind else [document]
+        first: dict[str, int] = {}
+        for index, entry in enumerate(entries):
+            for key in entry:
+                if key not in known:
+                    first.setdefault(key, index)
+        for key, index in first.items():
+            where = f"{kind}[{index}].{key}" if kind else key
+            close = difflib.get_close_matches(key, known, n=1, cutoff=0.7)
+            if close:
+                hint = f"did you mean '{close[0]}'?"
+                what = f"nothing reads '{key}'"
+                yield TruthFileError(path, what, where, hint=hint, is_slip=True, is_of_key=True)
+            else:
+                others.setdefault(f"'{key}' of {kind}" if kind else f"'{key}'", where)
+    if others:
+        more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
+        what = f"nothing reads {', '.join(list(others)[:_MOST_NAMED])}{more}"
+        yield TruthFileError(path, what, next(iter(others.values())), is_slip=True, is_of_key=True)
 
 
 def no_box(name: str, labels: Collection[str]) -> str:

@@ -1,0 +1,96 @@
+"""Code frames fit into the terminal, and show the place that they are about."""
+
+import fcntl
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from dodo_dsl.diagnostics import Diagnostic, Span, forget_lines, format_text
+from dodo_dsl.terminal import WIDE, cells, columns, excerpt, printable
+
+CHARACTERS = st.sampled_from("abc {}:,…\t\x1b\x00漢字한👍e\u0301ßÄ\u200b\ufeff")
+LINES = st.text(CHARACTERS, max_size=400) | st.builds(
+    lambda text, times: (text * times)[:100_000], st.text(CHARACTERS, min_size=1, max_size=9), st.just(100_000)
+)
+
+
+@given(LINES, st.integers(0), st.integers(1, 200_000), st.integers(12, 300))
+@example("x" * 250, 200, 1, 74)
+@example("漢" * 100, 99, 1, 12)
+@example("", 0, 1, 12)
+@example("a: " + "b" * 100_000, 3, 100_000, 74)
+def test_the_place_of_any_line_is_shown_in_any_width(line: str, number: int, length: int, room: int) -> None:
+    start = number % (len(line) + 1)
+    before, place, behind = excerpt(line, start, length, room)
+    head, tail = before.removeprefix("…"), behind.removesuffix("…")
+    assert cells(before + place + behind) <= room
+    assert not place or printable(line[start : start + length]).startswith(place)
+    assert place or start == len(line)
+    for end in {head, before}:
+        if printable(line[:start]).endswith(end) and printable(line[start + len(place) :]).startswith(tail):
+            break
+    else:
+        raise AssertionError((before, place, behind))
+    if cells(printable(line)) <= room - 2:
+        assert before + place + behind == printable(line)
+
+
+@given(st.lists(st.tuples(LINES, st.integers(0), st.integers(1, 500)), min_size=1, max_size=3), st.integers(30, 200))
+def test_each_frame_of_several_has_carets_below_its_place(
+    tmp_path_factory: pytest.TempPathFactory, places: list[tuple[str, int, int]], width: int
+) -> None:
+    file = tmp_path_factory.mktemp("frames") / "a.yml"
+    file.write_text("".join(f"{line}\n" for line, _, _ in places), encoding="utf-8")
+    forget_lines()
+    spans = [Span(str(file), n, at % (len(line) + 1) + 1, long) for n, (line, at, long) in enumerate(places, 1)]
+    for span, (line, _, _) in zip(spans, places, strict=True):
+        _, above, below = format_text([Diagnostic(span, "wrong-value", "wrong")], width).splitlines()
+        carets = below.strip(" |")
+        before = below[: below.index("^")]
+        assert max(cells(above), cells(below)) <= width
+        assert set(carets) == {"^"}
+        seen, column = "", 0
+        for character in above:
+            if column == len(before) and cells(character):
+                seen = character
+                break
+            column += cells(character)
+        wanted = printable(line[span.column - 1 : span.column])
+        assert seen == wanted or not cells(wanted), (above, below)
+
+
+def test_a_place_behind_what_is_read_of_a_file_has_no_frame(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text("{}")
+    found = [Diagnostic(Span(str(tmp_path / "a.json"), 1, 2_000_000), "wrong-file", "wrong")]
+    assert format_text(found).count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("written", "width"),
+    [("72", 72), ("0", WIDE), ("", WIDE), ("x", WIDE), ("5", 20), ("9" * 3, 999), ("9" * 30, WIDE)],
+)
+def test_the_width_that_columns_says(monkeypatch: pytest.MonkeyPatch, written: str, width: int) -> None:
+    monkeypatch.setenv("COLUMNS", written)
+    assert columns(StringIO()) == width
+
+
+@pytest.mark.parametrize(("size", "width"), [(61, 61), (0, 80)])
+def test_the_width_of_a_terminal_and_of_a_pipe_beside_it(
+    monkeypatch: pytest.MonkeyPatch, size: int, width: int
+) -> None:
+    monkeypatch.delenv("COLUMNS")
+    leader, follower = pty.openpty()
+    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, size, 0, 0))
+    code = "import sys; from dodo_dsl.terminal import columns; print(columns(sys.stdout))"
+    for stdout in (subprocess.PIPE, follower):
+        run = subprocess.run([sys.executable, "-c", code], stdin=follower, stdout=stdout, stderr=follower, check=True)
+        assert int(run.stdout if run.stdout else os.read(leader, 100)) == width
