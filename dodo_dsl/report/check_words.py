@@ -26,7 +26,7 @@ def is_exclusive(check: Check) -> bool:
 
 
 def bound(side: str, number: float, unit: str = "", exclusive: bool = False) -> str:
-    """``at least 0.03 m`` or ``more than 0 m`` for the side ``min``, ``at most 1 m`` or ``less than 1 m`` for ``max``."""
+    """``at least 1 m`` or ``more than 1 m`` for the side ``min``, ``at most 1 m`` or ``less than 1 m`` for ``max``."""
     return f"{_WORDS[side][exclusive]} {number:g} {unit}".rstrip()
 
 
