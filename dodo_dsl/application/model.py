@@ -60,11 +60,11 @@ class ComposeService:
 class ApplicationSource:
     """The merged compose files, which are all that rules and the planner see of the application.
 
-    ``services`` are those that start, by name; ``rest`` has every other top-level key. Paths are relative to
-    ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the services by their
-    ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set the secret ones
-    among them. ``known`` are all variables whose values are known, ``access`` is what the deployment allows,
-    ``limits`` are the highest that the services may set.
+    ``services`` are those that start, by name; ``rest`` has every other top-level key but those ``left_out``. Paths
+    are relative to ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the
+    services by their ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set
+    the secret ones among them. ``known`` are all variables whose values are known, ``access`` is what the deployment
+    allows, ``limits`` are the highest that the services may set.
     """
 
     path: Path
@@ -77,6 +77,7 @@ class ApplicationSource:
     known: Mapping[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
+    left_out: tuple[str, ...] = ()
 
     @functools.cached_property
     def paths(self) -> HostPaths:

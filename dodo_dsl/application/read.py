@@ -86,6 +86,7 @@ def _application(
         if name not in dropped and (service := _service(name, entry, path.parent)) is not None
     }
     rest = {k: e.value for k, e in document.entries.items() if k not in _OURS and not k.startswith("x-")}
+    left_out = tuple(key for key in document.entries if key != "services" and key not in rest)
     return ApplicationSource(
         path=path,
         services=kept,
@@ -97,6 +98,7 @@ def _application(
         known=known_variables(variables, os.environ, str(path.parent), access.passed),
         access=access,
         limits=limits,
+        left_out=left_out,
     )
 
 

@@ -12,6 +12,7 @@ from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import did_you_mean
+from dodo_dsl.spec.model import LEVEL_WORDS
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -78,7 +79,8 @@ def _file(instances: Sequence[Explanation]) -> str:
 def _head(one: Explanation) -> str:
     rig = f", rig {one.rig}" if one.rig else ""
     rig += f" of any {one.pool}" if one.pool else ""
-    return f"{printable(f'{one.name} ({one.level}, {one.kind}{rig})')}\n{printable(one.file)}\n"
+    level = f"{LEVEL_WORDS[one.level]}\n" if one.level in LEVEL_WORDS else ""
+    return f"{printable(f'{one.name} ({one.level}, {one.kind}{rig})')}\n{printable(one.file)}\n{level}"
 
 
 def _services(one: Explanation) -> str:

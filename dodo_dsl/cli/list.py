@@ -13,6 +13,7 @@ from dodo_dsl.cli.exits import Exit
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
 from dodo_dsl.spec.manifest import Manifest, Parameter
+from dodo_dsl.spec.model import LEVEL_WORDS
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -47,6 +48,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     else:
         columns = ("name", "layers", "description") if of_services else ("name", "level", "kind", "description")
         _table(rows, columns, stdout)
+        if not of_services and not options.test:
+            levels = {spec.level for spec in everything.specs}
+            stderr.writelines(f"{level}: {words}\n" for level, words in LEVEL_WORDS.items() if level in levels)
     checked = everything if options.test else without_unsatisfied(everything)
     stderr.write(selection.left_out(checked))
     if checked.ok:

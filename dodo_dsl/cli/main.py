@@ -54,6 +54,11 @@ _EXAMPLES = """examples:
   dodo compile --check               every problem of every test; writes nothing
   dodo run sil-closed-straight       run one test and judge the application
   dodo run --level sil -j 2          all simulations, two at a time
+
+levels of tests:
+  sil   software in the loop: the world is simulated
+  dil   data in the loop: the world is recorded
+  hil   hardware in the loop: the world is real
 """
 
 

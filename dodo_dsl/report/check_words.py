@@ -7,8 +7,8 @@ _OF_THE_WAY = ("time-to-goal", "to-goal", "gates")
 """What a drive that ends early leaves undone."""
 _ENDING = ("wall-margin", "max-speed", "silence")
 """What ends it early."""
-_WORDS = {"min": ("min", "more than"), "max": ("max", "less than")}
-"""For a limit that may be reached, and for one at which a check failed."""
+_WORDS = {"min": ("at least", "more than"), "max": ("at most", "less than")}
+"""For a limit that may be reached, and for one that may not."""
 
 Check = Mapping[str, Any]
 
@@ -19,15 +19,23 @@ def only_follows(check: Check, checks: Sequence[Check]) -> bool:
     return ended and not check["ok"] and check["name"] in _OF_THE_WAY
 
 
-def is_exclusive(check: Check, side: str) -> bool:
-    """Whether a check failed exactly at its limit, as a wall that is touched: the limit has to be exceeded."""
-    return not check["ok"] and check["value"] is not None and check["value"] == check["limit"][side]
+def is_exclusive(check: Check) -> bool:
+    """Whether a value at a limit fails, as a wall that is touched: the evaluator says so, or failed such a value."""
+    limit = check.get("limit") or {}
+    return bool(check.get("exclusive")) or (not check["ok"] and check["value"] in limit.values())
 
 
-def limits(check: Check, unit: str = "") -> Iterator[str]:
-    """``min 0.03 m`` and ``max 1 m``."""
-    for side, bound in (check.get("limit") or {}).items():
-        yield f"{_WORDS[side][is_exclusive(check, side)]} {bound:g} {unit}".rstrip()
+def bound(side: str, number: float, unit: str = "", exclusive: bool = False) -> str:
+    """``at least 1 m`` or ``more than 1 m`` for the side ``min``, ``at most 1 m`` or ``less than 1 m`` for ``max``."""
+    return f"{_WORDS[side][exclusive]} {number:g} {unit}".rstrip()
+
+
+def limits(check: Check) -> Iterator[str]:
+    """Each limit of a check: ``at least 0.03 m`` and ``at most 1 m``."""
+    exclusive = is_exclusive(check)
+    for side in ("min", "max"):
+        if side in (check.get("limit") or {}):
+            yield bound(side, check["limit"][side], check.get("unit") or "", exclusive)
 
 
 def line(check: Check, checks: Sequence[Check]) -> str:

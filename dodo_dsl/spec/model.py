@@ -17,7 +17,12 @@ from dodo_dsl.spec.registry import Location
 
 LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
-LEVELS = ("sil", "dil", "hil")
+LEVEL_WORDS = {
+    "sil": "software in the loop: the world is simulated",
+    "dil": "data in the loop: the world is recorded",
+    "hil": "hardware in the loop: the world is real",
+}
+LEVELS = tuple(LEVEL_WORDS)
 KINDS = ("perception", "open-loop", "closed-loop")
 FRAMES = (ALWAYS, ON_FAILURE, NEVER) = ("always", "on-failure", "never")
 """When the pictures of a test's cameras are kept."""

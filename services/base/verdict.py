@@ -10,13 +10,17 @@ from typing import Any, Literal
 
 @dataclass(frozen=True)
 class Check:
-    """A measure with its limit (``min`` and ``max``, both inclusive); no finite value is null."""
+    """A measure with its limit, ``min`` and ``max``; no finite value is null.
+
+    A value at a limit passes, unless the limits are ``exclusive``, as of a distance that has to be more than 0.
+    """
 
     name: str
     value: float | None
     limit: Mapping[str, float] = field(default_factory=dict)
     unit: str = ""
     ok: bool = True
+    exclusive: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """The check in the verdict line; numbers may come from numpy."""
@@ -26,6 +30,7 @@ class Check:
             "limit": {key: _number(bound) for key, bound in self.limit.items() if math.isfinite(bound)},
             "unit": self.unit,
             "ok": bool(self.ok),
+            **({"exclusive": True} if self.exclusive else {}),
         }
 
 

@@ -38,10 +38,10 @@ class DriveMeasures:
         return Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0)
 
     def wall_check(self, limit: float) -> Check:
-        """The margin, at least its limit; a limit of zero has to be *exceeded*, as a wall touched is a wall hit."""
+        """The margin, at least its limit, or more than a limit of zero: a wall touched is a wall hit."""
         margin = self.wall_margin
         is_kept = margin is not None and margin >= limit and margin > 0.0
-        return Check("wall-margin", margin, {"min": limit}, "m", is_kept)
+        return Check("wall-margin", margin, {"min": limit}, "m", is_kept, exclusive=limit <= 0.0)
 
     @staticmethod
     def gate_check(crossed: int, gates: int) -> Check:

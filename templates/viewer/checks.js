@@ -3,12 +3,6 @@
 
 dodo.checks = (function () {
   const { make, withUnit } = dodo.dom;
-  const WORDS = { min: "at least", max: "at most" };
-  const EXCLUSIVE = { min: "more than", max: "less than" };
-
-  function limit(check) {
-    return Object.entries(check.limit).map(([side, value]) => `${(check.exclusive.includes(side) ? EXCLUSIVE : WORDS)[side]} ${withUnit(value, check.unit)}`).join(", ");
-  }
 
   // The line with the parameters that set the limit marked in it.
   function source(line, flags) {
@@ -30,7 +24,7 @@ dodo.checks = (function () {
   function row(check) {
     if (check.follows) return make("li", {}, make("b", {}, `– ${check.name}`), ` ${withUnit(check.value, check.unit)}, when the drive ended`);
     const state = check.ok ? "passed" : "failed";
-    const measured = [withUnit(check.value, check.unit), limit(check)].filter(Boolean).join(", expected ");
+    const measured = [withUnit(check.value, check.unit), check.limits.join(", ")].filter(Boolean).join(", expected ");
     return make("li", { class: state }, make("b", {}, `${check.ok ? "✓" : "✗"} ${check.name}`), ` ${measured}`, ...(check.ok ? [] : places(check)));
   }
 
@@ -38,7 +32,7 @@ dodo.checks = (function () {
     const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok || a.follows - b.follows || (a.value === null) - (b.value === null));
     parent.append(make("h2", {}, "Checks"));
     if (!all.length) parent.append(make("p", { class: "nothing" }, "No evaluator measured anything."));
-    const judged = all.filter((check) => Object.keys(check.limit).length || !check.ok);
+    const judged = all.filter((check) => check.limits.length || !check.ok);
     const others = all.filter((check) => !judged.includes(check));
     const notes = dodo.data.test.test.notes.map((note) => make("li", {}, `Note: ${note}`));
     parent.append(make("ul", { tabindex: "0" }, ...judged.map(row), ...notes, ...others.map(row)));

@@ -39,22 +39,20 @@ dodo.signals = (function () {
       const wanted = dodo.dom.number(interpolated(target, time));
       return `${n < 0 ? "–" : dodo.dom.number(values[n])} · target ${wanted}`;
     };
-    const parts = [raw.band !== null && `band ±${dodo.dom.number(raw.band)}`, raw.distance !== null && `at most ±${dodo.dom.number(raw.distance)}`, raw.problem];
+    const parts = [raw.band !== null && `band ±${dodo.dom.number(raw.band)}`, raw.limit, raw.problem];
     const title = `${raw.field} of ${data.short(raw.message)}/${raw.sender}`;
     return { title, unit: "", times, values, target, band: raw.band, reach: raw.distance, marked, text, note: parts.filter(Boolean).join(", ") };
   }
 
   function margin(raw) {
     const values = way.margins();
-    const note = raw.min ? `at least ${dodo.dom.number(raw.min)} m` : "more than 0 m";
     const marked = (n) => (values[n] <= 0 || values[n] < (raw.min ?? 0) ? "failed" : "");
-    return { title: "Distance to the walls", unit: "m", times: way.times, values, min: raw.min ?? 0, marked, note };
+    return { title: "Distance to the walls", unit: "m", times: way.times, values, min: raw.min ?? 0, marked, note: raw.limit };
   }
 
   function speed(raw) {
     const values = way.speeds();
-    const note = raw.max === null ? "" : `at most ${dodo.dom.number(raw.max)} m/s`;
-    return { title: "Speed", unit: "m/s", times: way.times, values, max: raw.max, marked: outside(values, null, raw.max), note };
+    return { title: "Speed", unit: "m/s", times: way.times, values, max: raw.max, marked: outside(values, null, raw.max), note: raw.limit };
   }
 
   // Right, missed and false boxes of each frame, one on top of the other.

@@ -1,5 +1,6 @@
 """Compose files of many styles, rewritten as the goldens have it and accepted by compose as part of a test."""
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import diagnostics
+from dodo_dsl.application.model import plain
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text
 from dodo_dsl.emit.render import render_plan
@@ -63,6 +65,23 @@ def test_goldens(style: str, way: str, monkeypatch: pytest.MonkeyPatch, update_g
     if update_goldens:
         golden.write_text(text)
     assert text == golden.read_text()
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("style", STYLES)
+def test_the_first_lines_name_each_key_that_differs(style: str, way: str, tmp_path: Path) -> None:
+    source, _ = read_application(files(FOLDER / "good" / style))
+    made, _ = plan(FOLDER / "good" / style, way, tmp_path)
+    assert source is not None and made.application is not None
+    copied = made.application.compose
+    for name, service in source.services.items():
+        written, ours = plain(service.node), copied["services"][name]
+        said = [line for line in made.application.changes if line.startswith((f"{name}: ", "all services: "))]
+        differ = [key for key in {**written, **ours} if written.get(key) != ours.get(key)]
+        assert [key for key in differ if not re.search(rf"[ :]{key}\b", " ".join(said))] == []
+    beside = {key: plain(node) for key, node in source.rest.items()}
+    said = [line for line in made.application.changes if ": " in line]
+    assert [key for key in beside if copied[key] != beside[key] and key.removesuffix("s") not in " ".join(said)] == []
 
 
 @pytest.mark.slow

@@ -25,7 +25,8 @@ def test_a_broken_test_is_one_line_beside_the_list(tmp_path: Path, monkeypatch: 
     spec.write_text(spec.read_text().replace("9.5 cm", "9.5").replace("level: sil", "level: sail"))
     code, out, err = dodo("list")
     assert (code, [line.split()[0] for line in out.splitlines()]) == (2, ["mine", "other"])
-    assert err == "problems in tests/mine/mine.dodo.yml; dodo compile --check shows them\n"
+    level = "sil: software in the loop: the world is simulated\n"
+    assert err == f"{level}problems in tests/mine/mine.dodo.yml; dodo compile --check shows them\n"
 
 
 def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -36,7 +37,9 @@ def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch
     code, out, err = dodo("list")
     assert code == 0
     assert "\nsil-perception" in out
-    assert err.startswith(
+    *levels, skipped = err.splitlines()
+    assert [line.split(",")[0].split(":")[0] for line in levels] == ["sil", "dil", "hil"]
+    assert skipped.startswith(
         "skipped shipped tests that need what the application does not send: dil-static-rig, hil-camera,"
     )
 

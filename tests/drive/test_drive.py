@@ -25,7 +25,7 @@ def good_drives(report: Path) -> None:
         assert test["outcome"] == "passed", test
         checks = {c["name"]: c for c in test["checks"]}
         assert 3.0 < checks["time-to-goal"]["value"] < 40.0
-        assert checks["wall-margin"]["value"] > 0.03
+        assert checks["wall-margin"]["value"] > 0.03 and checks["wall-margin"]["exclusive"]
         assert (report / slug / "trajectory.png").read_bytes().startswith(b"\x89PNG")
         assert (report / slug / "test.rec").stat().st_size > 10_000
 

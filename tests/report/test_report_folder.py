@@ -92,7 +92,7 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     assert "Test: t/gone.dodo.yml" in page
     assert "<td>late<br><small>samples or detections that came too late to be judged, ignored</small></td>" in page
     assert "<td>mean</td>" in page
-    assert "<td>max 0.75 s</td><td>0.25 s</td>" in page
+    assert "<td>at most 0.75\u00a0s</td><td>0.25\u00a0s</td>" in page
 
 
 def test_what_the_page_explains_are_checks_of_services() -> None:

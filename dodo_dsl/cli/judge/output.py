@@ -7,6 +7,7 @@ from dodo_dsl.cli.display import colours
 from dodo_dsl.cli.judge.known_run import KnownRun
 from dodo_dsl.diagnostics import Piece
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.report import check_words
 from dodo_dsl.run.protocol import VerdictEvent
 from dodo_dsl.run.recorded.judge import Judgement
 from dodo_dsl.run.recorded.test_recording import TestRecording
@@ -77,8 +78,7 @@ def _comparison(plan: Plan, judgement: Judgement, run: KnownRun | None) -> Itera
 def _checks(verdict: VerdictEvent) -> Iterator[str]:
     for check in verdict.checks:
         unit = f" {check['unit']}" if check["unit"] else ""
-        sides = {"min": "at least", "max": "at most"}
-        limits = " and ".join(f"{sides[side]} {value:g}{unit}" for side, value in check["limit"].items())
+        limits = ", ".join(check_words.limits(check))
         value = "none" if check["value"] is None else f"{_text(check['value'])}{unit}"
         margin = check.get("margin")
         margin_text = "" if margin is None else f", margin {_text(margin)}{unit}"

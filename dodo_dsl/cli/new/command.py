@@ -48,7 +48,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--language", choices=LANGUAGES, help="language of the application that --application writes (default: python)"
     )
-    parser.add_argument("--level", choices=LEVELS, help="level of the new test (default: sil)")
+    parser.add_argument(
+        "--level", choices=LEVELS, help="level of the new test: software, data or hardware in the loop (default: sil)"
+    )
     parser.add_argument("--kind", choices=KINDS, help="kind of the new test (default: closed-loop)")
     parser.add_argument("--extends", metavar="TEST", help="test that the new one changes; a shipped one is copied")
     parser.add_argument(

@@ -7,13 +7,9 @@ from typing import TextIO
 
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.new.starts import kinds, once, start
-from dodo_dsl.spec.model import LEVELS, Spec
+from dodo_dsl.spec.model import LEVEL_WORDS, Spec
 
-_LEVELS = {
-    "sil": "the world is simulated",
-    "dil": "the world was recorded",
-    "hil": "hardware: a rig, at first the emulated one",
-}
+_LEVELS = {**LEVEL_WORDS, "hil": f"{LEVEL_WORDS['hil']}, on a rig, at first the emulated one"}
 _KINDS = {
     "closed-loop": "the application drives",
     "open-loop": "the application is carried along, and its signals are judged",
@@ -45,7 +41,7 @@ class Questions:
         """The test, with what is not ``known`` of it already."""
         if known.extends or known.rec:
             return replace(known, name=self._name(f"my-{known.extends}" if known.extends else "dil-first"))
-        level = known.level or self._choice("level", [(name, _LEVELS[name]) for name in LEVELS])
+        level = known.level or self._choice("level", list(_LEVELS.items()))
         kind = known.kind or self._choice("kind", [(name, _KINDS[name]) for name in kinds(level)])
         first = start(level, kind)
         copies = [spec for spec in once(shipped) if (spec.level, spec.kind) == (level, kind)]

@@ -58,7 +58,11 @@ exit codes: 0 all passed, 1 some failed, 2 wrong usage or spec, 3 some ended in 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
     parser.add_argument(
-        "--level", action="append", choices=LEVELS, default=[], help="only tests of this level; repeatable"
+        "--level",
+        action="append",
+        choices=LEVELS,
+        default=[],
+        help="only tests of this level: software, data or hardware in the loop; repeatable",
     )
     parser.add_argument(
         "--backend",

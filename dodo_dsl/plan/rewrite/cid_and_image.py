@@ -24,13 +24,13 @@ def assign_cid(copy: ServiceCopy, in_files: tuple[str, ...]) -> None:
         before = service.get(key)
         if before is not None:
             service[key] = after = _command(before, cid)
-            assigned.extend([f"--cid={cid}"] if opendlv_flags.takes_cid(_words(after), {}) else [])
+            assigned.extend([f"{key}: --cid={cid}"] if opendlv_flags.takes_cid(_words(after), {}) else [])
     check = service.get("healthcheck")
     if isinstance(check, dict) and check.get("test") is not None:
         service["healthcheck"] = {**check, "test": _command(check["test"], cid)}
     assigned.extend(_assign_environment(service, cid, in_files))
-    if assigned:
-        copy.note(", ".join(dict.fromkeys(assigned)))
+    for change in assigned:
+        copy.note(change)
 
 
 def _command(command: Any, cid: int) -> Any:
@@ -60,7 +60,7 @@ def _assign_environment(service: dict[str, Any], cid: int, in_files: tuple[str, 
         return []
     service["environment"] = list(changed.values()) if isinstance(raw, list) else changed
     return [
-        f"{name}={cid}" if name in opendlv_flags.CID_VARIABLES else f"--cid={cid} in {name}"
+        f"environment: {f'{name}={cid}' if name in opendlv_flags.CID_VARIABLES else f'--cid={cid} in {name}'}"
         for name, value in changed.items()
         if pairs.get(name) != value
     ]

@@ -69,7 +69,7 @@ def remove_hardware(copy: ServiceCopy) -> None:
     for volume in service.get("volumes") or ():
         found = host_access.mount(copy.filled(volume))
         if host_access.is_hardware(found):
-            copy.note(f"{found.source} removed, the test has no hardware")
+            copy.note(f"volumes: {found.source} removed, the test has no hardware")
         else:
             kept.append(volume)
     copy.keep_items("volumes", kept)
@@ -95,7 +95,7 @@ def _remove_capabilities(copy: ServiceCopy) -> None:
     kept = [word for word in words if host_access.is_harmless_capability(copy.filled(word))]
     copy.keep_items("cap_add", kept)
     if taken := [str(word) for word in words if word not in kept]:
-        copy.note(f"capabilities removed: {', '.join(taken)}")
+        copy.note(f"cap_add: removed {', '.join(taken)}")
 
 
 def _remove_unconfined(copy: ServiceCopy) -> None:

@@ -11,7 +11,15 @@ from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, Word, environment, plain, text
 from dodo_dsl.application.test_variables import with_variables
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.plan.rewrite import cid_and_image, container_limits, removals, service_namespaces, variables, volumes
+from dodo_dsl.plan.rewrite import (
+    cid_and_image,
+    container_limits,
+    other_changes,
+    removals,
+    service_namespaces,
+    variables,
+    volumes,
+)
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 from dodo_dsl.source import Node
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -65,8 +73,10 @@ def plan_application(
     for key in ("secrets", "configs"):
         if isinstance(rest.get(key), dict):
             rest[key] = {name: volumes.without_name(about) for name, about in rest[key].items()}
+    changes = other_changes.of_all(changes, list(services))
     if "volumes" in rest:
         rest["volumes"] = volumes.own_volumes(rest["volumes"], changes, limits, known)
+    changes += other_changes.of_top_level(application, rest)
     planned = tuple(_planned(service, cid) for service in application.services.values())
     carried = variables.carried(application, cid, base, path_variables)
     secrets = {name: _relative(file, folder) for name, file in application.secrets.items()}
@@ -86,14 +96,20 @@ def _relative(path: Path, folder: Path) -> str:
 
 def _copied(service: ComposeService, node: Node, setting: Setting, changes: list[str]) -> dict[str, Any]:
     """The service rewritten, without keys that have no value, most of which compose refuses."""
-    kept = {key: value for key, value in plain(node).items() if key not in KEYS and value is not None}
-    if isinstance(build := kept.get("build"), dict):
-        kept["build"] = {key: value for key, value in build.items() if value is not None}
+    kept = {key: value for key, value in _with_values(plain(node)).items() if key not in KEYS}
     copy = ServiceCopy(service.name, kept, setting, changes)
     cid_and_image.assign_cid(copy, service.cid_variables)
     for step in _STEPS:
         step(copy)
+    other_changes.note_others(copy, _with_values(plain(service.node)), _with_values(plain(node)))
     return copy.service
+
+
+def _with_values(service: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {key: value for key, value in service.items() if value is not None}
+    if isinstance(build := kept.get("build"), dict):
+        kept["build"] = {key: value for key, value in build.items() if value is not None}
+    return kept
 
 
 def _planned(service: ComposeService, cid: int) -> ApplicationService:

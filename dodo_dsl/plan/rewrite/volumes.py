@@ -35,7 +35,7 @@ def _renamed(copy: ServiceCopy, volume: Any) -> Any:
     found = host_access.mount(volume)
     if found.source not in OWN_VOLUMES or (isinstance(volume, dict) and volume.get("type", "volume") != "volume"):
         return volume
-    copy.note(f"volume {found.source} renamed to {renamed(found.source)}")
+    copy.note(f"volumes: {found.source} renamed to {renamed(found.source)}")
     if isinstance(volume, dict):
         return {**volume, "source": renamed(found.source)}
     return ":".join([renamed(found.source), *split_outside(volume, ":")[1:]])
@@ -45,12 +45,12 @@ def _own(copy: ServiceCopy, volume: Any) -> Any:
     """The mount as an isolated test has it, None for shared memory, which it has already."""
     found = host_access.mount(volume)
     if host_access.is_shared_memory(found):
-        copy.note(f"{found.source} removed, shared memory is the test's own")
+        copy.note(f"volumes: {found.source} removed, shared memory is the test's own")
         return None
     is_token = found.below("/tmp") and found.source == found.target and not found.below(_DISPLAYS)
     if found.source != "/tmp" and not is_token:
         return volume
-    copy.note("/tmp is the test's own")
+    copy.note("volumes: /tmp is the test's own")
     target = "/tmp" if is_token else found.target
     if isinstance(volume, str):
         options = [word for part in split_outside(volume, ":")[2:] for word in part.split(",") if word in ("ro", "rw")]

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from dodo_dsl.margins import with_margin
 from dodo_dsl.outcome import SLOW_ANSWERS
+from dodo_dsl.report import check_words
 
 NEGLIGIBLE = 0.01
 """Share of a limit by which a value may change without a word, where only its last decimal shows that."""
@@ -26,9 +27,9 @@ class CheckChange:
     before: float | None
     after: float | None
     direction: Direction
-    limit: Mapping[str, float]
-    """As it is now."""
-    old_limit: Mapping[str, float]
+    limits: tuple[str, ...]
+    """In words, as they are now."""
+    old_limits: tuple[str, ...]
     old_unit: str
     is_crossing: bool
     """Whether it is on the other side of its limit now."""
@@ -49,8 +50,8 @@ def check_change(before: Mapping[str, Any], after: Mapping[str, Any], index: int
         before["value"],
         after["value"],
         _direction(before, after),
-        after.get("limit") or {},
-        before.get("limit") or {},
+        tuple(check_words.limits(after)),
+        tuple(check_words.limits(before)),
         before.get("unit") or "",
         bool(before["ok"]) != bool(after["ok"]),
     )

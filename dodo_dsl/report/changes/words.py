@@ -1,7 +1,5 @@
 """The words for changes, which the terminal, Markdown and the page have in common."""
 
-from collections.abc import Mapping
-
 from dodo_dsl.report.changes.check_change import CheckChange
 from dodo_dsl.report.changes.comparison import TestChange
 
@@ -11,20 +9,14 @@ def value(number: float | None, unit: str) -> str:
     return "none" if number is None else f"{number:.4g} {unit}".rstrip()
 
 
-def bounds(limit: Mapping[str, float], unit: str) -> str:
-    """``min 0.03 m, max 1 m``; empty without a limit."""
-    return ", ".join(f"{key} {value(limit[key], unit)}" for key in ("min", "max") if key in limit)
-
-
 def difference(check: CheckChange) -> str:
     """``-0.07 m``; empty where there is none to tell."""
     return "" if not check.difference else f"{check.difference:+.3g} {check.unit}".rstrip()
 
 
 def change(check: CheckChange) -> str:
-    """``0.12 m -> 0.05 m (-0.07 m; limit: min 0.03 m)``"""
-    limit = bounds(check.limit, check.unit)
-    old = bounds(check.old_limit, check.old_unit)
+    """``0.12 m -> 0.05 m (-0.07 m; limit: at least 0.03 m)``"""
+    limit, old = ", ".join(check.limits), ", ".join(check.old_limits)
     was = f", was {old or 'none'}" if limit != old else ""
     notes = [difference(check), f"limit: {limit or 'none'}{was}" if limit or was else ""]
     told = "; ".join(filter(None, notes))

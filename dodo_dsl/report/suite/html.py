@@ -59,6 +59,7 @@ MEANINGS = {
 
 
 _BREAKS = re.compile(r"(?=\[)|(?<=,)")
+_UNITS = re.compile(r"(?<=\d) (?=\S)")
 _MOST_TEXT = 10_000
 """Characters of one text of others on the page."""
 _URGENCIES = ("error", "failed", "passed")
@@ -100,6 +101,7 @@ def render(
             style=style(),
             hash=source_hash,
             breakable=breakable,
+            unbroken=unbroken,
         )
     )
 
@@ -124,6 +126,11 @@ def environment() -> jinja2.Environment:
 def breakable(name: str) -> Markup:
     """A test's name, which lines may break before its values and between them."""
     return Markup("<wbr>").join(_BREAKS.split(_harmless(name)))
+
+
+def unbroken(text: str) -> Markup:
+    """Values whose units stay in the line of their numbers."""
+    return Markup("\u00a0").join(_UNITS.split(_harmless(text)))
 
 
 def source_hash(text: str) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.report import check_words
 from dodo_dsl.report.viewer import target
 from dodo_dsl.report.viewer.encoded import packed, shown
 from dodo_dsl.report.viewer.recorded import RecordedTest
@@ -74,7 +75,8 @@ def _signal(
         "field": flags.get("field", ""),
         "target": {"times": packed(times[:_MOST]), "values": packed(values[:_MOST])},
         "band": number(flags.get("band")),
-        "distance": number(flags.get("max-distance")),
+        "distance": (distance := number(flags.get("max-distance"))),
+        "limit": "" if distance is None else f"distance {check_words.bound('max', distance)}",
         "from": number(flags.get("from")),
         "until": number(flags.get("until")),
         "problem": problem,
@@ -95,8 +97,12 @@ def _target(flags: Mapping[str, str], folder: Path, test: RecordedTest, messages
 
 def _track(service: PlannedService, flags: Mapping[str, str]) -> Iterator[dict[str, Any]]:
     if flags.get("walls"):
-        yield {"kind": "margin", "evaluator": service.name, "min": number(flags.get("min-margin"))}
-    yield {"kind": "speed", "evaluator": service.name, "max": number(flags.get("max-speed"))}
+        least = number(flags.get("min-margin"))
+        limit = check_words.bound("min", least or 0.0, "m", exclusive=not least)
+        yield {"kind": "margin", "evaluator": service.name, "min": least, "limit": limit}
+    most = number(flags.get("max-speed"))
+    limit = "" if most is None else check_words.bound("max", most, "m/s")
+    yield {"kind": "speed", "evaluator": service.name, "max": most, "limit": limit}
     for request in filter(None, flags.get("requests", "").split(",")):
         message, _, sender = request.partition("/")
         yield {"kind": "request", "evaluator": service.name, "message": shown(message, 100), "sender": whole(sender)}

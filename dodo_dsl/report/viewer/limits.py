@@ -57,10 +57,9 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines) -> Iterator[dict[str,
         yield {
             "name": shown(check["name"], 100),
             "value": check["value"],
-            "limit": {key: value for key, value in (check.get("limit") or {}).items() if key in ("min", "max")},
+            "limits": [shown(words, 80) for words in check_words.limits(check)],
             "unit": shown(check.get("unit") or "", 40),
             "ok": bool(check["ok"]),
-            "exclusive": [side for side in check.get("limit") or {} if check_words.is_exclusive(check, side)],
             "follows": check_words.only_follows(check, outcome.checks),
             "margin": check.get("margin"),
             "places": [

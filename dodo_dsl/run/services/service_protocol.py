@@ -32,6 +32,7 @@ _OUTCOMES = ("passed", "failed")
 _STOPS = ("unanswered", "stuck", "timedout")
 _MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
+_OPTIONAL_CHECK_KEYS = {"exclusive"}
 _EVIDENCE_KEY = re.compile(r"[a-z][a-z0-9-]{0,39}")
 _MOST_EVIDENCE, _MAX_EVIDENCE_TEXT = 20, 200
 
@@ -155,7 +156,7 @@ def _check_problem(check: object) -> str:
     if not isinstance(check, dict) or not _is_text(check.get("name")):
         return "a check has no name"
     name = check["name"]
-    surplus = set(check) - _CHECK_KEYS
+    surplus = set(check) - _CHECK_KEYS - _OPTIONAL_CHECK_KEYS
     missing = _CHECK_KEYS - set(check)
     if missing:
         return f"check '{name}' has no key '{min(missing)}'"
@@ -168,8 +169,9 @@ def _check_problem(check: object) -> str:
     limit = check["limit"]
     if not isinstance(limit, dict) or not all(k in ("min", "max") and _is_number(v) for k, v in limit.items()):
         return f"the limit of check '{name}' is not an object of numbers 'min' and 'max'"
-    if not isinstance(check.get("ok"), bool):
-        return f"check '{name}': 'ok' is neither true nor false"
+    for key in ("ok", "exclusive"):
+        if not isinstance(check.get(key, False), bool):
+            return f"check '{name}': '{key}' is neither true nor false"
     return ""
 
 

@@ -53,7 +53,7 @@ def test_verbose_shows_checks_and_what_services_complained_of(tmp_path: Path) ->
     stream = StringIO()
     summary.write(stream, [passed], {"ok": "ok"}, [], Verbosity.VERBOSE, {"ok": tmp_path})
     assert stream.getvalue().splitlines()[2:8] == [
-        "        ok   gap: 0.5 m (min 0.1)",
+        "        ok   gap: 0.5 m (at least 0.1 m)",
         "        steering: warning: late�",
         "        steering: Traceback",
         "        steering:   File x",

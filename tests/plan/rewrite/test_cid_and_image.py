@@ -26,12 +26,12 @@ def test_images(service: dict[str, Any], image: str | None) -> None:
 @pytest.mark.parametrize(
     ("service", "changed", "notes"),
     [
-        ({"command": "p --cid=111"}, {"command": "p --cid=140"}, ["a: --cid=140"]),
-        ({"command": ["p", "--cid", 111]}, {"command": ["p", "--cid", "140"]}, ["a: --cid=140"]),
+        ({"command": "p --cid=111"}, {"command": "p --cid=140"}, ["a: command: --cid=140"]),
+        ({"command": ["p", "--cid", 111]}, {"command": ["p", "--cid", "140"]}, ["a: command: --cid=140"]),
         ({"entrypoint": "p", "command": "-v"}, {"entrypoint": "p", "command": "-v"}, []),
-        ({"environment": ["CID=111", "X=1"]}, {"environment": ["CID=140", "X=1"]}, ["a: CID=140"]),
-        ({"environment": {"CID": 111, "X": 1}}, {"environment": {"CID": "140", "X": 1}}, ["a: CID=140"]),
-        ({"environment": ["ARGS=--cid=1"]}, {"environment": ["ARGS=--cid=140"]}, ["a: --cid=140 in ARGS"]),
+        ({"environment": ["CID=111", "X=1"]}, {"environment": ["CID=140", "X=1"]}, ["a: environment: CID=140"]),
+        ({"environment": {"CID": 111, "X": 1}}, {"environment": {"CID": "140", "X": 1}}, ["a: environment: CID=140"]),
+        ({"environment": ["ARGS=--cid=1"]}, {"environment": ["ARGS=--cid=140"]}, ["a: environment: --cid=140 in ARGS"]),
         ({"healthcheck": {"test": "p --cid=1"}}, {"healthcheck": {"test": "p --cid=140"}}, []),
         ({"healthcheck": {"disable": True}}, {"healthcheck": {"disable": True}}, []),
     ],
@@ -54,4 +54,4 @@ def test_cids_of_environment_files(written: Any, changed: Any) -> None:
     own = copy({"environment": written})
     assign_cid(own, ("OD4SESSION_CID",))
     assert own.service["environment"] == changed
-    assert own.changes == ["a: OD4SESSION_CID=140"]
+    assert own.changes == ["a: environment: OD4SESSION_CID=140"]

@@ -66,11 +66,11 @@ def test_without_a_rig() -> None:
     assert own.service == {**UNPRIVILEGED, "volumes": ["./a:/a"]}
     assert own.changes == [
         "a: privileged removed",
-        "a: capabilities removed: NET_RAW, ${C:-SYS_ADMIN}",
+        "a: cap_add: removed NET_RAW, ${C:-SYS_ADMIN}",
         "a: security_opt keeps the engine's confinement",
         "a: privileged removed from build",
         "a: devices removed, the test has no hardware",
-        "a: /dev/bus removed, the test has no hardware",
+        "a: volumes: /dev/bus removed, the test has no hardware",
     ]
 
 

@@ -68,9 +68,25 @@ def test_own_network(tmp_path: Path) -> None:
             },
         }
     }
-    assert "perception: --cid=140" in application.changes
-    assert "steering: OD4SESSION_CID=140" in application.changes
-    assert "steering: ports removed, tests publish none" in application.changes
+    added = "cap_drop, ipc, logging, mem_limit, pids_limit, security_opt, ulimits"
+    assert application.changes == (
+        "perception: command: --cid=140",
+        "perception: image from DODO_IMAGE_PERCEPTION, where it is set",
+        "perception: container_name removed, compose names the container",
+        "perception: restart removed, containers are not restarted",
+        "perception: ipc is the test's own",
+        "perception: volumes: /tmp is the test's own",
+        "perception: paths start at this folder: build, volumes",
+        f"perception: added for the test: {added.replace('ipc, ', 'depends_on, ')}",
+        "perception: left out: x-dodo, x-dodo-process",
+        "steering: environment: OD4SESSION_CID=140",
+        "steering: image from DODO_IMAGE_STEERING, where it is set",
+        "steering: ports removed, tests publish none",
+        "steering: changed for the test: depends_on",
+        f"steering: added for the test: {added}",
+        "all services: network_mode removed, the test has a network of its own",
+        "left out: version",
+    )
 
 
 def test_host_network_keeps_what_is_host(tmp_path: Path) -> None:

@@ -77,10 +77,10 @@ def test_margins_are_those_of_the_results_where_they_have_any() -> None:
 @pytest.mark.parametrize(
     ("before", "after", "told"),
     [
-        (check(0.12, min=0.03), check(0.05, min=0.03), "0.12 m -> 0.05 m (-0.07 m; limit: min 0.03 m)"),
+        (check(0.12, min=0.03), check(0.05, min=0.03), "0.12 m -> 0.05 m (-0.07 m; limit: at least 0.03 m)"),
         (check(1, unit=""), check(3, unit=""), "1 -> 3 (+2)"),
-        (check(1, max=2), check(None, ok=False, max=3), "1 m -> none (limit: max 3 m, was max 2 m)"),
-        (check(1, max=2), check(900, unit="mm"), "1 m -> 900 mm (limit: none, was max 2 m)"),
+        (check(1, max=2), check(None, ok=False, max=3), "1 m -> none (limit: at most 3 m, was at most 2 m)"),
+        (check(1, max=2), check(900, unit="mm"), "1 m -> 900 mm (limit: none, was at most 2 m)"),
     ],
 )
 def test_a_change_in_words(before: dict[str, Any], after: dict[str, Any], told: str) -> None:

@@ -65,7 +65,7 @@ def test_the_terminal_shows_what_changed() -> None:
         "  FIXED          b  failed -> passed  drove",
         "  new check      a  x",
         "  new check      d  y",
-        "  worse          d  x  1 m -> 1.5 m (+0.5 m; limit: max 2 m)",
+        "  worse          d  x  1 m -> 1.5 m (+0.5 m; limit: at most 2 m)",
         "  1 check unchanged",
     ]
 
@@ -91,7 +91,7 @@ def test_markdown_shows_what_changed() -> None:
         "- `b`: failed -> passed, `drove`",
         "",
         "**Checks: worse (1)**",
-        "- `d` `x`: `1 m -> 1.5 m (+0.5 m; limit: max 2 m)`",
+        "- `d` `x`: `1 m -> 1.5 m (+0.5 m; limit: at most 2 m)`",
     ]  # fmt: skip
 
 

@@ -11,9 +11,11 @@ import pytest
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.suite import check_history
 from dodo_dsl.report.suite.html import ReportFiles, ReportPicture, breakable, render
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named, write
+from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
 from tests.report.viewer.hostile import HOSTILE
 
@@ -88,6 +90,36 @@ def test_tests_are_searched_filtered_and_sorted(chromium: Chromium, tmp_path: Pa
         page.wait("document.documentElement.scrollWidth <= innerWidth")
         assert page.faults == []
         assert [url for url in page.requests if not url.startswith((tmp_path.as_uri(), "data:,"))] == []
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("chromium")
+def test_no_column_is_clipped(chromium: Chromium, tmp_path: Path) -> None:
+    """With a picture beside the widest table: checks that failed and follow, a comparison, and latest runs."""
+    outcomes = drives.write(tmp_path, [failures.wall_hit()])
+    late = {**check(-12345.678, ok=False, unit="m/s", max=-0.012345), "name": "mean-over-time"}
+    new = [
+        replace(test, checks=(*test.checks, {**check(1.8, ok=False, max=0), "name": "to-goal"}, late))
+        for test in outcomes
+    ]
+    grid = [named(f"m[light={light},speed={speed}]") for light in (0.45, 1) for speed in (1, 2)]
+    old = [
+        replace(test, outcome="passed", checks=tuple({**c, "value": 0.123456, "ok": True} for c in test.checks))
+        for test in new
+    ]
+    runs = [{"when": n, "outcome": "passed", "checks": {c["name"]: n for c in new[0].checks}} for n in range(3)]
+    check_history.write(tmp_path, {new[0].slug: runs})
+    comparison = compare([*new, *grid], GivenReport(Path("main/results.json"), [*old, *grid]))
+    for changes in (None, comparison):
+        write_summaries(tmp_path, [*new, *grid], changes)
+        with chromium.page((tmp_path / "index.html").as_uri()) as page:
+            assert page.value("document.querySelectorAll('.facts .curve, .pictures img').length") > 3
+            for width in (1366, 1024, 768, 390):
+                page.resize(width, 900)
+                page.wait("document.documentElement.scrollWidth <= innerWidth")
+                cells = "Array.from(document.querySelectorAll('.facts, .wide, .wide :is(th, td), .checks :is(th, td)'))"
+                wide = f"{cells}.filter(e => e.scrollWidth > e.clientWidth + 1 && e.checkVisibility())"
+                assert page.value(f"{wide}.map(e => [e.className, e.textContent, e.scrollWidth])") == [], width
 
 
 @pytest.mark.slow

@@ -32,7 +32,8 @@ def timed_out() -> MadeDrive:
     time, reason = 40.0, "did not reach finish within 40.00 s: the vehicle is at x = 0.00 m, y = 0.40 m, 2.42 m from it"
     samples = [*poses(lambda t: (0.0, min(0.1 * t, 0.4), math.pi / 2), time), *requests(lambda t: 0.0, time)]
     said = verdict("track", reason, time=time, x=0.0, y=0.4)
-    checks = (check("time-to-goal", None, False, "s", max=40), check("wall-margin", 0.17, True, "m", min=0))
+    clear = {**check("wall-margin", 0.17, True, "m", min=0), "exclusive": True}
+    checks = (check("time-to-goal", None, False, "s", max=40), clear)
     return MadeDrive("sil-closed-straight", time, samples, {"reason": reason, "checks": checks, "verdicts": (said,)})
 
 

@@ -117,6 +117,13 @@ def test_keys_clicks_and_addresses_move_the_cursor(page: Page) -> None:
     page.wait("dodo.cursor.time() > 0.8")
 
 
+@pytest.mark.parametrize("page", ["timeout"], indirect=True)
+def test_a_limit_has_the_same_words_beside_a_check_and_a_plot(page: Page) -> None:
+    shown = page.value("document.body.innerText")
+    assert shown.count("more than 0 m") == 2 and "at least 0 m" not in shown
+    assert "0.17 m, expected more than 0 m" in shown
+
+
 @pytest.mark.parametrize("page", ["missed cones"], indirect=True)
 def test_a_frame_is_shown_with_its_boxes(page: Page) -> None:
     frame = page.value("dodo.detection.at(dodo.cursor.time())")

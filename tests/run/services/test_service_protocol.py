@@ -118,6 +118,7 @@ MALFORMED = {
     "huge": (line(checks=[{**CHECK, "value": int("1" * 400)}]), "the value of check 'time' is not a finite number"),
     "unit": (line(checks=[{**CHECK, "unit": 3}]), "the unit of check 'time' is not a string"),
     "ok": (line(checks=[{**CHECK, "ok": 1}]), "check 'time': 'ok' is neither true nor false"),
+    "exclusive": (line(checks=[{**CHECK, "exclusive": 1}]), "check 'time': 'exclusive' is neither true nor false"),
     "limit": (
         line(checks=[{**CHECK, "limit": {"most": 1}}]),
         "the limit of check 'time' is not an object of numbers 'min' and 'max'",

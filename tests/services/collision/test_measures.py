@@ -43,7 +43,8 @@ def test_the_smallest_margin_keeps_its_limit_and_is_above_zero(
     for margin in margins:
         measures.approach(margin)
     smallest = min(margins, default=None)
-    assert measures.wall_check(limit) == Check("wall-margin", smallest, {"min": limit}, "m", is_kept)
+    check = Check("wall-margin", smallest, {"min": limit}, "m", is_kept, exclusive=limit == 0.0)
+    assert measures.wall_check(limit) == check
 
 
 def test_goal_and_gates() -> None:
