@@ -13,6 +13,8 @@ _COMPLETES = "_ARGCOMPLETE"
 def run() -> None:
     if sys.stdout is None or sys.stderr is None:
         sys.exit(_refuse_closed())
+    if sys.getfilesystemencoding() != "utf-8":
+        _start_again_in_utf8()
     if _COMPLETES in os.environ:
         from dodo_dsl.cli.completion.protocol import answer
 
@@ -30,6 +32,15 @@ def run() -> None:
     except KeyboardInterrupt:
         code = 130
     sys.exit(_flushed(code))
+
+
+def _start_again_in_utf8() -> None:
+    """Replaces this process by one in Python's UTF-8 mode (PEP 540), as all that it starts will be.
+
+    Whatever the locale, names of files are bytes, and specs, messages and reports are UTF-8.
+    """
+    words = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
+    os.execve(sys.executable, words, {**os.environ, "PYTHONUTF8": "1"})
 
 
 def _refuse_closed() -> int:

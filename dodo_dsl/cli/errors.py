@@ -1,5 +1,7 @@
 """The end of a command that cannot go on: one sentence and an exit code, whichever part of DoDo raised the error."""
 
+import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -24,7 +26,7 @@ def files_of_the_user() -> Iterator[None]:
 
 def exit_code(error: Exception) -> Exit | None:
     """The exit code of an error that its own sentence explains; None for an unexpected one."""
-    if isinstance(error, UsageError):
+    if isinstance(error, UsageError) or _is_no_utf8(error):
         return Exit.USAGE
     if isinstance(error, _usage_errors()) or getattr(error, "usage", False):
         return Exit.USAGE
@@ -33,10 +35,25 @@ def exit_code(error: Exception) -> Exit | None:
 
 def sentence(error: Exception) -> str:
     """The error's own text; an error of the system without its number, with its file."""
+    if isinstance(error, UnicodeEncodeError) and _is_no_utf8(error):
+        return _of_no_utf8(error)
     if not isinstance(error, OSError):
         return str(error).rstrip("\n")
     place = f"{error.filename}: " if error.filename else ""
     return f"{place}{error.strerror or error}"
+
+
+def _is_no_utf8(error: Exception) -> bool:
+    """Whether the bytes of a name, which are no UTF-8, were to be written as text."""
+    return isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed"
+
+
+def _of_no_utf8(error: UnicodeEncodeError) -> str:
+    """The text may be a whole file, of which the name is one value."""
+    begin = max(error.object.rfind(end, 0, error.start) for end in '"\n') + 1
+    name = re.split(r'["\n]', error.object[begin:], maxsplit=1)[0]
+    shown = os.fsencode(name).decode("utf-8", "backslashreplace")
+    return f"'{shown}' is not UTF-8, as names of files and folders must be here: rename it"
 
 
 def _usage_errors() -> tuple[type[Exception], ...]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import jinja2
-import orjson
 import yaml
 
 from dodo_dsl import package_data
@@ -16,7 +15,7 @@ from dodo_dsl.emit.containers import containers
 from dodo_dsl.emit.job_options import NO_OPTIONS, JobOptions
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
-from dodo_dsl.plan.plan_json import to_json
+from dodo_dsl.plan.plan_json import json_text, to_json
 from dodo_dsl.source import resolve
 from dodo_dsl.template_cache import compiled_templates
 
@@ -77,7 +76,7 @@ def _dumped(value: dict[str, Any]) -> str:
 
 def _yaml(value: Any) -> str:
     """A scalar as JSON, which YAML reads as the same value."""
-    return orjson.dumps(value).decode()
+    return json_text(value)
 
 
 @functools.cache

@@ -38,7 +38,16 @@ class PlanError(ValueError):
 def to_json(plan: Plan) -> str:
     own = {field.name: getattr(plan, field.name) for field in dataclasses.fields(plan)}
     document = {"dodo": "plan", "version": FORMAT, **own}
-    return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE).decode()
+    return json_text(document, orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+
+
+def json_text(value: Any, option: int = 0) -> str:
+    """JSON by orjson; raises UnicodeEncodeError where a text is not UTF-8, as a path may be."""
+    try:
+        return orjson.dumps(value, option=option).decode()
+    except TypeError:
+        json.dumps(value, ensure_ascii=False, default=dataclasses.asdict).encode()  # it tells which text
+        raise
 
 
 def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008  (it is frozen)

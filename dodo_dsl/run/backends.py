@@ -18,7 +18,6 @@ from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.attendance import RigSession, attended, is_real, refuse_hardware
 
 Say = Callable[[str], None]
-WAY_OUT = "install bubblewrap and allow user namespaces, or trust the application and run with --isolation host"
 
 
 @dataclass(frozen=True)
@@ -96,15 +95,16 @@ class Processes:
         wanted = {self._isolation or plan.isolation for plan in plans}
         self._start_fork_server(plans if "network" in wanted else ())
         if self._isolation is None and "network" in wanted:
-            refusal = await asyncio.to_thread(host_isolation.namespaces_refusal, self._fork_server)
-            if refusal:
-                self._problem = f"the application cannot be isolated on this machine: {refusal}; {WAY_OUT}"
+            if refusal := await asyncio.to_thread(host_isolation.isolation_refusal, self._fork_server):
+                remedy = f"{refusal.remedy}, or trust" if refusal.remedy else "trust"
+                way_out = f"{remedy} the application and run with --isolation host"
+                self._problem = f"the application cannot be isolated on this machine: {refusal}; {way_out}"
                 return
         if "host" in wanted or any(is_real(plan) for plan in plans):
-            refusal = await asyncio.to_thread(host_isolation.process_namespace_refusal)
-            self._is_apart = not refusal
-            if refusal:
-                note(f"what an application starts may outlive its test on the host: {refusal}")
+            why = await asyncio.to_thread(host_isolation.process_namespace_refusal)
+            self._is_apart = not why
+            if why:
+                note(f"what an application starts may outlive its test on the host: {why}")
 
     def _start_fork_server(self, plans: Sequence[Plan]) -> None:
         """One for the services of these tests, none where there are none."""

@@ -18,6 +18,8 @@ from dodo_dsl.opendlv.memory.token_file import MAX_NAME, SharedMemoryError
 
 FOLDER = Path("/dev/shm")  # where the C library's shm_open keeps its objects
 _SLICE = 0.1  # seconds
+MODE = 0o666
+"""Whatever the umask: the application, another user, takes its lock."""
 _FLAGS = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
@@ -43,12 +45,13 @@ class PosixSegment:
         """Make it anew; what a dead creator left is removed. Raises SharedMemoryError."""
         try:
             _remove_orphan(path)
-            token = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
+            token = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, MODE)
         except SharedMemoryError:
             raise
         except OSError as error:
             raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {path}: {error.strerror}") from None
         try:
+            os.fchmod(token, MODE)
             fcntl.flock(token, fcntl.LOCK_SH | fcntl.LOCK_NB)  # tells other creators that we live
             os.posix_fallocate(token, 0, HEADER_BYTES + size)  # a full memory is an error now, not a SIGBUS later
             memory = mmap.mmap(token, HEADER_BYTES + size)

@@ -6,10 +6,13 @@ give the same keys. A creator therefore moves its token to another inode when an
 
 import os
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 FOLDER = "/tmp"
 MAX_NAME = 254
+MODE = 0o644
+"""Whatever the umask: the application, another user, looks for it."""
 ATTEMPTS = 100
 
 
@@ -48,9 +51,13 @@ def open_or_create(path: Path) -> tuple[int, bool]:
     """A descriptor of the token file, and whether it was there before; raises SharedMemoryError."""
     existed = path.exists()
     try:
-        return os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666), existed
+        token = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, MODE)
     except OSError as error:
         raise _not_made(path, error) from None
+    if not existed:
+        with suppress(PermissionError):  # another user made it meanwhile
+            os.fchmod(token, MODE)
+    return token, existed
 
 
 def move_to_other_inode(path: Path) -> None:
@@ -59,8 +66,10 @@ def move_to_other_inode(path: Path) -> None:
     try:
         for attempt in range(ATTEMPTS):
             spare = path.with_name(f".{path.name}.{os.getpid()}.{attempt}")
-            os.close(os.open(spare, os.O_RDONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666))
+            token = os.open(spare, os.O_RDONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, MODE)
             tried.append(spare)
+            os.fchmod(token, MODE)
+            os.close(token)
             if not collides(spare):
                 spare.replace(path)
                 return

@@ -21,9 +21,9 @@ _SEGMENT_BYTES = 64 << 20
 
 def namespaces() -> Iterator[Capability]:
     """Whether tests can have namespaces of their own."""
-    refusal = host_isolation.namespaces_refusal()
-    if refusal:
-        advice = "sudo apt install bubblewrap; allow user namespaces; or, for applications you trust, --isolation host"
+    if refusal := host_isolation.isolation_refusal():
+        remedy = f"{refusal.remedy}; " if refusal.remedy else ""
+        advice = f"{remedy}for applications you trust, --isolation host"
         yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal}", advice)
     else:
         yield Capability(

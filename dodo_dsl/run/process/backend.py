@@ -96,7 +96,8 @@ class ProcessBackend:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
                 await asyncio.wait_for(output.done.wait(), 1.0)
         if failed:
-            self._events.put_nowait(Unstartable(exited, " ".join(self.tail(exited)[-1:]) or "it has no sandbox"))
+            why = " ".join(self.tail(exited)[-1:]) or f"exit code {code}"
+            self._events.put_nowait(Unstartable(exited, f"its sandbox cannot be set up: {why}"))
             return
         if used:
             most = self.plan.application.limits.memory

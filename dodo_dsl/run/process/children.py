@@ -40,8 +40,10 @@ class ChildExit:
 class Children:
     """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how."""
 
-    def __init__(self, on_exit: Callable[[str, ChildExit], None]) -> None:
+    def __init__(self, on_exit: Callable[[str, ChildExit], None], umask: int = -1) -> None:
+        """``umask`` is that of programs that are started, by default this process's."""
         self._on_exit = on_exit
+        self._umask = umask
         self._running: dict[str, Child] = {}
         self._used: dict[str, int] = {}
         self.names: dict[int, str] = {}
@@ -72,6 +74,7 @@ class Children:
             stdout=output,
             stderr=output,
             start_new_session=True,
+            umask=self._umask,
             preexec_fn=functools.partial(_begin, os.getpid(), masked),  # noqa: PLW1509  (it has one thread)
         )
         return self._add(name, child)
@@ -86,7 +89,7 @@ class Children:
         places: Places | None,
     ) -> int:
         """Starts a program of the application; raises as ``start``, and NoSeccomp."""
-        return self._add(name, ConfinedProcess(words, environment, output, confined, places))
+        return self._add(name, ConfinedProcess(words, environment, output, confined, places, self._umask))
 
     @property
     def are_watched(self) -> bool:

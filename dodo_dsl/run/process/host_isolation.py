@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.process.confined.bubblewrap import PROGRAM
+from dodo_dsl.run.process.confined.confined_probe import BUBBLEWRAP, NAMESPACES
 from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
@@ -26,8 +28,30 @@ from dodo_dsl.run.protocol import BackendError
 PROBE_S = 0.3
 
 
-def namespaces_refusal(fork_server: ForkServer | None = None) -> str:
-    """Why tests and applications cannot have namespaces of their own on this machine; empty when they can.
+@dataclass(frozen=True)
+class Refusal:
+    """Why applications cannot be isolated; ``missing`` is what was found missing by a trial of its own, or empty."""
+
+    why: str
+    missing: str = ""
+
+    @property
+    def remedy(self) -> str:
+        """What to do about what is missing; empty where nothing is."""
+        if self.missing == NAMESPACES and os.getuid() == 0:
+            return "allow this container to make namespaces (docker run --privileged, for example)"
+        return {BUBBLEWRAP: "install bubblewrap", NAMESPACES: "allow user namespaces"}.get(self.missing, "")
+
+    def __str__(self) -> str:
+        if self.missing == BUBBLEWRAP:
+            return f"there is no program '{PROGRAM}'"
+        if self.missing == NAMESPACES:
+            return f"the kernel refuses namespaces: {self.why}"
+        return f"to start 'true' in a sandbox ended with: {self.why}"
+
+
+def isolation_refusal(fork_server: ForkServer | None = None) -> Refusal | None:
+    """Why tests and applications cannot have namespaces of their own on this machine; None when they can.
 
     A sandbox tries it, which the fork server forks, where there is one.
     """
@@ -36,7 +60,8 @@ def namespaces_refusal(fork_server: ForkServer | None = None) -> str:
         with contextlib.suppress(OSError):  # it has ended, which says nothing about the machine
             answer = _probe(fork_server.fork)
     answer = answer or _probe(_start)
-    return str(answer.get("probe", answer.get("down", "the kernel refuses them")))
+    why = str(answer.get("probe", answer.get("down", "the sandbox ended at once")))
+    return Refusal(why, str(answer.get("missing", ""))) if why else None
 
 
 def _probe(start: Callable[[socket.socket, int, str], "subprocess.Popen[bytes] | None"]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """An own network, IPC, process and ``/tmp`` for a test, by Linux namespaces; no other program is needed.
 
 Inside, ``lo`` is up and carries multicast, ``/tmp`` and ``/dev/shm`` are empty and private, and the folders that lay
-in ``/tmp`` stay visible, so that programs and specs kept there still run.
+in them stay visible, so that programs and specs kept there still run.
 """
 
 import contextlib
@@ -25,9 +25,8 @@ _OPEN_TREE, _MOVE_MOUNT, _MOUNT_SETATTR = 428, 429, 442
 """System calls that have the same number on every processor."""
 _AT_FDCWD, _AT_EMPTY_PATH, _AT_RECURSIVE = -100, 0x1000, 0x8000
 _OPEN_TREE_CLONE, _MOVE_MOUNT_F_EMPTY_PATH, _MOUNT_ATTR_IDMAP = 1, 4, 0x00100000
-_TMP = Path("/tmp")
-_TMP_SIZE = "size=1g,mode=1777"
-SHARED = (_TMP, Path("/dev/shm"))
+_SHARED_SIZE = "size=1g,mode=1777"
+SHARED = (Path("/tmp"), Path("/dev/shm"))
 """Where shared memories have their names."""
 
 _libc = ctypes.CDLL(None, use_errno=True)
@@ -78,6 +77,32 @@ def unshare() -> None:
     _unshare(_CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID)
 
 
+def refusal() -> str:
+    """Why the kernel refuses this process further namespaces with mounts of their own, in a child; empty when it allows.
+
+    As bubblewrap makes them: without root within a user namespace.
+    """
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            _unshare(_CLONE_NEWNS | _CLONE_NEWPID)
+            _keep_mounts_private()
+        except OSError as error:
+            os.write(writer, str(error.strerror).encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as answer:
+        why = answer.read().decode(errors="replace")
+    os.waitpid(child, 0)
+    return why
+
+
+def _keep_mounts_private() -> None:
+    _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
+
+
 def _unshare(flags: int) -> None:
     user, group = os.getuid(), os.getgid()
     if user == 0:
@@ -120,28 +145,29 @@ def _join(process: int, kind: str, flag: int) -> None:
 def furnish_entered(trees: Mapping[Path, int], shown: Iterable[Path]) -> None:
     """Mounts the folders of ``enter``; to be called by the new process 1.
 
-    Of the host's ``/tmp`` only what holds ``shown`` paths stays, as an empty folder to the other process.
+    Of the host's ``SHARED`` only what holds ``shown`` paths stays, as an empty folder to the other process.
     """
-    _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
+    _keep_mounts_private()
     _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
-    old = os.open(_TMP, os.O_PATH | os.O_DIRECTORY)
-    names = sorted({path.relative_to(_TMP).parts[0] for path in shown if path.is_relative_to(_TMP) and path != _TMP})
-    for path, tree in trees.items():
-        _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(path), _MOVE_MOUNT_F_EMPTY_PATH)
+    places = tuple(shown)
+    for folder, tree in trees.items():
+        names = sorted({p.relative_to(folder).parts[0] for p in places if p.is_relative_to(folder) and p != folder})
+        old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+        _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(folder), _MOVE_MOUNT_F_EMPTY_PATH)
         os.close(tree)
-    for name in names:
-        _bind_old(old, name)
-    os.close(old)
+        for name in names:
+            _bind_old(old, folder / name)
+        os.close(old)
 
 
 def furnish() -> None:
     """Mounts and network of the new namespaces; to be called by their process 1."""
-    _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
+    _keep_mounts_private()
     with contextlib.suppress(OSError):  # containers may mask /proc; only tools like ps would miss it
         _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
-    _private_tmp()
-    if Path("/dev/shm").is_dir():
-        _call("mount", b"tmpfs", b"/dev/shm", b"tmpfs", _MS_NOSUID | _MS_NODEV, _TMP_SIZE.encode())
+    for folder in SHARED:
+        if folder.is_dir():
+            _make_private(folder)
     _loopback_up()
     _multicast_route()
 
@@ -208,22 +234,21 @@ def overlay(lower: Path, upper: Path, work: Path, target: Path) -> None:
     _call("mount", b"overlay", bytes(target), b"overlay", _MS_NOSUID | _MS_NODEV, options.encode())
 
 
-def _private_tmp() -> None:
-    """An empty ``/tmp`` with the old one's folders, but not its files: those may be another test's tokens."""
-    old = os.open(_TMP, os.O_PATH | os.O_DIRECTORY)
-    folders = [entry.name for entry in os.scandir(_TMP) if entry.is_dir(follow_symlinks=False)]
-    _call("mount", b"tmpfs", bytes(_TMP), b"tmpfs", _MS_NOSUID | _MS_NODEV, _TMP_SIZE.encode())
-    for name in folders:
-        _bind_old(old, name)
+def _make_private(folder: Path) -> None:
+    """An empty folder with the old one's folders, but not its files: those may be another test's tokens."""
+    old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+    names = [entry.name for entry in os.scandir(folder) if entry.is_dir(follow_symlinks=False)]
+    mount_tmpfs(folder, _SHARED_SIZE)
+    for name in names:
+        _bind_old(old, folder / name)
     os.close(old)
 
 
-def _bind_old(old: int, name: str) -> None:
-    """Shows a folder of the old ``/tmp`` in the new one."""
-    target = _TMP / name
+def _bind_old(old: int, target: Path) -> None:
+    """Shows a folder of an old one, of which ``old`` is a descriptor, in the new one that took its place."""
     target.mkdir(exist_ok=True)
     with contextlib.suppress(FileNotFoundError):  # it was removed meanwhile
-        _call("mount", f"/proc/self/fd/{old}/{name}".encode(), bytes(target), None, _MS_BIND | _MS_REC, None)
+        bind(Path(f"/proc/self/fd/{old}", target.name), target, deep=True)
 
 
 def _loopback_up() -> None:

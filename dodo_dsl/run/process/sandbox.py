@@ -10,10 +10,11 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         that it must not see, "confined" the application's confinement or null;
                         {"do": "close"}; {"do": "probe"}; {"do": "send", "cid", "data"}; {"do": "load"};
                         {"do": "listeners"}; {"do": "keep"} with the descriptors of outputs and logs
-    sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or {"unstartable": id, "why"};
+    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or {"unstartable": id, "why"};
                         {"exited": id, "code", "used", "failed"}; {"load": snapshot or null};
                         {"listeners": names of what listens on a bus, or null};
-                        {"probe": why an application cannot be confined, or ""}
+                        {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
+                        ``confined.missing`` has it}
 """
 
 import contextlib
@@ -25,7 +26,6 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -37,8 +37,9 @@ from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
-from dodo_dsl.run.process.confined.confined_process import ConfinedProcess, user_of
-from dodo_dsl.run.process.confined.confinement import INTERPRETER, Confinement
+from dodo_dsl.run.process.confined import confined_probe
+from dodo_dsl.run.process.confined.confined_process import user_of
+from dodo_dsl.run.process.confined.confinement import Confinement
 from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
 from dodo_dsl.run.process.confined.places import Places
 from dodo_dsl.run.process.confined.seccomp_filter import NoSeccomp
@@ -47,6 +48,8 @@ from dodo_dsl.run.services.listeners import listening
 
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
+UMASK = 0o022
+"""Of programs in own namespaces, as in containers: what one user's service makes, another's is to read."""
 
 
 class Sandbox:
@@ -57,7 +60,8 @@ class Sandbox:
         self.channel = channel
         self.isolation = isolation
         self.forks = forks
-        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)))
+        umask = UMASK if isolation == "network" else -1
+        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), umask)
         self.places: Places | None = None
         self.times = ThreadTimes()
         self.keep = False
@@ -149,21 +153,8 @@ class Sandbox:
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_probe(self, _descriptors: list[int]) -> None:
-        """Confines a program that does nothing."""
-        with tempfile.TemporaryFile() as output:
-            try:
-                places = Places(user_of(0))
-                environment = {"PATH": os.defpath}
-                true = ConfinedProcess(
-                    ["true"], environment, output.fileno(), Confinement("/usr", "network", 0, INTERPRETER), places
-                )
-                code = true.wait()
-            except (OSError, subprocess.SubprocessError, NoSeccomp) as error:
-                self.send(probe=str(error))
-                return
-            output.seek(0)
-            told = output.read(1000).decode(errors="replace").strip()
-            self.send(probe="" if code == 0 else told or f"exit code {code}")
+        why = confined_probe.problem()
+        self.send(probe=why, missing=confined_probe.missing() if why else "")
 
     def _do_send(self, _descriptors: list[int], cid: int, data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
@@ -235,7 +226,8 @@ def main(argv: list[str]) -> int:
         else:
             namespaces.adopt_orphans()
     except OSError as error:
-        channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
+        missing = confined_probe.NAMESPACES if namespaces.refusal() else ""
+        channel.send(json.dumps({"down": str(error.strerror or error), "missing": missing}).encode())
         return 1
     sandbox = Sandbox(channel, isolation, forks)
     sandbox.send(up=outside)

@@ -15,7 +15,7 @@ import pytest
 from dodo_dsl.run import leases
 from dodo_dsl.run.process import leftovers
 from dodo_dsl.run.process.forks.fork_server_client import ForkServer
-from dodo_dsl.run.process.host_isolation import host_slot, namespaces_refusal, runs_alone
+from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal, runs_alone
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError
 from tests.run.desk import ROOT
@@ -153,7 +153,7 @@ def test_a_fork_server_answers_as_a_sandbox_of_its_own_does(lives: bool) -> None
     try:
         if not lives:
             server.kill()
-        assert namespaces_refusal(server) == namespaces_refusal()
+        assert isolation_refusal(server) == isolation_refusal()
     finally:
         if lives:
             server.close()

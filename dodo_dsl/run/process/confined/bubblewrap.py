@@ -1,8 +1,8 @@
 """The words that start a program in a sandbox of its own by bubblewrap (bwrap(1)): pure text."""
 
 import os
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl.run.process.confined.confinement import Confinement
@@ -20,13 +20,15 @@ _TO_UNMASK = ("CAP_SYS_ADMIN", "CAP_MKNOD", "CAP_DAC_READ_SEARCH", "CAP_SYS_MODU
 
 @dataclass(frozen=True)
 class Mounts:
-    """Where the sandbox prepared the application's folder, home and ``/tmp``."""
+    """Where the sandbox prepared the application's folder and home, ``/tmp`` and ``/dev/shm``, and what it may read."""
 
     folder: Path
     writable: bool
     """The folder; what is written there goes with the test."""
     home: Path
-    tmp: Path
+    shared: Mapping[str, Path]
+    reads: Mapping[str, Path] = field(default_factory=dict)
+    """By their paths; what is not there is shown as it is."""
 
 
 def words(
@@ -68,19 +70,35 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
             seen += ["--symlink", str(Path(path).readlink()), path]
         else:
             seen += ["--ro-bind-try", path, path]
-    seen += ["--proc", "/proc", "--dev", "/dev", "--bind", "/dev/shm", "/dev/shm", "--bind", str(mounts.tmp), "/tmp"]
+    seen += ["--proc", "/proc", "--dev", "/dev"]
+    seen += [word for path, source in mounts.shared.items() for word in ("--bind", str(source), path)]
     seen += ["--tmpfs", "/run", "--tmpfs", "/var/tmp"]
     read = (*_shown(confined, program), *confined.reads)
-    for parent in _parents((HOME, confined.folder, *read)):
-        seen += ["--perms", "0755", "--dir", parent]
-    for path in read:
-        seen += ["--ro-bind-try", path, path]
+    seen += [*_folders(_parents((HOME, confined.folder, *read))), *_read_only(read, mounts)]
     seen += ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
     seen += ["--bind", str(mounts.home), HOME]
-    for path in confined.hidden:
-        if Path(path).is_dir():
-            seen += ["--tmpfs", path, "--remount-ro", path]
+    for path in _outermost(filter(os.path.isdir, confined.hidden)):
+        inside = [one for one in read if Path(one).is_relative_to(path)]
+        parents = [one for one in _parents(inside) if Path(one).is_relative_to(path) and one != path]
+        seen += ["--tmpfs", path, *_folders(parents), *_read_only(inside, mounts), "--remount-ro", path]
     return [*seen, "--remount-ro", "/"]
+
+
+def _folders(paths: Iterable[str]) -> list[str]:
+    return [word for path in paths for word in ("--perms", "0755", "--dir", path)]
+
+
+def _read_only(paths: Iterable[str], mounts: Mounts) -> list[str]:
+    return [word for path in paths for word in ("--ro-bind-try", str(mounts.reads.get(path, path)), path)]
+
+
+def _outermost(paths: Iterable[str]) -> list[str]:
+    """Paths without those that lie in another one: nothing can be mounted in what is hidden already."""
+    found: list[str] = []
+    for path in sorted(set(paths)):  # what holds others comes before them
+        if not any(Path(path).is_relative_to(other) for other in found):
+            found.append(path)
+    return found
 
 
 def _parents(paths: Iterable[str]) -> list[str]:

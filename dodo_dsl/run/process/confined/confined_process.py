@@ -35,11 +35,12 @@ class ConfinedProcess:
         output: int,
         confined: Confinement,
         places: Places | None,
+        umask: int = -1,
     ) -> None:
         """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
         program = _found(words[0], environment, confined.folder)
         user = user_of(confined.cid) if places else None
-        mounts = bubblewrap.Mounts(*places.folder(confined.folder), places.home, places.tmp) if places else None
+        mounts = _mounts(places, confined) if places else None
         given = {**environment, "PWD": confined.folder, **({"HOME": bubblewrap.HOME} if mounts else {})}
         self._status, status = os.pipe()
         filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)
@@ -54,6 +55,7 @@ class ConfinedProcess:
                 stdout=output,
                 stderr=output,
                 start_new_session=True,
+                umask=umask,
                 pass_fds=(filter_fd, status, source),
                 preexec_fn=functools.partial(_limit, confined.limits, os.getpid()),  # noqa: PLW1509  (it has one thread)
             )
@@ -75,6 +77,11 @@ class ConfinedProcess:
             told = status.read().decode(errors="replace")
         self.failed = code > 0 and not any("exit-code" in json.loads(line) for line in told.splitlines())
         return 128 - code if code in _SIGNALLED else code
+
+
+def _mounts(places: Places, confined: Confinement) -> bubblewrap.Mounts:
+    reads = {path: places.read(path) for path in confined.reads}
+    return bubblewrap.Mounts(*places.folder(confined.folder), places.home, places.shared, reads)
 
 
 def _found(name: str, environment: Mapping[str, str], folder: str) -> str:

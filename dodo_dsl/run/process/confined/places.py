@@ -1,4 +1,7 @@
-"""What a sandbox prepares once for the application: its view of ``/tmp``, a home, and its folder with writes apart."""
+"""What a sandbox prepares once for the application: its ``/tmp``, a home, its folder with writes apart, and what it reads.
+
+The user's umask decides about none of these folders: the application's user must enter them.
+"""
 
 import errno
 import os
@@ -9,6 +12,9 @@ from pathlib import Path
 from dodo_dsl.run.process import namespaces
 
 _SIZE = "size=1g,mode=0755"
+_MODE = 0o755
+_SYSTEM = Path("/usr")
+"""What packages of the system install: everybody can read it."""
 _READABLE = stat.S_IROTH | stat.S_IXOTH
 
 
@@ -17,17 +23,27 @@ class Places:
 
     def __init__(self, user: int | None) -> None:
         self._user = user
-        self._root = Path(tempfile.mkdtemp(prefix="dodo-application-"))
+        self._root = Path(tempfile.mkdtemp(prefix="dodo-application-", dir=namespaces.SHARED[0]))  # the sandbox's own
         namespaces.mount_tmpfs(self._root, _SIZE)
         self.home = self._own("home")
-        self.tmp = self._root / "tmp"
-        self.tmp.mkdir()
-        namespaces.bind(Path("/tmp"), self.tmp, deep=False)  # without the folders of the host's that are mounted there
+        self.shared = {str(place): self._shallow(place) for place in namespaces.SHARED if place.is_dir()}
+        """``/tmp`` and ``/dev/shm`` by their names, without the host's folders that are mounted there."""
         self._shown: dict[str, tuple[Path, bool]] = {}
+        self._read: dict[str, Path] = {}
+
+    def _shallow(self, place: Path) -> Path:
+        target = self._folder(place.name)
+        namespaces.bind(place, target, deep=False)
+        return target
+
+    def _folder(self, name: str) -> Path:
+        path = self._root / name
+        path.mkdir()
+        path.chmod(_MODE)
+        return path
 
     def _own(self, name: str) -> Path:
-        path = self._root / name
-        path.mkdir(parents=True)
+        path = self._folder(name)
         if self._user is not None:
             os.chown(path, self._user, self._user)
         return path
@@ -38,11 +54,9 @@ class Places:
         What is written goes nowhere else. Raises OSError, also where its user may not read the folder.
         """
         if folder not in self._shown:
-            place = self._root / f"folder-{len(self._shown)}"
-            lower, merged = place / "lower", place / "merged"
+            place = self._folder(f"folder-{len(self._shown)}")
+            lower, merged = self._folder(f"{place.name}/lower"), self._folder(f"{place.name}/merged")
             upper, work = self._own(f"{place.name}/upper"), self._own(f"{place.name}/work")
-            for path in (lower, merged):
-                path.mkdir()
             self._show(Path(folder), lower)  # whose name needs no escapes
             try:
                 namespaces.overlay(lower, upper, work, merged)
@@ -51,6 +65,23 @@ class Places:
             else:
                 self._shown[folder] = merged, True
         return self._shown[folder]
+
+    def read(self, path: str) -> Path:
+        """What to show in the place of a path that it may read: as its own, or the path itself where that suffices."""
+        if self._user is None or Path(path).is_relative_to(_SYSTEM) or not Path(path).exists():
+            return Path(path)
+        if path not in self._read:
+            self._read[path] = self._as_own(Path(path), self._root / f"read-{len(self._read)}")
+        return self._read[path]
+
+    def _as_own(self, source: Path, target: Path) -> Path:
+        assert self._user is not None
+        target.mkdir() if source.is_dir() else target.touch()
+        try:
+            namespaces.bind_as(source, target, source.stat().st_uid, self._user)
+        except OSError:  # as some kernels and file systems refuse: then it reads what everybody can
+            return source
+        return target
 
     def _show(self, source: Path, target: Path) -> None:
         """The folder as the application's own where the kernel can do that, else as it is."""

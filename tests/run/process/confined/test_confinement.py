@@ -7,7 +7,7 @@ from dodo_dsl.run.process.confined.bubblewrap import Mounts, words
 from dodo_dsl.run.process.confined.confinement import Confinement, confinement
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
-MOUNTS = Mounts(Path("/tmp/x/folder"), True, Path("/tmp/x/home"), Path("/tmp/x/tmp"))
+MOUNTS = Mounts(Path("/tmp/x/folder"), True, Path("/tmp/x/home"), {"/tmp": Path("/tmp/x/tmp")})
 
 
 def test_paths_are_relative_to_its_folder_and_the_interpreter_is_there(tmp_path: Path) -> None:
