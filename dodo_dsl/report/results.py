@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import package_data
+from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, NotRun, Outcome, Response, Wait
 from dodo_dsl.report.run_record import RunRecord, run_record
@@ -129,8 +130,19 @@ def _validate(document: Any) -> None:
     schema = json.loads((package_data.schemas() / "results.schema.json").read_text(encoding="utf-8"))
     problem = best_match(Draft202012Validator(schema).iter_errors(document))
     if problem is not None:
-        raise ValueError(f"{problem.json_path}: {problem.message[:_MAX_PROBLEM_TEXT]}")
+        raise ValueError(_sentence(problem))
     json.dumps(document, ensure_ascii=False).encode()
+
+
+def _sentence(problem: Any) -> str:
+    """What is wrong, with its place, and the key that a key of no meaning may be."""
+    if problem.validator != "additionalProperties":
+        return f"{problem.json_path}: {problem.message[:_MAX_PROBLEM_TEXT]}"
+    known = problem.schema["properties"]
+    name = next(key for key in problem.instance if key not in known)
+    hint = did_you_mean(name, known.keys() - problem.instance.keys())
+    told = f"; {hint}" if hint.startswith("did") else ""
+    return f"{problem.json_path}: unknown key '{name[:_MAX_PROBLEM_TEXT]}'{told}"
 
 
 def _outcome(test: dict[str, Any]) -> Outcome:

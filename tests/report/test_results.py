@@ -2,13 +2,16 @@
 
 import json
 import math
+import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
-from dodo_dsl.outcome import MachineLoad, NotRun, Wait
+from dodo_dsl.outcome import MachineLoad, NotRun, Response, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport
@@ -136,3 +139,46 @@ def test_results_and_page_say_of_which_run_they_are(tmp_path: Path) -> None:
 def test_joined_results_are_of_all_runs_each_once() -> None:
     one, other = (results.Results([], results.Circumstances((run,))) for run in (RUN, replace(RUN, host="b")))
     assert [run.host for run in results.joined([one, other, one]).runs] == ["a-<host>", "b"]
+
+
+WHOLE = replace(
+    OUTCOME,
+    services=({"name": "camera", "layer": "environment", "uses": "virtual-camera", "exit_code": 0},),
+    checks=({"name": "x", "value": 1.0, "limit": {"max": 2.0}, "unit": "m", "ok": True},),
+    verdicts=({"evaluator": "track", "outcome": "failed", "reason": "hit wall", "evidence": {"time": 1.0}},),
+    goals=(Goal("time-to-goal", 20.0, 5.0, 2.0),),
+    machine=LOAD,
+    response=Response(9, 0.1, 0.01, 0.02, 0.03, None, None, None, 0, None, "a processor"),
+)
+NAMES = ("evidence",)
+"""Objects whose keys are names."""
+
+
+def objects(value: Any, path: str = "$") -> Iterator[tuple[str, dict[str, Any]]]:
+    if isinstance(value, dict):
+        yield path, value
+        for key, below in value.items():
+            yield from objects(below, f"{path}.{key}")
+    for index, below in enumerate(value if isinstance(value, list) else ()):
+        yield from objects(below, f"{path}[{index}]")
+
+
+def test_an_unknown_key_of_results_is_told_where_it_is(tmp_path: Path) -> None:
+    text = results.to_json([WHOLE], results.Circumstances((RUN,), (NOT_RUN,)))
+    (tmp_path / "results.json").write_text(text)
+    results.read(tmp_path / "results.json")
+    document = json.loads(text)
+    places = [place for place in objects(document) if not place[0].endswith(NAMES)]
+    assert len(places) >= 14
+    for path, inner in places:
+        inner["zzq"] = 1
+        (tmp_path / "results.json").write_text(json.dumps(document))
+        with pytest.raises(results.ResultsError, match=re.escape(f"({path}: unknown key 'zzq')")):
+            results.read(tmp_path / "results.json")
+        del inner["zzq"]
+
+
+def test_an_almost_known_key_of_results_is_told(tmp_path: Path) -> None:
+    (tmp_path / "results.json").write_text(results.to_json([WHOLE]).replace('"notes"', '"nots"'))
+    with pytest.raises(results.ResultsError, match=r"\$\.tests\[0\]: unknown key 'nots'; did you mean 'notes'\?"):
+        results.read(tmp_path / "results.json")

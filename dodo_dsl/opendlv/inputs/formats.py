@@ -110,7 +110,8 @@ def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
     if path.suffix != RECORDING:
         from dodo_dsl.opendlv.inputs import target_table
 
-        yield from _table(path) or _raised(path, lambda: target_table.read(path, field))
+        wrong = _table(path) or list(_raised(path, lambda: target_table.read(path, field)))
+        yield from wrong or target_table.misspelt(path, field)
         return
     message = settings["target-message"] or settings["message"]
     sender = settings["target-sender"] or settings["sender"]

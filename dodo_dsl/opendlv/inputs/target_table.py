@@ -1,12 +1,14 @@
 """A target from a CSV table: a column `time` in seconds and one of values, a header above them."""
 
 import csv
+import difflib
 import io
 from collections.abc import Iterator, Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.inputs.problem import InputError
 from dodo_dsl.opendlv.numbers import exact
 
 TIME, VALUE = "time", "value"
@@ -30,6 +32,17 @@ def read(path: Path, field: str) -> list[tuple[int, float]]:
     if len(samples) < 2:
         raise TargetError(f"{path}: expected at least 2 rows below the header, found {len(samples)}")
     return samples
+
+
+def misspelt(path: Path, field: str) -> Iterator[InputError]:
+    """Columns of a table that nothing reads, as they are spelt almost like the one of `field`; the table is read."""
+    header = next(csv.reader(io.StringIO(regular_file.text(path, encoding="utf-8-sig"), newline="")), [])
+    names = [name.strip() for name in header]
+    for close in difflib.get_close_matches(field, names, cutoff=0.75) if field not in names else ():
+        if close not in (TIME, VALUE):
+            what = f"nothing reads the column '{close}', as the values are those of '{VALUE}'"
+            column = ",".join(header).find(close) + 1
+            yield InputError(path, what, line=1, column=column, hint=f"did you mean '{field}'?", is_slip=True)
 
 
 def _columns(header: Sequence[str], field: str, path: Path) -> tuple[int, int, int]:

@@ -23,6 +23,7 @@ SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
 _FROM_HERE = "paths are relative to the folder of dodo.yml"
 _NOT_YET = f"dodo new NAME makes it, with a first test; {_FROM_HERE}"
+_OF_GANTRY = ("serial", "limits", "axes")
 _NETWORK = "for example 10.213.0.0/16"
 DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
@@ -200,6 +201,7 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
         taken.setdefault(raw["cid"], name)
         rigs[name] = found
         problems.extend(_tags(found))
+        problems.extend(_unused(found))
         problems.extend(size_problems(written.value))
     return rigs
 
@@ -209,6 +211,15 @@ def _octal(cid: Node | None) -> Iterator[Diagnostic]:
         message = f"'cid' is {cid.text}, which other readers of YAML take for an octal number"
         hint = f"write {cid.value}"
         yield Diagnostic(cid.span, "wrong-value", message, hint, fix=Fix(cid.text, str(cid.value)))
+
+
+def _unused(found: Rig) -> Iterator[Diagnostic]:
+    """Keys about what moves, of a rig that does not."""
+    for key in _OF_GANTRY if found.kind == "static" else ():
+        if key in found.node.entries:
+            message = f"a static rig does not use '{key}'"
+            hint = "remove it, or write the kind of a rig that moves: dynamic or circle"
+            yield Diagnostic(found.node.entries[key].key, "unknown-key", message, hint, "warning")
 
 
 def _tags(found: Rig) -> Iterator[Diagnostic]:

@@ -1,0 +1,128 @@
+"""A key that nothing reads is told at every level of the files that tests name."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.opendlv.inputs import formats
+from dodo_dsl.opendlv.inputs.problem import InputError
+
+MAP: dict[str, Any] = {
+    "model": [{"name": "cone", "file": "cone.obj", "color": [1, 0, 0], "instances": [[0, 1, 0, 0]]}],
+    "block": [{"name": "floor", "dimension": [9, 9, 1], "color": [0, 0, 0], "instances": [[0, 0, -0.5, 0]]}],
+    "overlay": [],
+    "obstacles": [{"name": "finish", "lines": [[-1, 3, 1, 3]]}],
+}
+TRUTH: dict[str, Any] = {
+    "info": {"description": "of another tool", "version": "1"},
+    "licenses": [{"id": 1, "name": "MIT", "url": ""}],
+    "images": [{"id": 1, "width": 640, "height": 480, "file_name": "a.png", "license": 1, "date_captured": ""}],
+    "categories": [{"id": 1, "name": "cone", "supercategory": ""}],
+    "annotations": [
+        {"id": 1, "image_id": 1, "category_id": 1, "bbox": [1, 1, 9, 9], "area": 81, "segmentation": [], "iscrowd": 0}
+    ],
+}
+OF_TRUTH = {"truth-frames": "one", "classes": ""}
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+FREE = {"truth": ("info", "licenses")}
+"""What other tools say about their file, whose keys are theirs."""
+
+
+@pytest.fixture
+def told(tmp_path: Path) -> Callable[[str, Any], list[InputError]]:
+    """What is said about a document of a format."""
+    (tmp_path / "cone.obj").write_text(OBJ)
+
+    def problems(name: str, document: Any) -> list[InputError]:
+        (tmp_path / "map.json").write_text(json.dumps(document, indent=1))
+        given = {"truth": OF_TRUTH}.get(name, {})
+        return list(formats.problems(name, tmp_path / "map.json", given, {}))
+
+    return problems
+
+
+def objects(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """The paths of all objects of a document."""
+    if isinstance(value, dict):
+        yield path
+    for step, below in (
+        value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    ):
+        yield from objects(below, (*path, step))
+
+
+CASES = [
+    (name, path)
+    for name, document in (("map", MAP), ("obstacles", MAP), ("truth", TRUTH))
+    for path in objects(document)
+    if path[:1] not in [(key,) for key in FREE.get(name, ())]
+]
+
+
+@pytest.mark.parametrize(("name", "path"), CASES, ids=str)
+def test_an_unknown_key_is_told_where_it_is(
+    told: Callable[[str, Any], list[InputError]], name: str, path: tuple[str | int, ...]
+) -> None:
+    document = json.loads(json.dumps(TRUTH if name == "truth" else MAP))
+    inner = document
+    for step in path:
+        inner = inner[step]
+    inner["zzq"] = 1
+    line = next(n for n, each in enumerate(json.dumps(document, indent=1).splitlines(), 1) if "zzq" in each)
+    assert [(e.is_slip, e.position()[0]) for e in told(name, document) if "'zzq'" in e.what] == [(True, line)]
+
+
+@pytest.mark.parametrize(("name", "document"), [("map", MAP), ("obstacles", MAP), ("truth", TRUTH)])
+def test_keys_of_the_format_are_not_told(
+    told: Callable[[str, Any], list[InputError]], name: str, document: dict[str, Any]
+) -> None:
+    assert told(name, document) == []
+
+
+def test_a_key_of_many_objects_is_told_once(told: Callable[[str, Any], list[InputError]]) -> None:
+    (found,) = told("map", {**MAP, "obstacles": [{**MAP["obstacles"][0], "lnes": 1, "name": name} for name in "abc"]})
+    assert found.what == "$.obstacles[0].lnes: nothing reads 'lnes' (and in 2 more)"
+    assert found.hint == "did you mean 'lines'?"
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "said"),
+    [
+        ("model", {"frames": [0, 1]}, "frames: a model at the frame of a vehicle is not drawn yet"),
+        ("model", {"textureFile": "floor.png"}, "color: 'color' is not used beside 'textureFile'"),
+        ("block", {"textureFile": "floor.png"}, "color: 'color' is not used beside 'textureFile'"),
+        ("block", {"textureSize": [1, 1]}, "textureSize: 'textureSize' is not used without 'textureFile'"),
+    ],
+)
+def test_keys_of_the_format_without_effect_are_told(
+    told: Callable[[str, Any], list[InputError]], kind: str, more: dict[str, Any], said: str
+) -> None:
+    found = [e.what for e in told("map", {**MAP, kind: [{**MAP[kind][0], **more}]}) if e.is_slip]
+    assert found == [f"$.{kind}[0].{said}"]
+
+
+def test_the_other_keys_of_a_truth_are_told_together(told: Callable[[str, Any], list[InputError]]) -> None:
+    """Those near one that is read are told by themselves."""
+    annotation = TRUTH["annotations"][0]
+    annotations = [{**annotation, "id": n, "attributes": {"occluded": n}, "isCrowd": 0} for n in range(50)]
+    misspelt, others = told("truth", {**TRUTH, "tool": "x", "annotations": annotations})
+    assert (misspelt.where, misspelt.hint) == ("annotations[0].isCrowd", "did you mean 'iscrowd'?")
+    assert others.what == "tool: nothing reads 'tool', 'attributes' of annotations"
+
+
+def test_a_column_that_is_almost_the_field_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,value,groundSteerng\n0,1,2\n1,1,2\n")
+    given = dict.fromkeys(formats.SETTINGS["target"], "") | {"field": "groundSteering"}
+    (found,) = formats.problems("target", tmp_path / "a.csv", given, {})
+    assert (found.is_slip, found.position(), found.hint) == (True, (1, 12), "did you mean 'groundSteering'?")
+    assert "'groundSteerng'" in found.what
+
+
+def test_an_unknown_parameter_of_a_car_is_told(tmp_path: Path) -> None:
+    (tmp_path / "car.yml").write_text("mass: 1\nzzq: 1\n")
+    (found,) = formats.problems("car", tmp_path / "car.yml", {}, {})
+    assert found.position()[0] == 2
+    assert "zzq" in found.what
