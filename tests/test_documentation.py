@@ -17,6 +17,7 @@ from jsonschema import Draft202012Validator
 from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.cli.selection import select
 from dodo_dsl.report.pictures.trajectory import read_ground
+from dodo_dsl.spec.model import LEVEL_WORDS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -192,3 +193,31 @@ def test_pages_install_dodo_in_the_same_place_and_from_a_checkout() -> None:
         assert "dodo-dsl[" not in text, page
         named = re.findall(r"PATH-OF-THE-CHECKOUT\[([\w,]+)\]", text)
         assert {extra for names in named for extra in names.split(",")} <= extras.keys(), page
+
+
+def tracked(pattern: str) -> list[Path]:
+    listed = subprocess.run(["git", "ls-files", pattern], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [ROOT / name for name in listed.stdout.split()]
+
+
+def test_each_page_that_names_the_thesis_links_to_where_it_is_cited() -> None:
+    cited = ROOT / "docs" / "explanation" / "architecture.md"
+    naming = [
+        page for page in tracked("*.md") if re.search(r"\bthesis\b", page.read_text()) and page.name != "CHANGELOG.md"
+    ]
+    assert len(naming) > 5 and cited in naming
+    assert [page for page in naming if "architecture.md#the-thesis" not in page.read_text() and page != cited] == []
+    assert "Chalmers University of Technology" in cited.read_text()
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/reference/language.md", "docs/explanation/architecture.md"])
+def test_levels_are_spelt_out(page: str) -> None:
+    text = " ".join((ROOT / page).read_text().split())
+    first = min(text.find(f"`{level}`") for level in LEVEL_WORDS)
+    assert re.search("software(, data or hardware)? in the loop", text[first : first + 400], re.IGNORECASE), text[
+        first:
+    ][:80]
+    stdout = StringIO()
+    with contextlib.redirect_stdout(stdout):
+        main(["--help"], stdout, stdout)
+    assert all(words in stdout.getvalue() for words in LEVEL_WORDS.values())

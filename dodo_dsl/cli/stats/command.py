@@ -59,7 +59,9 @@ def as_text(tests: Mapping[str, Sequence[str]]) -> str:
         for (name, new), count in zip(_new(tests), counts, strict=True)
     ]
     lines += ["", *_fits(f"{len(tests)} tests, {counts[-1]:g} services", list(tests.values())), ""]
-    lines += _fits("thesis, Table 5.1: 9 tests, 10 services", list(thesis.TESTS.values()))
+    lines += _fits(
+        "thesis (Johansson and Paulsson, 2024), Table 5.1: 9 tests, 10 services", list(thesis.TESTS.values())
+    )
     low, high = thesis.B_INTERVAL
     stated = f"b = {thesis.B} ({low} to {high}); its a = {thesis.LN_A} is ln a"
     lines += [f"  as the thesis states    {stated}; no order of its rows gives these figures"]

@@ -1,4 +1,4 @@
-"""Table 5.1 of the thesis: its nine tests in its order, with their services, and the fit that it states."""
+"""Table 5.1 of the thesis that architecture.md cites: its nine tests in its order, with their services, and its fit."""
 
 _LOOP = ("virtual-camera", "dynamic-model", "integrator", "collision")
 _OPEN = ("virtual-camera", "beacon", "continuous-signal")
