@@ -12,12 +12,12 @@ from dodo_dsl.run.load import process_memory
 _STATE, _PARENT, _TIMES = 0, 1, slice(11, 15)
 """Fields of ``/proc/PID/stat`` (proc_pid_stat(5)) behind the program's name; times are those of it and its children."""
 _TICKS = os.sysconf("SC_CLK_TCK")
-_LOOK_S = 0.1
-"""After how long new processes, and files in memory, are looked for again."""
+_LOOK_S = 0.25
+"""After how long at least new processes, and files in memory, are looked for again."""
 _SMALL = 4 << 20
 """Bytes up to which it does not matter how much of a process's memory others share."""
 _TIMES_COST = 100
-"""How many times as long as it took to find out what processes share that is taken to be so."""
+"""How many times as long as a look took, or to find out what processes share, that is taken to be so."""
 _TRIES = 3
 
 
@@ -51,7 +51,7 @@ class ServiceUse:
 
     def __init__(self, proc: Path = process_memory.PROC) -> None:
         self._proc = proc
-        self._looked_s = float("-inf")
+        self._look_at_s = float("-inf")
         self._pids: dict[str, list[int]] = {}
         self._held: dict[str, int] = {}
         self._sharing: dict[str, _Sharing] = {}
@@ -62,7 +62,7 @@ class ServiceUse:
     def take(self, services: Mapping[int, str]) -> dict[str, Used]:
         """What services use, by name; ``services`` are the ids of their first processes, and names."""
         now = time.monotonic()
-        if now >= self._looked_s + _LOOK_S:
+        if now >= self._look_at_s:
             self._look(services)
         found: dict[str, Used] = {}
         for pid, name in services.items():
@@ -79,8 +79,8 @@ class ServiceUse:
 
     def _look(self, services: Mapping[int, str]) -> None:
         """Finds the processes of services, ancestors first."""
+        began = time.thread_time()
         known = {int(e.name): p for e in self._proc.iterdir() if e.name.isdigit() and (p := self._read(int(e.name)))}
-        self._looked_s = time.monotonic()
         found: dict[str, list[tuple[int, int]]] = {name: [] for name in services.values()}
         for pid in known:
             ancestor, depth = pid, 0
@@ -90,6 +90,7 @@ class ServiceUse:
                 found[services[ancestor]].append((depth, pid))
         self._pids = {name: [pid for _, pid in sorted(pids)] for name, pids in found.items()}
         self._held = {name: process_memory.held(pids, self._proc) for name, pids in self._pids.items()}
+        self._look_at_s = time.monotonic() + _patience_s(began)
 
     def _count(self, first: int, name: str, services: Mapping[int, str]) -> list[int]:
         """Adds up the processor time of a service; returns its processes.
@@ -124,11 +125,10 @@ class ServiceUse:
         if now >= sharing.until_s:
             began = time.thread_time()
             theirs = [sum(process_memory.proportional(pid, self._proc)) for pid in large]
-            cost_s = time.thread_time() - began
             every = sum(sum(size) for size in sizes.values())
             shared = sum(sum(sizes[pid]) for pid in large) - sum(theirs)
             part = (every - max(shared, 0)) / every if all(theirs) else 1.0  # not told to everybody
-            sharing = self._sharing[name] = _Sharing(part, now + max(_TIMES_COST * cost_s, _LOOK_S))
+            sharing = self._sharing[name] = _Sharing(part, now + _patience_s(began))
         return sharing.part
 
     def _read(self, pid: int) -> _Process | None:
@@ -138,3 +138,8 @@ class ServiceUse:
         except OSError:
             return None
         return _Process(int(words[_PARENT]), sum(map(int, words[_TIMES])), words[_STATE] == b"Z")
+
+
+def _patience_s(began: float) -> float:
+    """Seconds to the next time for what began at a processor time of this thread, so that it takes little of it."""
+    return max(_TIMES_COST * (time.thread_time() - began), _LOOK_S)

@@ -109,9 +109,8 @@ def growth(points: Sequence[Point]) -> float | None:
         return None
     slope, rise = statistics.median(slopes), statistics.median(slopes) * (found[-1][0] - found[0][0])
     third = max(len(found) // 3, 1)
-    low, central, high = (
-        statistics.median(size for _, size in part)
-        for part in (found[:third], found[third:-third] or found[third : third + 1], found[-third:])
-    )
-    is_steady = min(central - low, high - central) >= _LEAST_SHARE * rise
-    return slope if rise >= LEAST_RISE and is_steady else 0.0
+    sizes = [size for _, size in found]
+    low, high = statistics.median(sizes[:third]), statistics.median(sizes[-third:])
+    central = sizes[third:-third]
+    rises = statistics.median_low(central) - low, high - statistics.median_high(central)
+    return slope if rise >= LEAST_RISE and min(rises) >= _LEAST_SHARE * rise else 0.0
