@@ -121,10 +121,10 @@ class ServiceUse:
 
     def in_words(self) -> str:
         """The figures in a line."""
-        share = "" if self.processor_share is None else f" ({self.processor_share * 100:.0f} % of one)"
-        used = f"{self.processor_s:.2f} s of processors{share}, at most {megabytes(self.peak_memory_bytes)} of memory"
+        share = "" if self.processor_share is None else f" ({self.processor_share * 100:.0f} % of a processor)"
+        used = f"{self.processor_s:.2f} s of processor time{share}, up to {megabytes(self.peak_memory_bytes)} of memory"
         growth = self.memory_growth_bytes_per_s
-        return used if growth is None else f"{used}, which grew by {megabytes(growth * 60)}/min"
+        return f"{used}, growing by {megabytes(growth * 60)}/min" if growth else used
 
 
 def megabytes(size: float) -> str:

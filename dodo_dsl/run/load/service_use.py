@@ -3,7 +3,7 @@
 import os
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Set
 from pathlib import Path
 from typing import NamedTuple
 
@@ -40,10 +40,11 @@ class _Process(NamedTuple):
 
 
 class _Sharing(NamedTuple):
-    """Which part of the memory counts that processes have, as some of it is the same, and until when that is so."""
+    """Which part of the memory counts that some processes have, as it is partly the same, and until when that is so."""
 
-    part: float = 1.0
-    until_s: float = 0.0
+    part: float
+    among: Set[int]
+    until_s: float
 
 
 class ServiceUse:
@@ -113,23 +114,30 @@ class ServiceUse:
         self._ticks[name] = ticks
 
     def _memory(self, name: str, pids: Iterable[int], now: float) -> int:
+        """Bytes of all processes; one that began since it was told what they share counts when it is told again."""
         sizes = {pid: process_memory.resident(pid, self._proc) for pid in pids}
-        large = [pid for pid, size in sizes.items() if sum(size) > _SMALL]
+        large = {pid for pid, size in sizes.items() if sum(size) > _SMALL}
+        part = 1.0
+        if len(large) > 1:
+            sharing = self._shared(name, large, sizes, now)
+            known = {pid: size for pid, size in sizes.items() if pid not in large - sharing.among}
+            if not known:
+                return max(map(sum, sizes.values()))
+            part, sizes = sharing.part, known
         anonymous, shared = (sum(parts) for parts in zip(*sizes.values(), strict=True))
-        total = anonymous + max(shared, self._held.get(name, 0))
-        return int(total * self._part(name, large, sizes, now)) if len(large) > 1 else total
+        return int((anonymous + max(shared, self._held.get(name, 0))) * part)
 
-    def _part(self, name: str, large: Sequence[int], sizes: Mapping[int, tuple[int, int]], now: float) -> float:
+    def _shared(self, name: str, large: Set[int], sizes: Mapping[int, tuple[int, int]], now: float) -> _Sharing:
         """Which part of their memory counts, as the kernel told it at last."""
-        sharing = self._sharing.get(name, _Sharing())
-        if now >= sharing.until_s:
+        sharing = self._sharing.get(name)
+        if sharing is None or now >= sharing.until_s:
             began = time.thread_time()
             theirs = [sum(process_memory.proportional(pid, self._proc)) for pid in large]
             every = sum(sum(size) for size in sizes.values())
             shared = sum(sum(sizes[pid]) for pid in large) - sum(theirs)
             part = (every - max(shared, 0)) / every if all(theirs) else 1.0  # not told to everybody
-            sharing = self._sharing[name] = _Sharing(part, now + _patience_s(began))
-        return sharing.part
+            sharing = self._sharing[name] = _Sharing(part, frozenset(large), now + _patience_s(began))
+        return sharing
 
     def _read(self, pid: int) -> _Process | None:
         try:

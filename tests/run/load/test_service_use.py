@@ -79,6 +79,20 @@ def test_what_processes_share_counts_once(tmp_path: Path) -> None:
     assert ServiceUse(tmp_path).take({10: "app"})["app"].memory == 202 * MB, "not everybody may know"
 
 
+def test_new_forks_count_when_it_is_known_what_they_share(tmp_path: Path) -> None:
+    use = ServiceUse(tmp_path)
+    for pid in (10, 11):
+        put(tmp_path, pid, 1 if pid == 10 else 10, megabytes=100, proportional=50)
+    assert use.take({10: "app"})["app"].memory == 100 * MB
+    for pid in (12, 13):
+        put(tmp_path, pid, 10, megabytes=100, proportional=25)
+    use._look({10: "app"})
+    assert use.take({10: "app"})["app"].memory == 100 * MB
+    for pid in (10, 11):
+        put(tmp_path, pid, 1 if pid == 10 else 10, megabytes=1)
+    assert use.take({10: "app"})["app"].memory == MB, "the small ones, until it is known"
+
+
 def test_a_service_that_has_ended_keeps_its_time(tmp_path: Path) -> None:
     use = ServiceUse(tmp_path)
     put(tmp_path, 10, 1, (100, 5), 3)
