@@ -5,7 +5,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from dodo_dsl.outcome import SLOW_ANSWERS, Outcome
+from dodo_dsl.outcome import Outcome, differs_each_run
 
 
 def with_margin(check: Mapping[str, Any]) -> dict[str, Any]:
@@ -24,9 +24,9 @@ def worst_margin(outcome: Outcome) -> float | None:
     """How far a test is from failing, -1 to 1: the least share of its checks; negative exactly where it failed.
 
     None for an error, -1 for a failed test without a failing check that has a value. A check that holds with nothing
-    to spare does not count, as three gates of three or no broken sample: it cannot be better. Nor does the time of
-    answers, which differs from run to run. 0 where no check is left of a passed test. A check that fails at its limit,
-    as a wall that is touched, does not say by how much, and counts only where no other check that failed does.
+    to spare does not count, as three gates of three or no broken sample: it cannot be better. Nor does what differs
+    from run to run, as the time of answers. 0 where no check is left of a passed test. A check that fails at its
+    limit, as a wall that is touched, does not say by how much, and counts only where no other check that failed does.
     """
     if outcome.outcome == "error":
         return None
@@ -34,16 +34,16 @@ def worst_margin(outcome: Outcome) -> float | None:
     counting = [
         check
         for check in outcome.checks
-        if check["ok"] is not is_failed and (is_failed or check["name"] != SLOW_ANSWERS)
+        if check["ok"] is not is_failed and (is_failed or not differs_each_run(check["name"]))
     ]
     shares = (check.get("margin_share") for check in counting if not is_failed or (check.get("margin") or 0.0) < 0)
     return min((share for share in shares if share), default=-1.0 if is_failed else 0.0)
 
 
 def failed_checks(outcome: Outcome) -> tuple[str, ...]:
-    """The names of the checks that failed, but for the time of answers."""
+    """The names of the checks that failed, but for those that differ from run to run."""
     names = {check["name"] for check in outcome.checks if not check["ok"]}
-    return tuple(sorted(names - {SLOW_ANSWERS}))
+    return tuple(sorted(name for name in names if not differs_each_run(name)))
 
 
 def _margin(check: Mapping[str, Any]) -> float | None:

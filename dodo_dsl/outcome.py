@@ -50,7 +50,18 @@ class MachineLoad:
 
 
 SLOW_ANSWERS = "slow-answers"
-"""The check of how long answers took; its value differs from run to run, unlike all others of lockstep."""
+"""The check of how long answers took."""
+PEAK_MEMORY, MEMORY_GROWTH = "peak-memory", "memory-growth"
+PROCESSOR_TIME, PROCESSOR_SHARE = "processor-time", "processor-share"
+"""The checks of what each of the application's services uses, ``peak-memory-steering`` for example."""
+_OF_USE = tuple(f"{name}-" for name in (PEAK_MEMORY, MEMORY_GROWTH, PROCESSOR_TIME, PROCESSOR_SHARE))
+
+
+def differs_each_run(check: str) -> bool:
+    """Whether a check measures the program and the machine, so that lockstep does not make its value the same."""
+    return check == SLOW_ANSWERS or check.startswith(_OF_USE)
+
+
 SAMPLE_TIMES = "uncopied-sample-times"
 """The check of how many answers lacked the sample times of their frames."""
 
@@ -78,6 +89,8 @@ class Response:
     processor: str
     """The processor by its name, with its clock."""
     uncopied: int = 0
+    worst_frame: int = 0
+    """The number of the frame whose answer took the longest, from 1 on; 0 where that is not known."""
 
     def in_words(self) -> str:
         """The times in a sentence, with the processor that they were measured on."""
@@ -88,6 +101,36 @@ class Response:
 
 def _ms(seconds: float) -> str:
     return f"{seconds * 1000:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
+
+
+@dataclass(frozen=True)
+class ServiceUse:
+    """What a service of the application used from the begin of the test to its end, with all its processes.
+
+    ``processor_share`` is its processor time by the test's own time, 1 for one processor all the time.
+    ``memory_growth_bytes_per_s`` is that of the second half of the test, by the test's own time, 0 where it does not
+    grow steadily, None where the test was too short to tell. ``memory_limit_bytes`` is None where there is none.
+    """
+
+    service: str
+    processor_s: float
+    processor_share: float | None
+    peak_memory_bytes: int
+    memory_growth_bytes_per_s: float | None
+    memory_limit_bytes: int | None
+
+    def in_words(self) -> str:
+        """The figures in a line."""
+        share = "" if self.processor_share is None else f" ({self.processor_share * 100:.0f} % of a processor)"
+        used = f"{self.processor_s:.2f} s of processor time{share}, up to {megabytes(self.peak_memory_bytes)} of memory"
+        growth = self.memory_growth_bytes_per_s
+        return f"{used}, growing by {megabytes(growth * 60)}/min" if growth else used
+
+
+def megabytes(size: float) -> str:
+    """A number of bytes in MB, with three digits at least."""
+    number = size / 1e6
+    return f"{number:,.0f} MB" if number >= 100 or not number else f"{number:.3g} MB"
 
 
 @dataclass(frozen=True)
@@ -117,6 +160,8 @@ class Outcome:
     description: str = ""
     machine: MachineLoad | None = None
     response: Response | None = None
+    resources: tuple[ServiceUse, ...] = ()
+    """Of the application's services; empty where nothing was measured."""
     goals: tuple[Goal, ...] = ()
 
 

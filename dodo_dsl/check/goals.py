@@ -11,7 +11,14 @@ from dodo_dsl.spec import quantity
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.goals import Goal
 
-_OF_THE_TEST = {"slow-answers": "", "uncopied-sample-times": ""}
+_OF_THE_TEST = {
+    "slow-answers": "",
+    "uncopied-sample-times": "",
+    "peak-memory-*": "MB",
+    "memory-growth-*": "MB/min",
+    "processor-time-*": "s",
+    "processor-share-*": "",
+}
 """Checks of no evaluator."""
 
 

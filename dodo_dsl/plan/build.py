@@ -184,6 +184,7 @@ class _Builder:
             "isolation",
             "record",
             "response",
+            "resources",
             "goals",
         ):
             if key in spec.spans:
@@ -210,6 +211,7 @@ class _Builder:
             services=services,
             application=self.rewritten(self.cid, isolated, evaluators, hardware, privileged, self._variables()),
             lockstep=lockstep(spec, self.application.declared, self.settings.wall_timeout_s),
+            resources=spec.resources,
             rig=rig.name if rig else "",
             more_tags=rig.more_tags if rig else (),
             pool=self._pooled() if spec.pool else None,

@@ -8,6 +8,7 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.spec import model as spec_model
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.goals import Goal
+from dodo_dsl.spec.resource_limits import ResourceLimits
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0
@@ -146,6 +147,7 @@ class Plan:
     services: tuple[PlannedService, ...]
     application: Application
     lockstep: Lockstep | None = None
+    resources: ResourceLimits | None = None
     rig: str = ""
     more_tags: tuple[str, ...] = ()
     pool: Pooled | None = None

@@ -25,6 +25,7 @@ from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.goals import Goal, is_goal
 from dodo_dsl.spec.instances.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS
+from dodo_dsl.spec.resource_limits import ResourceLimits, is_valid
 from dodo_dsl.spec.settings import Settings
 
 FORMAT = 1
@@ -71,6 +72,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         if settings.wall_timeout_s is not None and raw["lockstep"]:
             raw["lockstep"]["wall_timeout_s"] = settings.wall_timeout_s
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
+        raw["resources"] = ResourceLimits(**raw["resources"]) if raw["resources"] else None
         raw |= {key: tuple(raw[key]) for key in ("more_tags", "messages", "senders", "truth", "import_paths")}
         raw["pool"] = Pooled(**raw["pool"]) if raw["pool"] else None
         raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
@@ -115,6 +117,7 @@ def _problem(plan: Plan) -> str:
         "variable": all(isinstance(v, str) for v in plan.application.variables.values()),
         "secret": all(isinstance(text, str) for pair in plan.application.secrets.items() for text in pair),
         "access": _is_access(plan.application.access),
+        "resources": plan.resources is None or is_valid(plan.resources),
         "message": all(isinstance(m, str) for s in plan.application.services for m in (*s.inputs, *s.outputs)),
         "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }

@@ -7,7 +7,10 @@ from dodo_dsl.outcome import Outcome
 
 
 def to_text(outcomes: Sequence[Outcome]) -> str:
-    """Duration of set-up and execution, outcome, margins and every check's value, labelled with the test."""
+    """Duration of set-up and execution, outcome, margins, every check's value, and what the application used.
+
+    All are labelled with the test.
+    """
     from prometheus_client import CollectorRegistry, Gauge
     from prometheus_client.openmetrics.exposition import generate_latest
 
@@ -20,6 +23,8 @@ def to_text(outcomes: Sequence[Outcome]) -> str:
         "dodo_check_margin", "Distance of the value to its limit", ["test", "check", "unit"], registry=registry
     )
     worst = Gauge("dodo_worst_margin", "Least margin of the checks, -1 to 1", ["test"], registry=registry)
+    processor = Gauge("dodo_processor_seconds", "Processor time", ["test", "service"], registry=registry)
+    memory = Gauge("dodo_peak_memory_bytes", "Most memory at any time", ["test", "service"], registry=registry)
     for outcome in outcomes:
         passed.labels(outcome.slug).set(outcome.outcome == "passed")
         if outcome.setup_s is not None:
@@ -28,6 +33,9 @@ def to_text(outcomes: Sequence[Outcome]) -> str:
             execution.labels(outcome.slug).set(round(outcome.execution_s, 3))
         if (share := worst_margin(outcome)) is not None:
             worst.labels(outcome.slug).set(share)
+        for use in outcome.resources:
+            processor.labels(outcome.slug, use.service).set(round(use.processor_s, 3))
+            memory.labels(outcome.slug, use.service).set(use.peak_memory_bytes)
         for check in outcome.checks:
             if check["value"] is not None:
                 value.labels(outcome.slug, check["name"], check.get("unit") or "").set(check["value"])

@@ -9,7 +9,7 @@ from typing import Any
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import MachineLoad, NotRun, Outcome, Response, Wait
+from dodo_dsl.outcome import MachineLoad, NotRun, Outcome, Response, ServiceUse, Wait
 from dodo_dsl.report.run_record import RunRecord, run_record
 from dodo_dsl.spec.goals import Goal, is_goal
 
@@ -93,6 +93,8 @@ def _rounded(test: dict[str, Any]) -> dict[str, Any]:
 def _rounded_value(name: str, value: Any) -> Any:
     if isinstance(value, dict):
         return _rounded(value)
+    if name == "resources":
+        return [_rounded(use) for use in value]
     return round(value, 3) if name.endswith(("_s", "_share")) and value is not None else value
 
 
@@ -151,7 +153,9 @@ def _outcome(test: dict[str, Any]) -> Outcome:
     goals = tuple(Goal(**goal) for goal in test.get("goals", ()))
     if not all(map(is_goal, goals)):
         raise ValueError("a goal whose numbers make no score")
-    return Outcome(**{**values, "machine": _load(test.get("machine")), "response": response, "goals": goals})
+    resources = tuple(ServiceUse(**use) for use in test.get("resources", ()))
+    read = {"machine": _load(test.get("machine")), "response": response, "resources": resources, "goals": goals}
+    return Outcome(**{**values, **read})
 
 
 def _circumstances(document: dict[str, Any]) -> Circumstances:

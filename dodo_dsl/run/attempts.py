@@ -10,6 +10,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
+from dodo_dsl.run.load.judgement import too_busy
 from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
 from dodo_dsl.run.rigs.pool import opened
 from dodo_dsl.run.standing import Standing
@@ -84,6 +85,8 @@ class Attempts:
                 self.kept.extend(kept)
                 if engine.state.is_unanswered and not self._keep and (why := await asyncio.to_thread(_silent, job)):
                     outcome = replace(outcome, reason=f"{outcome.reason}; {why}")
+                if not self._keep and (paused := await asyncio.to_thread(_paused, job, outcome)):
+                    outcome = replace(outcome, notes=(*outcome.notes, paused))
                 if job.plan.pool:
                     outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
@@ -104,6 +107,18 @@ def _silent(job: Job) -> str:
 
     with contextlib.suppress(OSError, OdvdError):
         return silent_consumer(job.plan, job.folder, job.report / RECORDING)
+    return ""
+
+
+def _paused(job: Job, outcome: Outcome) -> str:
+    """The longest pause of the application between two answers where that is a note, else empty."""
+    from dodo_dsl.opendlv.odvd.tokens import OdvdError
+    from dodo_dsl.run.recorded.longest_pause import long_pause
+
+    if outcome.machine is None or too_busy(outcome.machine):
+        return ""
+    with contextlib.suppress(OSError, OdvdError):
+        return long_pause(job.plan, job.folder, job.report / RECORDING)
     return ""
 
 

@@ -9,6 +9,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run.load.meter import LoadMeter, add_up
+from dodo_dsl.run.load.use_series import UseMeter
 from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
     Backend,
@@ -50,6 +51,7 @@ class Engine:
     state: RunState = field(init=False)
     _now: Callable[[], float] = field(init=False)
     _meter: LoadMeter = field(init=False)
+    _use: UseMeter = field(init=False)
     _begin_sent: float = 0.0
 
     async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
@@ -57,13 +59,16 @@ class Engine:
         self._now = asyncio.get_running_loop().time
         self.state = RunState(self.plan, self._now)
         self._meter = LoadMeter(self.backend.load)
+        self._use = UseMeter(self.backend.use, self._now)
         kept: list[str] = []
         try:
             await self._set_up()
             self.begun()
             if self.plan.clock == "realtime":
                 self._meter.begin()
+            self._use.begin()
             await self._execute()
+            await self._measure()
         except Ended:
             pass
         except BackendError as error:
@@ -95,8 +100,20 @@ class Engine:
         self.state.notes.append(f"not all of the test was taken down: {type(error).__name__}: {error}")
         return []
 
+    async def _measure(self) -> None:
+        """Takes the last figures of what the application used, while it is there."""
+        try:
+            await self._use.end()
+        except Exception as error:  # noqa: BLE001  (whatever it is, it must not decide the test)
+            why = f"{type(error).__name__}: {error}"
+            self.state.notes.append(f"what the application used was not measured to the end: {why}")
+        began, finished = self.state.began, self.state.finished or self._now()
+        whole = [] if began is None else [(began, 0.0), (finished, finished - began)]
+        self.state.resources = self._use.figures(self.state.progress if self.plan.lockstep else whole)
+
     async def _wind_up(self, keep: bool) -> list[str]:
         try:
+            await self._measure()
             await self._meter.end()
             self.state.load = add_up(self._meter.snapshots, self.state.is_application)
         except Exception as error:  # noqa: BLE001  (whatever it is, the test has to be taken down)

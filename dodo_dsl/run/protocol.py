@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from dodo_dsl.outcome import Response
+from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
 
 
@@ -199,6 +200,10 @@ class Backend(Protocol):
 
     async def load(self) -> Snapshot | None:
         """What the test's services have used so far; None where that cannot be measured."""
+        ...
+
+    async def use(self) -> Mapping[str, Used] | None:
+        """What each service of the application used so far; None where that cannot be measured."""
         ...
 
     async def close(self, keep: bool) -> list[str]:

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result
+from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.recorder_service import RECORDER
+from dodo_dsl.run.load import response, use_judgement
 from dodo_dsl.run.load.judgement import consider
-from dodo_dsl.run.load.response import judged
 from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
@@ -73,6 +73,9 @@ class RunState:
     is_unanswered: bool = False
     """Whether the clock of a lockstep test gave up as the application did not answer."""
     time: Time | None = None
+    progress: list[tuple[float, float]] = field(default_factory=list)
+    """Times of ``clock`` in lockstep, with the test time that was reached then."""
+    resources: tuple[ServiceUse, ...] = ()
     _ended_by: str = ""
     """The service whose end was that of the test."""
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -150,8 +153,9 @@ class RunState:
                 self.input_ended = True
             case Time():
                 self.time = event
-            case Responded(response):
-                self.response = response
+                self.progress.append((self.clock(), event.seconds))
+            case Responded(answers):
+                self.response = answers
 
     def _take_stop(self, kind: str, reason: str) -> None:
         if kind == "timedout":
@@ -207,8 +211,9 @@ class RunState:
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
-        answers = judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
-        considered = consider(decide(self.facts, answers.findings), self._load())
+        answers = response.judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
+        use = use_judgement.judged(self.resources, plan.resources)
+        considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
         finding = self._timed(considered.finding)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
@@ -218,12 +223,13 @@ class RunState:
             execution_s=None if self.finished is None or self.began is None else self.finished - self.began,
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
-            checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks),
+            checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks, *use.checks),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
-            notes=(*self.notes, *losses, *answers.notes),
+            notes=(*self.notes, *losses, *answers.notes, *use.notes),
             machine=considered.load,
             response=self.response,
+            resources=self.resources,
         )
 
     def is_application(self, service: str) -> bool:

@@ -14,6 +14,7 @@ from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.instances.matrix import Choice
 from dodo_dsl.spec.pool import Pool, pool_of
 from dodo_dsl.spec.registry import Location
+from dodo_dsl.spec.resource_limits import KEYS, ResourceLimits
 
 LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
@@ -26,7 +27,7 @@ LEVELS = tuple(LEVEL_WORDS)
 KINDS = ("perception", "open-loop", "closed-loop")
 FRAMES = (ALWAYS, ON_FAILURE, NEVER) = ("always", "on-failure", "never")
 """When the pictures of a test's cameras are kept."""
-_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "application", "goals", "rig")
+_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "resources", "application", "goals", "rig")
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
 
@@ -51,6 +52,7 @@ class Spec:
     cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
+    ``resources`` are the limits of what each of the application's services uses, None without any.
     ``variables`` are those that the application gets from the test, ``goals`` the soft ones by the names of checks.
     ``is_whole`` is False where services could not be read, so that missing producers are not reported.
     ``ranges`` are those of ``vary``, ``template`` is the instance before their values were filled in, and ``corners``
@@ -74,6 +76,7 @@ class Spec:
     max_response_s: float | None = None
     response_over: float = 0.0
     copies_times: bool = False
+    resources: ResourceLimits | None = None
     uses: tuple[Use, ...] = ()
     variables: dict[str, Entry] = field(default_factory=dict)
     goals: dict[str, Entry] = field(default_factory=dict)
@@ -155,6 +158,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
     longest, more = _within(_part(response, "max"), "max", "s", (0.0001, 3600), "0.1 ms to 1 h")
     largest, also = _within(_part(node.get("record"), "limit"), "limit", "MB", (1, 100_000), "1 MB to 100 GB")
     frames, rate, wrong = _frames(node.get("record"))
+    resources, exceeding = _resources(node.get("resources"))
     over, most = _within(_part(response, "over"), "over", quantity.SHARE, (0, 1), "0 % to 100 %")
     spec = Spec(
         location,
@@ -173,6 +177,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         record_limit_mb=largest,
         max_response_s=longest,
         response_over=over or 0.0,
+        resources=resources,
         copies_times=_part(response, "sample-times") is not None,
         uses=uses,
         variables=_variables(node.get("application")),
@@ -181,7 +186,16 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         spans={key: entry.value.span for key, entry in node.entries.items()},
         is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),
     )
-    return spec, [*found, *more, *also, *wrong, *most]
+    return spec, [*found, *more, *also, *wrong, *exceeding, *most]
+
+
+def _resources(node: Node | None) -> tuple[ResourceLimits | None, list[Diagnostic]]:
+    """The limits of what services use, and the problems of those that are out of range."""
+    if not isinstance(node, Mapping):
+        return None, []
+    read = {key.field: _within(node.get(key.name), key.name, *key[2:]) for key in KEYS}
+    problems = [problem for _, found in read.values() for problem in found]
+    return ResourceLimits(**{name: value for name, (value, _) in read.items()}), problems
 
 
 def _variables(application: Node | None) -> dict[str, Entry]:

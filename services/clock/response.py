@@ -8,6 +8,9 @@ from typing import Any
 
 from services.clock.processor_time import Spent
 
+_FIRST_FRAME = 2
+"""The one of the first answer that counts."""
+
 
 @dataclass
 class ResponseTimes:
@@ -48,6 +51,7 @@ class ResponseTimes:
             "processor_p95_s": _percentile(self._processor, 0.95) if self._processor else None,
             "processor_worst_s": max(self._processor, default=None),
             "slow": sum(taken > self.period_s for taken in self._taken),
+            "worst_frame": self._taken.index(max(self._taken)) + _FIRST_FRAME,
             "uncopied": self.uncopied,
             "over": None if self.limit_s is None else sum(taken > self.limit_s for taken in self._taken),
             "processor": processor_name(),

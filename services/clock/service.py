@@ -25,7 +25,7 @@ from services.clock.participants import Patience, Roles, TestEnded
 from services.clock.processor_time import ApplicationProcesses
 from services.clock.response import ResponseTimes
 
-_REPORT_S = 1.0
+_REPORT_S = 0.25
 _SLICE = 0.05
 _MOST_EARLY = 1000
 CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone")

@@ -33,11 +33,13 @@ def test_values_are_in_the_unit_of_the_check(tmp_path: Path) -> None:
         "goals:\n"
         "  time-to-goal: {better: less, zero: 1 min, one: 5 s, weight: 2}\n"
         "  wall-margin: {better: more, zero: 0 cm, one: 20 cm}\n"
-        "  slow-answers: {better: less, zero: 10 %, one: 0}\n",
+        "  slow-answers: {better: less, zero: 10 %, one: 0}\n"
+        "  peak-memory-steering: {better: less, zero: 1 GB, one: 100 MB}\n",
     )
     assert problems == []
     assert goals == (
         Goal("time-to-goal", 60.0, 5.0, 2.0), Goal("wall-margin", 0.0, 0.2), Goal("slow-answers", 0.1, 0.0),
+        Goal("peak-memory-steering", 1000.0, 100.0),
     )  # fmt: skip
 
 

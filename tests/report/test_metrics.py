@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from dodo_dsl.margins import with_margin
+from dodo_dsl.outcome import ServiceUse
 from dodo_dsl.report.metrics import to_text
 from tests.report.test_report_folder import OUTCOME
 
@@ -21,6 +22,13 @@ def test_margins_are_labelled_as_values_are() -> None:
     assert samples(text, "dodo_check_margin") == ['check="wall-margin",test="test",unit="m"} -0.020000000000000004']
     assert len(samples(text, "dodo_check_value")) == 2
     assert samples(text, "dodo_worst_margin") == ['test="test"} -0.28571428571428575']
+
+
+def test_what_the_application_used() -> None:
+    use = ServiceUse("steering", 1.2345, 0.4, 150_000_000, 0.0, None)
+    text = to_text([replace(OUTCOME, resources=(use,))])
+    assert samples(text, "dodo_processor_seconds") == ['service="steering",test="test"} 1.234']
+    assert samples(text, "dodo_peak_memory_bytes") == ['service="steering",test="test"} 1.5e+08']
 
 
 def test_an_error_has_no_margin() -> None:

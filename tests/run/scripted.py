@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
+from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot, Times
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, VerdictEvent
 
@@ -89,6 +90,8 @@ class ScriptedBackend:
     name: str = "process"
     loads: Callable[[float], Snapshot | None] = lambda _: None
     """What was used at a time of the loop."""
+    uses: Callable[[float], Mapping[str, Used] | None] = lambda _: None
+    """What services of the application have used, as ``loads``."""
     listens: Mapping[str, float] | None = None
     """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
 
@@ -119,6 +122,9 @@ class ScriptedBackend:
 
     async def load(self) -> Snapshot | None:
         return self.loads(asyncio.get_running_loop().time())
+
+    async def use(self) -> Mapping[str, Used] | None:
+        return self.uses(asyncio.get_running_loop().time())
 
     async def close(self, keep: bool) -> list[str]:
         await self._call("close")

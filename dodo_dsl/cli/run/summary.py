@@ -42,6 +42,7 @@ def write(
             stream.writelines(
                 f"        {printable(check_words.line(check, outcome.checks))}\n" for check in outcome.checks
             )
+            stream.writelines(f"        {printable(use.service)}: {use.in_words()}\n" for use in outcome.resources)
             colours.write(stream, _complaints((logs or {}).get(outcome.slug)))
         if outcome.outcome != "passed":
             stream.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)

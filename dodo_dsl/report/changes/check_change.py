@@ -6,7 +6,7 @@ from decimal import Decimal
 from typing import Any, Literal
 
 from dodo_dsl.margins import with_margin
-from dodo_dsl.outcome import SLOW_ANSWERS
+from dodo_dsl.outcome import differs_each_run
 from dodo_dsl.report import check_words
 
 NEGLIGIBLE = 0.01
@@ -65,7 +65,7 @@ def with_margins(check: Mapping[str, Any]) -> Mapping[str, Any]:
 def _direction(before: Mapping[str, Any], after: Mapping[str, Any]) -> Direction:
     if bool(before["ok"]) != bool(after["ok"]):
         return "better" if after["ok"] else "worse"
-    if after["name"] == SLOW_ANSWERS:
+    if differs_each_run(after["name"]):
         return "unchanged"  # it differs from run to run
     is_same_unit = (before.get("unit") or "") == (after.get("unit") or "")
     is_same_limit = (before.get("limit") or {}) == (after.get("limit") or {})

@@ -15,7 +15,7 @@ import jinja2
 from markupsafe import Markup
 
 from dodo_dsl import __version__, package_data
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import Outcome, megabytes
 from dodo_dsl.report import check_words
 from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.comparison import KINDS, Comparison
@@ -87,6 +87,7 @@ def render(
             runs=circumstances.runs,
             version=__version__,
             machine_line=machine_line,
+            megabytes=megabytes,
             curve=check_history.curve,
             grids=matrix_grid.grids(outcomes),
             decisive_value=matrix_grid.decisive_value,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dodo_dsl.outcome import SLOW_ANSWERS, Outcome
+from dodo_dsl.outcome import Outcome, differs_each_run
 from dodo_dsl.report.changes import words
 from dodo_dsl.report.changes.check_change import with_margins
 from dodo_dsl.report.check_words import only_follows
@@ -54,7 +54,9 @@ def decisive_value(outcome: Outcome) -> str:
     """
     checks = outcome.checks
     failed = [check for check in checks if not check["ok"] and not only_follows(check, checks)]
-    shares = ((with_margins(check)["margin_share"], check) for check in outcome.checks if check["name"] != SLOW_ANSWERS)
+    shares = (
+        (with_margins(check)["margin_share"], check) for check in outcome.checks if not differs_each_run(check["name"])
+    )
     judged = sorted(((share, check) for share, check in shares if share), key=lambda pair: pair[0])
     found = failed or [check for _, check in judged]
     return f"{found[0]['name']} {words.value(found[0]['value'], found[0].get('unit') or '')}" if found else ""

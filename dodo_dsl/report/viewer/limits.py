@@ -6,7 +6,15 @@ from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS, Outcome
+from dodo_dsl.outcome import (
+    MEMORY_GROWTH,
+    PEAK_MEMORY,
+    PROCESSOR_SHARE,
+    PROCESSOR_TIME,
+    SAMPLE_TIMES,
+    SLOW_ANSWERS,
+    Outcome,
+)
 from dodo_dsl.plan.model import Place, Plan, PlannedService
 from dodo_dsl.report import check_words
 from dodo_dsl.report.viewer.encoded import shown
@@ -21,6 +29,13 @@ _OTHER_NAMES = {
 """Parameters that set the limit of a check whose name does not name them."""
 _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
 """Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
+_OF_USE = {
+    PEAK_MEMORY: "max-memory",
+    MEMORY_GROWTH: "max-memory-growth",
+    PROCESSOR_TIME: "max-processor-time",
+    PROCESSOR_SHARE: "max-processor-share",
+}
+"""The same of the test's ``resources``; the name of a service follows that of the check."""
 _ENDINGS = ("-over-time",)
 _MOST_SPEC = 1 << 20
 
@@ -72,6 +87,9 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines) -> Iterator[dict[str,
 def _places(plan: Plan, check: str) -> Iterator[tuple[str, Place]]:
     if check in _OF_THE_TEST and "response" in plan.source_map:
         yield _OF_THE_TEST[check], plan.source_map["response"]
+    for name, flag in _OF_USE.items():
+        if check.startswith(f"{name}-") and "resources" in plan.source_map:
+            yield flag, plan.source_map["resources"]
     for service in plan.services:
         if not service.judge:
             continue

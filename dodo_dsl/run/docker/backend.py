@@ -15,10 +15,12 @@ from dodo_dsl.run.docker.bus import announce_begin
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.events import Watch
 from dodo_dsl.run.docker.processes import ContainerProcesses
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.docker.teardown import take_down, writers
+from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
@@ -62,6 +64,7 @@ class DockerBackend:
         self._compose = self.compose_kind(plan, folder, report, project, say)
         self._containers: dict[str, Any] = {}
         self._processes = ContainerProcesses({})
+        self._use = ContainerUse({})
         self._outputs: dict[str, ServiceOutput] = {}
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
@@ -79,6 +82,8 @@ class DockerBackend:
         try:
             self._containers = await asyncio.to_thread(self._find_containers)
             self._processes = ContainerProcesses(self._containers)
+            names = {service.name for service in self.plan.application.services}
+            self._use = ContainerUse({name: c for name, c in self._containers.items() if name in names})
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
             if SANDBOX in self._containers:
                 await asyncio.to_thread(self._containers[SANDBOX].start)
@@ -181,6 +186,9 @@ class DockerBackend:
 
     async def load(self) -> Snapshot | None:
         return await asyncio.to_thread(self._processes.load)
+
+    async def use(self) -> Mapping[str, Used] | None:
+        return await asyncio.to_thread(self._use.take)
 
     async def close(self, keep: bool) -> list[str]:
         self._watch.ignores = True

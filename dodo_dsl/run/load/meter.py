@@ -18,20 +18,20 @@ OTHERS = 0.5
 _NONE = Times(0.0, 0.0)
 
 
-class LoadMeter:
-    """Takes snapshots by ``take`` from ``begin`` to ``end``; threads that live for less than PERIOD_S may be missed."""
+class Meter:
+    """Calls ``look`` from ``begin`` to ``end``; ``period`` gives the seconds to the next time by those that passed."""
 
-    def __init__(self, take: Callable[[], Awaitable[Snapshot | None]]) -> None:
-        self._take = take
+    def __init__(self, look: Callable[[], Awaitable[None]], period: Callable[[float], float]) -> None:
+        self._look = look
+        self._period = period
         self._task: asyncio.Task[None] | None = None
         self._is_over = False
-        self.snapshots: list[Snapshot] = []
 
     def begin(self) -> None:
         self._task = asyncio.ensure_future(self._run())
 
     async def end(self) -> None:
-        """Takes the last snapshot, with little patience."""
+        """Looks for the last time, with little patience."""
         if self._task is None:
             return
         self._is_over = True  # also for a snapshot that came as it was cancelled
@@ -40,12 +40,23 @@ class LoadMeter:
         self._task = None
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(LAST_PATIENCE_S):
-                await self._add()
+                await self._look()
 
     async def _run(self) -> None:
+        now = asyncio.get_running_loop().time
+        began = now()
         while not self._is_over:
-            await self._add()
-            await asyncio.sleep(PERIOD_S)
+            await self._look()
+            await asyncio.sleep(self._period(now() - began))
+
+
+class LoadMeter(Meter):
+    """Takes snapshots by ``take``; threads that live for less than PERIOD_S may be missed."""
+
+    def __init__(self, take: Callable[[], Awaitable[Snapshot | None]]) -> None:
+        super().__init__(self._add, lambda _: PERIOD_S)
+        self._take = take
+        self.snapshots: list[Snapshot] = []
 
     async def _add(self) -> None:
         snapshot = await self._take()

@@ -12,28 +12,30 @@ from dodo_dsl.run.outcomes import Finding
 UNSEEN = "the limit of the time of an answer is not judged, as what containers wait for a processor cannot be seen"
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
+MOST_PERIODS = 10
+"""The periods of frames that one answer may take before a note says so."""
 
 _Judged = tuple[str, dict[str, Any]]
 """Why the application failed, or an empty text; and the check."""
 
 
 @dataclass(frozen=True)
-class JudgedResponse:
-    """What follows from the answers."""
+class JudgedFigures:
+    """What follows from what was measured of the application."""
 
     findings: tuple[Finding, ...] = ()
     checks: tuple[dict[str, Any], ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def judged(response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> JudgedResponse:
+def judged(response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> JudgedFigures:
     """Judges the answers by the limits of the test; ``services`` are the application's."""
     if response is None or lockstep is None:
-        return JudgedResponse()
+        return JudgedFigures()
     every = [*_times(response, lockstep), *_copies(response, lockstep)]
     who = services[0] if services else ""
     findings = tuple(Finding("failed", reason, who) for reason, _ in every if reason)
-    return JudgedResponse(findings, tuple(with_margin(check) for _, check in every), tuple(_notes(response, lockstep)))
+    return JudgedFigures(findings, tuple(with_margin(check) for _, check in every), tuple(_notes(response, lockstep)))
 
 
 def _times(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
@@ -61,6 +63,10 @@ def _notes(response: Response, lockstep: Lockstep) -> Iterator[str]:
     if response.slow > MOST_SLOW * response.answers:
         slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
         yield f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
+    if response.worst_s > MOST_PERIODS * response.period_s:
+        which = f" to frame {response.worst_frame}" if response.worst_frame else ""
+        took = f"the answer{which} took {response.worst_s:.3g} s, as long as {response.worst_s / response.period_s:.0f}"
+        yield f"{took} frames, which outside lockstep would not have waited"
     is_unseen = response.processor_median_s is None and response.over is not None
     if is_unseen and (response.over or 0) > lockstep.response_over * response.answers:
         yield UNSEEN

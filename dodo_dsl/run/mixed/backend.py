@@ -1,9 +1,10 @@
 """The mixed backend: the application in containers, DoDo's services as processes that share network and memory."""
 
 import asyncio
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
+from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.mixed.containers import ApplicationContainers
 from dodo_dsl.run.process.backend import ProcessBackend
@@ -44,6 +45,9 @@ class MixedBackend:
         if own is None or application is None:
             return None
         return replace(own, services={**own.services, **application.services})
+
+    async def use(self) -> Mapping[str, Used] | None:
+        return await self._containers.use()
 
     async def close(self, keep: bool) -> list[str]:
         kept = await asyncio.gather(self._processes.close(keep), self._containers.close(keep))

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.application_files import hidden_folders
 from dodo_dsl.run.load import snapshot
+from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes, import_paths
 from dodo_dsl.run.process.confined.confinement import confinement
@@ -61,8 +62,8 @@ class ProcessBackend:
         self._outputs: dict[str, ServiceOutput] = {}
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
-        self._asked: asyncio.Future[Snapshot | None] | None = None
-        self._listeners: asyncio.Future[list[str] | None] | None = None
+        self._asked: dict[str, asyncio.Future[Any]] = {}
+        """What the sandbox is to answer, by what it is asked to do."""
         self._sandbox = SandboxClient(
             isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
         )
@@ -79,12 +80,9 @@ class ProcessBackend:
         elif "unstartable" in message:
             self._pids[message["unstartable"]].cancel()
             self._events.put_nowait(Unstartable(message["unstartable"], message["why"]))
-        elif "load" in message:
-            if self._asked is not None and not self._asked.done():
-                self._asked.set_result(snapshot.from_json(message["load"]))
-        elif "listeners" in message:
-            if self._listeners is not None and not self._listeners.done():
-                self._listeners.set_result(message["listeners"])
+        elif asked := self._asked.keys() & message.keys():
+            for what in asked:
+                self._asked.pop(what).set_result(message[what])
         elif "exited" in message:
             task = asyncio.ensure_future(self._exited(**message))
             task.add_done_callback(lambda t: t.exception())
@@ -140,9 +138,13 @@ class ProcessBackend:
             self._events.put_nowait(Unstartable(command.name, str(error)))
         output.release_writer()
 
+    @property
+    def _is_confined(self) -> bool:
+        return self.isolation != "host" or self.is_apart
+
     def _confined(self, command: Command) -> dict[str, Any] | None:
         """How an application's process is kept apart; None for DoDo's own services."""
-        if command.layer != "application" or (self.isolation == "host" and not self.is_apart):
+        if command.layer != "application" or not self._is_confined:
             return None
         application = self.plan.application
         hidden = hidden_folders(application, self._folder, self.report)
@@ -162,21 +164,28 @@ class ProcessBackend:
 
     async def load(self) -> Snapshot | None:
         """What the sandbox sees of its processes; None when it does not answer."""
-        if self._asked is None or self._asked.done():
-            self._asked = asyncio.get_running_loop().create_future()
-            self._sandbox.send({"do": "load"})
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
-                return await asyncio.shield(self._asked)
-        return None
+        return snapshot.from_json(await self._ask("load"))
 
     async def listeners(self) -> Collection[str] | None:
         """As the sandbox sees them; None when it does not answer."""
-        self._listeners = asyncio.get_running_loop().create_future()
-        self._sandbox.send({"do": "listeners"})
+        found: list[str] | None = await self._ask("listeners")
+        return found
+
+    async def use(self) -> Mapping[str, Used] | None:
+        """As the sandbox sees it; None when it does not answer."""
+        names = [service.name for service in self.plan.application.services]
+        found: dict[str, tuple[float, int]] | None = await self._ask("use", names=names)
+        limit = self.plan.application.limits.memory if self._is_confined else 0
+        return {name: Used(*used, limit) for name, used in found.items()} if found else None
+
+    async def _ask(self, what: str, **words: object) -> Any:
+        """What the sandbox answers; None when it does not."""
+        if what not in self._asked:
+            self._asked[what] = asyncio.get_running_loop().create_future()
+            self._sandbox.send({"do": what, **words})
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(LOAD_PATIENCE_S):
-                return await self._listeners
+            async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
+                return await asyncio.shield(self._asked[what])
         return None
 
     async def close(self, keep: bool) -> list[str]:

@@ -38,11 +38,20 @@ class ChildExit:
 
 
 class Children:
-    """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how."""
+    """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how.
 
-    def __init__(self, on_exit: Callable[[str, ChildExit], None], umask: int = -1) -> None:
+    Before, while the kernel still knows it, ``on_end`` is called with its process id and name.
+    """
+
+    def __init__(
+        self,
+        on_exit: Callable[[str, ChildExit], None],
+        on_end: Callable[[int, str], None] = lambda _pid, _name: None,
+        umask: int = -1,
+    ) -> None:
         """``umask`` is that of programs that are started, by default this process's."""
         self._on_exit = on_exit
+        self._on_end = on_end
         self._umask = umask
         self._running: dict[str, Child] = {}
         self._used: dict[str, int] = {}
@@ -121,6 +130,7 @@ class Children:
                     os.waitpid(info.si_pid, 0)
                 else:
                     child = self._running.pop(name)
+                    self._on_end(child.pid, name)
                     code = child.wait()
                     failed = isinstance(child, ConfinedProcess) and child.failed
                     self._on_exit(name, ChildExit(code, self._used.pop(name, 0), failed))

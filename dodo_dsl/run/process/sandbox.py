@@ -9,10 +9,12 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
                         {"do": "close"}; {"do": "probe"}; {"do": "send", "cid", "data"}; {"do": "load"};
-                        {"do": "listeners"}; {"do": "keep"} with the descriptors of outputs and logs
+                        {"do": "listeners"}; {"do": "use", "names": [service, ...]};
+                        {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or {"unstartable": id, "why"};
                         {"exited": id, "code", "used", "failed"}; {"load": snapshot or null};
                         {"listeners": names of what listens on a bus, or null};
+                        {"use": {service: [seconds on processors, bytes of memory]} or null};
                         {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
                         ``confined.missing`` has it}
 """
@@ -34,6 +36,7 @@ from typing import Any
 
 from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.run.load import snapshot
+from dodo_dsl.run.load.service_use import ServiceUse
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
@@ -61,7 +64,8 @@ class Sandbox:
         self.isolation = isolation
         self.forks = forks
         umask = UMASK if isolation == "network" else -1
-        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), umask)
+        self.use = ServiceUse()
+        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), self.use.note_end, umask)
         self.places: Places | None = None
         self.times = ThreadTimes()
         self.keep = False
@@ -164,6 +168,11 @@ class Sandbox:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
         taken = snapshot.take(self.times, {**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
         self.send(load=snapshot.to_json(taken))
+
+    def _do_use(self, _descriptors: list[int], names: list[str]) -> None:
+        """Reports what some services have used so far."""
+        services = {pid: name for pid, name in self.children.names.items() if name in names}
+        self.send(use={name: used[:2] for name, used in self.use.take(services).items()} if _has_own_proc() else None)
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
         found = listening(self.children.names) if _has_own_proc() else None

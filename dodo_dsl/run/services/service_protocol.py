@@ -118,10 +118,12 @@ def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
 def _response(message: dict[str, Any]) -> Responded | None:
     """How long the application took, where all of the numbers can be."""
     facts: dict[str, Any] = {field.name: message.get(field.name) for field in dataclasses.fields(Response)}
-    facts["uncopied"] = message.get("uncopied", 0)
+    facts |= {name: message.get(name, 0) for name in ("uncopied", "worst_frame")}
     counts = [facts["answers"], facts["slow"], facts["over"] or 0, facts["uncopied"]]
     times = [value for name, value in facts.items() if name.endswith("_s")]
     if not all(type(count) is int and 0 <= count <= counts[0] for count in counts) or counts[0] == 0:
+        return None
+    if type(facts["worst_frame"]) is not int or not 0 <= facts["worst_frame"] <= counts[0] + 1:
         return None
     if not all(_is_number(time, none=True) and (time or 0) >= 0 for time in times) or None in times[:4]:
         return None

@@ -24,14 +24,22 @@ def test_without_figures_nothing_is_judged(lockstep: Lockstep | None) -> None:
 
 
 def test_too_slow_for_real_time_is_a_note() -> None:
-    slow = replace(FAST, median_s=0.5, p95_s=0.52, worst_s=1.25, slow=58)
+    slow = replace(FAST, median_s=0.5, p95_s=0.52, worst_s=0.75, slow=58)
     (note,) = judged(slow, PLAIN, ["steering"]).notes
     assert note == (
         "too slow for real time: 58 of 60 answers took longer than the frames' period of 100 ms; "
-        "an answer took 500 ms (median), 520 ms (95 %), 1.25 s (worst), 10 ms of it on the processor, "
+        "an answer took 500 ms (median), 520 ms (95 %), 750 ms (worst), 10 ms of it on the processor, "
         "on Some CPU, 2000 MHz"
     )
     assert judged(replace(slow, slow=6), PLAIN, ["steering"]).notes == (), "a tenth is not the rule"
+
+
+def test_one_answer_of_many_frames_is_a_note() -> None:
+    assert judged(replace(FAST, worst_s=1.0), PLAIN, ["steering"]).notes == ()
+    (note,) = judged(replace(FAST, worst_s=1.5, worst_frame=17), PLAIN, ["steering"]).notes
+    assert note == (
+        "the answer to frame 17 took 1.5 s, as long as 15 frames, which outside lockstep would not have waited"
+    )
 
 
 @pytest.mark.parametrize(("over", "passes"), [(0, True), (6, True), (7, False)])
