@@ -37,7 +37,8 @@ from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
-from dodo_dsl.run.process.confined.confined_process import ConfinedProcess, user_of
+from dodo_dsl.run.process.confined import users
+from dodo_dsl.run.process.confined.confined_process import ConfinedProcess
 from dodo_dsl.run.process.confined.confinement import INTERPRETER, Confinement
 from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
 from dodo_dsl.run.process.confined.places import Places
@@ -145,14 +146,14 @@ class Sandbox:
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
         if confined.isolation == "network" and self.places is None:
-            self.places = Places(user_of(confined.cid))
+            self.places = Places(_own_user(confined.cid))
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_probe(self, _descriptors: list[int]) -> None:
         """Confines a program that does nothing."""
         with tempfile.TemporaryFile() as output:
             try:
-                places = Places(user_of(0))
+                places = Places(_own_user(0))
                 environment = {"PATH": os.defpath}
                 true = ConfinedProcess(
                     ["true"], environment, output.fileno(), Confinement("/usr", "network", 0, INTERPRETER), places
@@ -195,6 +196,11 @@ class Sandbox:
 
     def _do_close(self, _descriptors: list[int]) -> None:
         self.ended = True
+
+
+def _own_user(cid: int) -> int | None:
+    """Who the application is where DoDo is root, as nobody else is; None without root, when it is who runs DoDo."""
+    return users.lease(users.FIRST + cid) if os.getuid() == 0 else None
 
 
 def _has_own_proc() -> bool:

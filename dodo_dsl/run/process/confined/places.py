@@ -16,7 +16,8 @@ class Places:
     """Folders that belong to ``user``, None for that of this process. To be made by a sandbox with own mounts."""
 
     def __init__(self, user: int | None) -> None:
-        self._user = user
+        self.user = user
+        """Who the application is; None for the user of this process."""
         self._root = Path(tempfile.mkdtemp(prefix="dodo-application-"))
         namespaces.mount_tmpfs(self._root, _SIZE)
         self.home = self._own("home")
@@ -28,8 +29,8 @@ class Places:
     def _own(self, name: str) -> Path:
         path = self._root / name
         path.mkdir(parents=True)
-        if self._user is not None:
-            os.chown(path, self._user, self._user)
+        if self.user is not None:
+            os.chown(path, self.user, self.user)
         return path
 
     def folder(self, folder: str) -> tuple[Path, bool]:
@@ -54,12 +55,12 @@ class Places:
 
     def _show(self, source: Path, target: Path) -> None:
         """The folder as the application's own where the kernel can do that, else as it is."""
-        if self._user is None:
+        if self.user is None:
             namespaces.bind(source, target, deep=True)
             return
         status = source.stat()
         try:
-            namespaces.bind_as(source, target, status.st_uid, self._user)
+            namespaces.bind_as(source, target, status.st_uid, self.user)
         except OSError:
             if status.st_mode & _READABLE != _READABLE:
                 why = "readable for its owner alone, and this kernel cannot show it to the application's user"
