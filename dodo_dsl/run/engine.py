@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
+from dodo_dsl.run.load import shortage
 from dodo_dsl.run.load.meter import LoadMeter, add_up
 from dodo_dsl.run.load.use_series import UseMeter
 from dodo_dsl.run.outcomes import deaf
@@ -57,7 +58,7 @@ class Engine:
     async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
         self._now = asyncio.get_running_loop().time
-        self.state = RunState(self.plan, self._now)
+        self.state = RunState(self.plan, self._now, memory_kills=shortage.memory_kills)
         self._meter = LoadMeter(self.backend.load)
         self._use = UseMeter(self.backend.use, self._now)
         kept: list[str] = []
@@ -80,12 +81,20 @@ class Engine:
             if self.state.finished is None:
                 self.state.finished = self._now()
             self.state.keep_tails(self.backend)
+            if self.state.is_to_explain():
+                self.state.shortage = self._shortage()
             if not keep and self.state.outcome(self.backend).outcome == "passed":
                 self.passed()
             self.say("taking down")
             kept = await self._close(keep)
             await self._collect_losses()
         return self.state.outcome(self.backend), kept
+
+    def _shortage(self) -> str:
+        """What of the machine, or of the limits that it was given, the test may have lacked."""
+        below = shortage.below(self.plan.application.limits) if self.state.ended_early() else ""
+        shared = shortage.Shared(self.backend.is_on_host, self.backend.has_engine)
+        return shortage.used_up(shared) or ("" if self.backend.has_engine else below)
 
     async def _close(self, keep: bool) -> list[str]:
         """Teardown to its end, however often the run is interrupted meanwhile; its errors do not change the verdict."""

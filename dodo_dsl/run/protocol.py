@@ -181,6 +181,13 @@ class Backend(Protocol):
 
     name: str
     cid: int
+    has_engine: bool
+    """Whether a Docker engine runs the application."""
+
+    @property
+    def is_on_host(self) -> bool:
+        """Whether the application has the machine's own ``/tmp``, shared memory and IPC."""
+        ...
 
     async def open(self) -> None: ...
 

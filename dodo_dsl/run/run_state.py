@@ -1,5 +1,6 @@
 """The state of one test while it runs, and what it decides."""
 
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -72,6 +73,12 @@ class RunState:
     input_ended: bool = False
     is_unanswered: bool = False
     """Whether the clock of a lockstep test gave up as the application did not answer."""
+    is_unstartable: bool = False
+    """Whether the test ended as a program could not be started."""
+    shortage: str = ""
+    """What of the machine was used up when the test ended; a sentence."""
+    memory_kills: Callable[[], int] = lambda: 0
+    """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
     progress: list[tuple[float, float]] = field(default_factory=list)
     """Times of ``clock`` in lockstep, with the test time that was reached then."""
@@ -79,8 +86,10 @@ class RunState:
     _ended_by: str = ""
     """The service whose end was that of the test."""
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    _killed_before: int = field(init=False)
 
     def __post_init__(self) -> None:
+        self._killed_before = self.memory_kills()
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
 
     def all_evaluators_ended(self) -> bool:
@@ -117,6 +126,7 @@ class RunState:
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Unstartable(service, why):
+                self.is_unstartable = True
                 self.end("error", unstartable(self.plan, service, why), service)
             case Lost(why):
                 self.end("error", why)
@@ -169,6 +179,9 @@ class RunState:
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
         if layer == "application":
             is_done = code == 0 and self.input_ended
+            if self._is_killed_for_others(code, out_of_memory):
+                ended = f"{ended}, as the machine ran out of memory"
+                self._end_by_exit("error", f"application service '{service}' {ended}", service)
             if not is_done and not self._all_verdicts_given():
                 self._end_by_exit(
                     "failed", f"application service '{service}' {ended}, before the test was decided", service
@@ -179,6 +192,32 @@ class RunState:
             self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
         elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
             self._end_by_exit("error", f"evaluator '{service}' ended without a verdict {when}", service)
+
+    def _is_killed_for_others(self, code: int, out_of_memory: bool) -> bool:
+        """Whether the kernel, not the test's own limit, has ended a program for want of memory."""
+        is_killed = code in (-signal.SIGKILL, 128 + signal.SIGKILL)
+        return is_killed and not out_of_memory and self.memory_kills() > self._killed_before
+
+    def is_to_explain(self) -> bool:
+        """Whether the machine may be the reason for how the test ended, if something of it was used up."""
+        return self.is_unstartable or self._is_of_conditions(decide(self.facts))
+
+    def _is_of_conditions(self, finding: Finding) -> bool:
+        """Whether a failure may come from what a program was given, unlike a message that it must not send."""
+        return finding.result == "failed" and bool(finding.is_timed or self._ended_by or self.is_unanswered)
+
+    def ended_early(self) -> bool:
+        """Whether the end of a service was that of the test."""
+        return bool(self._ended_by)
+
+    def _explained(self, finding: Finding) -> Finding:
+        """An error in place of a failure that may be due to what others used up."""
+        if not self.shortage:
+            return finding
+        if self._is_of_conditions(finding):
+            reason = f"the application cannot be judged here: {self.shortage}; it found: {finding.reason}"
+            return replace(finding, result="error", reason=reason)
+        return replace(finding, reason=f"{finding.reason}; {self.shortage}") if self.is_unstartable else finding
 
     def _end_by_exit(self, result: Result, reason: str, service: str) -> None:
         self._ended_by = service
@@ -214,7 +253,7 @@ class RunState:
         answers = response.judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
         use = use_judgement.judged(self.resources, plan.resources)
         considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
-        finding = self._timed(considered.finding)
+        finding = self._explained(self._timed(considered.finding))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(

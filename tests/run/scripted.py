@@ -88,6 +88,8 @@ class ScriptedBackend:
     tails: Mapping[str, list[str]] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
     name: str = "process"
+    has_engine: bool = False
+    is_on_host: bool = False
     loads: Callable[[float], Snapshot | None] = lambda _: None
     """What was used at a time of the loop."""
     uses: Callable[[float], Mapping[str, Used] | None] = lambda _: None

@@ -16,6 +16,7 @@ from dodo_dsl.run.engine import (
     READY_PATIENCE_S,
     Engine,
 )
+from dodo_dsl.run.load import shortage
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import (
     BackendError,
@@ -533,3 +534,49 @@ def test_what_is_written_after_the_decision_is_not_quoted() -> None:
 
     stages = {**READY, "begin": [(1.0, FAILED), (1.0, ENDED)]}
     assert outcome(Talking(plan(), stages, tails={"track": ["it hit the wall"]})).last_lines == ("it hit the wall",)
+
+
+@pytest.mark.parametrize(
+    ("event", "result"),
+    [
+        (FAILED, "error"),
+        (Exited("app", 1), "error"),
+        (Exited("app", 1, out_of_memory=True), "error"),
+        (Stopped("unanswered", "did not answer frame 17"), "error"),
+        (Foreign("the application sent x, which only 'pose' may send"), "failed"),
+        (PASSED, "passed"),
+    ],
+)
+def test_a_machine_that_had_nothing_left_is_not_the_applications_fault(
+    monkeypatch: pytest.MonkeyPatch, event: Event, result: str
+) -> None:
+    """What it must not send, it did not send for want of anything."""
+    monkeypatch.setattr(shortage, "used_up", lambda _: "9 of 9 open files of this machine were in use")
+    found = begun((1.0, event), (1.0, ENDED))
+    assert found.outcome == result
+    assert ("judged here: 9 of 9 open files of this machine were in use; it" in found.reason) == (result == "error")
+
+
+def test_what_could_not_be_started_is_told_with_what_was_used_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shortage, "used_up", lambda _: "9 of 9 processes were in use")
+    found = begun((1.0, Unstartable("app", "python: Resource temporarily unavailable")))
+    reason = (
+        "service 'app' could not be started: python: Resource temporarily unavailable; 9 of 9 processes were in use"
+    )
+    assert (found.outcome, found.reason) == ("error", reason)
+
+
+@pytest.mark.parametrize(("kills", "result"), [([3, 3], "failed"), ([3, 4], "error")])
+def test_a_kill_for_want_of_memory_is_the_machines(
+    monkeypatch: pytest.MonkeyPatch, kills: list[int], result: str
+) -> None:
+    monkeypatch.setattr(shortage, "memory_kills", lambda: kills.pop(0))
+    found = begun((1.0, Exited("app", -9)))
+    assert found.outcome == result
+    assert found.reason.startswith("application service 'app' was killed by SIGKILL")
+
+
+def test_a_lower_limit_of_the_shell_explains_an_early_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shortage, "below", lambda _: "DoDo was started with at most 256 open files")
+    assert begun((1.0, Exited("app", 1))).outcome == "error"
+    assert begun((1.0, FAILED), (1.0, ENDED)).outcome == "failed"

@@ -95,6 +95,8 @@ def _limit(copy: ServiceCopy, key: str, word: str, default: float) -> None:
 def _limit_files(copy: ServiceCopy) -> None:
     """The size of a file in bytes, files that are open, and no core dumps, unless the service sets lower ones."""
     own, limits = copy.service.get("ulimits"), copy.setting.limits
+    if isinstance(own, dict) and own.pop("nproc", None) is not None:
+        copy.note("ulimits.nproc removed, as it counts the user's processes on the whole machine: pids_limit counts")
     most = {"core": 0, "fsize": limits.file_size, "nofile": limits.files}
     copy.service["ulimits"] = most | (own if isinstance(own, dict) else {})
 

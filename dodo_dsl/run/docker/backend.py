@@ -28,6 +28,8 @@ from dodo_dsl.run.services.service_output import ServiceOutput
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
+_NOT_STARTED, _INIT = (126, 127), "[FATAL tini"
+"""How the engine's own first process of a container (``init: true``) ends when it cannot start the program."""
 _MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
 """How often, and how long each time, the engine's word is awaited that it was for memory: it may come late."""
 
@@ -36,6 +38,7 @@ class DockerBackend:
     """One test as a compose project of its own; ``subnets`` are tried in turn until the engine accepts one."""
 
     name = "docker"
+    has_engine = True
     compose_kind: type[Compose] = Compose
 
     def __init__(
@@ -69,6 +72,10 @@ class DockerBackend:
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self.left_behind = False
+
+    @property
+    def is_on_host(self) -> bool:
+        return self.plan.isolation == "host"
 
     async def open(self) -> None:
         await self._compose.read()
@@ -108,7 +115,16 @@ class DockerBackend:
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
+        if code in _NOT_STARTED and (why := self._init_said(name)):
+            self._events.put_nowait(Unstartable(name, why))
+            return
         self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
+
+    def _init_said(self, name: str) -> str:
+        """Why the engine's own first process of a container could not start the program; empty where it did."""
+        last = " ".join(self._outputs[name].tail()[-1:])
+        has_init = bool(self._containers[name].attrs["HostConfig"].get("Init"))
+        return last if has_init and last.startswith(_INIT) else ""
 
     async def _was_out_of_memory(self, name: str, code: int) -> bool:
         for _ in range(_MEMORY_TURNS):

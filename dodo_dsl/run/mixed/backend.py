@@ -17,11 +17,16 @@ class MixedBackend:
     """One test: two backends, each with its part of the services; they report to one queue."""
 
     name = "mixed"
+    has_engine = True
 
     def __init__(self, containers: ApplicationContainers, processes: ProcessBackend) -> None:
         self.cid = processes.cid
         self._containers, self._processes = containers, processes
         self._application = {service.name for service in processes.plan.application.services}
+
+    @property
+    def is_on_host(self) -> bool:
+        return self._containers.is_on_host
 
     async def open(self) -> None:
         await self._containers.open()

@@ -34,6 +34,7 @@ class ProcessBackend:
     """One test in a sandbox; ``folder`` is the compiled test's, ``report`` takes logs and recordings."""
 
     name = "process"
+    has_engine = False
 
     def __init__(
         self,
@@ -67,6 +68,10 @@ class ProcessBackend:
         self._sandbox = SandboxClient(
             isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
         )
+
+    @property
+    def is_on_host(self) -> bool:
+        return self.isolation == "host"
 
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from dodo_dsl.run import leases
+from dodo_dsl.run.process.confined import process_group
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
 
 SLOT_NAME = re.compile(r"dodo-[0-9a-f]{8}-")
@@ -18,6 +19,7 @@ def reap() -> list[str]:
     """Removes what killed runs left on the host, by leases that nobody holds; returns a phrase for each test."""
     removed = []
     leases.forget_dead()
+    process_group.remove_unused()
     for lease, about in leases.orphans("cid-"):
         slot = str(about.get("slot", ""))
         if SLOT_NAME.fullmatch(slot):

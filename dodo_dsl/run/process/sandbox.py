@@ -40,8 +40,7 @@ from dodo_dsl.run.load.service_use import ServiceUse
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
-from dodo_dsl.run.process.confined import confined_probe
-from dodo_dsl.run.process.confined.confined_process import user_of
+from dodo_dsl.run.process.confined import confined_probe, users
 from dodo_dsl.run.process.confined.confinement import Confinement
 from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
 from dodo_dsl.run.process.confined.places import Places
@@ -153,7 +152,7 @@ class Sandbox:
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
         if confined.isolation == "network" and self.places is None:
-            self.places = Places(user_of(confined.cid))
+            self.places = Places(users.own(confined.cid))
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_probe(self, _descriptors: list[int]) -> None:

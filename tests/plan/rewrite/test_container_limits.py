@@ -56,6 +56,7 @@ from tests.plan.rewrite.copies import CONFINED, copy
             {"cap_drop": ["CAP_NET_RAW", "CHOWN", "AUDIT_WRITE", "MKNOD", "SETFCAP", "SYS_CHROOT"]},
         ),
         ({"ulimits": {"core": -1, "nofile": 9}}, {"ulimits": {**CONFINED["ulimits"], "nofile": 9}}),
+        ({"ulimits": {"nproc": 40}}, {}),
         (
             {"ulimits": {"nofile": {"soft": 512, "hard": 99999}, "memlock": -1, "rtprio": 99}},
             {

@@ -31,14 +31,12 @@ class Mounts:
     """By their paths; what is not there is shown as it is."""
 
 
-def words(
-    confined: Confinement, mounts: Mounts | None, program: str, user: int | None, filter_fd: int, status_fd: int
-) -> list[str]:
+def words(confined: Confinement, mounts: Mounts | None, program: str, user: int | None, filter_fd: int) -> list[str]:
     """The words before the application's own; ``mounts`` is None on the host, ``user`` None without root.
 
     ``program`` is the path of the application's program, which is shown where nothing else would.
     """
-    always = [PROGRAM, "--unshare-pid", "--die-with-parent", "--json-status-fd", str(status_fd)]
+    always = [PROGRAM, "--unshare-pid", "--die-with-parent"]
     chdir = ["--chdir", confined.folder]
     if mounts is None:
         return [*always, "--dev-bind", "/", "/", *_masked(confined.masked), "--proc", "/proc", *chdir, "--"]

@@ -6,8 +6,9 @@ import subprocess
 import tempfile
 
 from dodo_dsl.run.process import namespaces
+from dodo_dsl.run.process.confined import users
 from dodo_dsl.run.process.confined.bubblewrap import PROGRAM
-from dodo_dsl.run.process.confined.confined_process import ConfinedProcess, user_of
+from dodo_dsl.run.process.confined.confined_process import ConfinedProcess
 from dodo_dsl.run.process.confined.confinement import INTERPRETER, Confinement
 from dodo_dsl.run.process.confined.places import Places
 from dodo_dsl.run.process.confined.seccomp_filter import NoSeccomp
@@ -24,7 +25,7 @@ def problem() -> str:
     with tempfile.TemporaryFile() as output:
         try:
             confined = Confinement(_FOLDER, "network", 0, INTERPRETER)
-            true = ConfinedProcess(["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(user_of(0)))
+            true = ConfinedProcess(["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(users.own(0)))
             code = true.wait()
         except (OSError, subprocess.SubprocessError, NoSeccomp) as error:
             return str(error)

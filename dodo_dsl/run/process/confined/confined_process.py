@@ -1,8 +1,8 @@
 """A program of the application in its own sandbox, with the interface of subprocess.Popen that ``Children`` uses."""
 
+import contextlib
 import errno
 import functools
-import json
 import os
 import resource
 import shutil
@@ -11,18 +11,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl.run.process import namespaces
-from dodo_dsl.run.process.confined import bubblewrap, launcher, seccomp_filter
-from dodo_dsl.run.process.confined.confinement import FIRST_USER, Confinement
+from dodo_dsl.run.process.confined import bubblewrap, launcher, process_group, seccomp_filter
+from dodo_dsl.run.process.confined.confinement import Confinement
 from dodo_dsl.run.process.confined.places import Places
+from dodo_dsl.run.process.confined.process_group import ProcessGroup
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _SIGNALLED = range(129, 129 + 64)
 """Exit codes by which bubblewrap tells the signal that ended the program."""
-
-
-def user_of(cid: int) -> int | None:
-    """Who the application is where DoDo is root; None without root, when it is the user who runs DoDo."""
-    return FIRST_USER + cid if os.getuid() == 0 else None
 
 
 class ConfinedProcess:
@@ -39,16 +35,19 @@ class ConfinedProcess:
     ) -> None:
         """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
         program = _found(words[0], environment, confined.folder)
-        user = user_of(confined.cid) if places else None
+        user = places.user if places else None
         mounts = _mounts(places, confined) if places else None
         given = {**environment, "PWD": confined.folder, **({"HOME": bubblewrap.HOME} if mounts else {})}
-        self._status, status = os.pipe()
+        others = 0 if user is not None else _threads_of_this_user()
+        self._group = process_group.make(confined.limits.processes)
+        self._began, began = os.pipe()
         filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)
         source = launcher.variables(given)
-        sandbox = bubblewrap.words(confined, mounts, program, user, filter_fd, status)
+        sandbox = bubblewrap.words(confined, mounts, program, user, filter_fd)
+        limit = functools.partial(_limit, confined.limits, os.getpid(), self._group, others)
         try:
             self._process = subprocess.Popen(
-                [*sandbox, *launcher.words(source, program), *words],
+                [*sandbox, *launcher.words(source, began, program), *words],
                 env={"PATH": os.environ.get("PATH", os.defpath)},
                 cwd=confined.folder,
                 stdin=subprocess.DEVNULL,
@@ -56,27 +55,31 @@ class ConfinedProcess:
                 stderr=output,
                 start_new_session=True,
                 umask=umask,
-                pass_fds=(filter_fd, status, source),
-                preexec_fn=functools.partial(_limit, confined.limits, os.getpid()),  # noqa: PLW1509  (it has one thread)
+                pass_fds=(filter_fd, began, source),
+                preexec_fn=limit,  # noqa: PLW1509  (it has one thread)
             )
         except BaseException:
-            os.close(self._status)
+            self._close()
             raise
         finally:
-            for descriptor in (status, filter_fd, source):
+            for descriptor in (began, filter_fd, source):
                 os.close(descriptor)
         self.pid = self._process.pid
         self.memory = confined.limits.memory
         self.failed = False
-        """Whether the sandbox could not be set up; known after ``wait``."""
+        """Whether the program never began; known after ``wait``."""
 
     def wait(self) -> int:
         """The program's exit code, below 0 for the signal that ended it."""
         code = self._process.wait()
-        with os.fdopen(self._status, "rb") as status:
-            told = status.read().decode(errors="replace")
-        self.failed = code > 0 and not any("exit-code" in json.loads(line) for line in told.splitlines())
+        self.failed = os.read(self._began, 16) != launcher.BEGAN
+        self._close()
         return 128 - code if code in _SIGNALLED else code
+
+    def _close(self) -> None:
+        os.close(self._began)
+        if self._group is not None:
+            self._group.remove()
 
 
 def _mounts(places: Places, confined: Confinement) -> bubblewrap.Mounts:
@@ -94,16 +97,32 @@ def _found(name: str, environment: Mapping[str, str], folder: str) -> str:
     return str(Path(folder, found))
 
 
-def _limit(limits: SandboxLimits, parent: int) -> None:
-    """Between fork and exec."""
+def _limit(limits: SandboxLimits, parent: int, group: ProcessGroup | None, others: int) -> None:
+    """Between fork and exec. Without a group the kernel counts processes by user, ``others`` of this one among them."""
     namespaces.end_with(parent)
+    if group is None or not group.join():
+        _set_limit(resource.RLIMIT_NPROC, limits.processes + process_group.OURS + 2 * others)
     for kind, most in (
         (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_NPROC, limits.processes),
         (resource.RLIMIT_NOFILE, limits.files),
         (resource.RLIMIT_FSIZE, limits.file_size),
         (resource.RLIMIT_DATA, 2 * limits.memory),  # what memory_watch would see too late
     ):
-        _, hard = resource.getrlimit(kind)
-        allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(kind, (allowed, allowed))
+        _set_limit(kind, most)
+
+
+def _set_limit(kind: int, most: int) -> None:
+    _, hard = resource.getrlimit(kind)
+    allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(kind, (allowed, allowed))
+
+
+def _threads_of_this_user(proc: Path = Path("/proc")) -> int:
+    """As many as are seen: in a sandbox its own, of which alone the kernel counts there (since Linux 5.14)."""
+    threads = 0
+    for entry in proc.iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(OSError):  # it has ended meanwhile
+                if entry.stat().st_uid == os.getuid():
+                    threads += sum(1 for _ in (entry / "task").iterdir())
+    return threads

@@ -11,8 +11,6 @@ from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 _PACKAGE = Path(__file__).resolve().parents[3]
 INTERPRETER = tuple(dict.fromkeys((sys.prefix, sys.base_prefix)))
 """The folders of this Python, which starts the application's programs."""
-FIRST_USER = 64_000
-"""Where DoDo runs as root, a test's application has this user plus its CID."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +18,7 @@ class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
     With ``isolation`` ``host`` it has only processes of its own, and sees what DoDo sees but for ``masked`` devices.
-    ``cid`` tells users apart.
+    ``cid`` says which user id of its own is tried first, where DoDo runs as root.
     """
 
     folder: str

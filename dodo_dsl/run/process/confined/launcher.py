@@ -10,9 +10,12 @@ from collections.abc import Mapping
 
 PROGRAM = """
 import errno, os, sys
-source, program, *words = sys.argv[1:]
+source, began, program, *words = sys.argv[1:]
+began = int(began)
+os.set_inheritable(began, False)
 with open(int(source), "rb") as file:
     environment = dict(item.split(b"=", 1) for item in file.read().split(b"\\0") if item)
+os.write(began, b"+")
 try:
     try:
         os.execve(program, words, environment)
@@ -21,13 +24,19 @@ try:
             raise
         os.execve("/bin/sh", ["sh", program, *words[1:]], environment)
 except OSError as error:
+    os.write(began, b"-")
     sys.exit(f"{program}: {error.strerror}")
 """
 
+BEGAN = b"+"
 
-def words(source: int, program: str) -> list[str]:
-    """The words before the application's own, the name of its program among them; ``source`` is of ``variables``."""
-    return [sys.executable, "-I", "-S", "-c", PROGRAM, str(source), program]
+
+def words(source: int, began: int, program: str) -> list[str]:
+    """The words before the application's own, the name of its program among them; ``source`` is of ``variables``.
+
+    ``began`` is a descriptor that gets ``BEGAN`` when all is prepared, and more when the program cannot be started.
+    """
+    return [sys.executable, "-I", "-S", "-c", PROGRAM, str(source), str(began), program]
 
 
 def variables(environment: Mapping[str, str]) -> int:

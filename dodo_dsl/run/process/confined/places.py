@@ -22,7 +22,8 @@ class Places:
     """Folders that belong to ``user``, None for that of this process. To be made by a sandbox with own mounts."""
 
     def __init__(self, user: int | None) -> None:
-        self._user = user
+        self.user = user
+        """Who the application is; None for the user of this process."""
         self._root = Path(tempfile.mkdtemp(prefix="dodo-application-", dir=namespaces.SHARED[0]))  # the sandbox's own
         namespaces.mount_tmpfs(self._root, _SIZE)
         self.home = self._own("home")
@@ -44,8 +45,8 @@ class Places:
 
     def _own(self, name: str) -> Path:
         path = self._folder(name)
-        if self._user is not None:
-            os.chown(path, self._user, self._user)
+        if self.user is not None:
+            os.chown(path, self.user, self.user)
         return path
 
     def folder(self, folder: str) -> tuple[Path, bool]:
@@ -68,29 +69,29 @@ class Places:
 
     def read(self, path: str) -> Path:
         """What to show in the place of a path that it may read: as its own, or the path itself where that suffices."""
-        if self._user is None or Path(path).is_relative_to(_SYSTEM) or not Path(path).exists():
+        if self.user is None or Path(path).is_relative_to(_SYSTEM) or not Path(path).exists():
             return Path(path)
         if path not in self._read:
             self._read[path] = self._as_own(Path(path), self._root / f"read-{len(self._read)}")
         return self._read[path]
 
     def _as_own(self, source: Path, target: Path) -> Path:
-        assert self._user is not None
+        assert self.user is not None
         target.mkdir() if source.is_dir() else target.touch()
         try:
-            namespaces.bind_as(source, target, source.stat().st_uid, self._user)
+            namespaces.bind_as(source, target, source.stat().st_uid, self.user)
         except OSError:  # as some kernels and file systems refuse: then it reads what everybody can
             return source
         return target
 
     def _show(self, source: Path, target: Path) -> None:
         """The folder as the application's own where the kernel can do that, else as it is."""
-        if self._user is None:
+        if self.user is None:
             namespaces.bind(source, target, deep=True)
             return
         status = source.stat()
         try:
-            namespaces.bind_as(source, target, status.st_uid, self._user)
+            namespaces.bind_as(source, target, status.st_uid, self.user)
         except OSError:
             if status.st_mode & _READABLE != _READABLE:
                 why = "readable for its owner alone, and this kernel cannot show it to the application's user"

@@ -30,19 +30,19 @@ def test_it_goes_to_the_sandbox_and_back() -> None:
 
 
 def test_a_program_elsewhere_is_shown_and_its_folder_is_not() -> None:
-    argv = words(Confinement("/app", "network", 130), MOUNTS, "/srv/bin/drive", None, 5, 6)
+    argv = words(Confinement("/app", "network", 130), MOUNTS, "/srv/bin/drive", None, 5)
     bound = [argv[n + 1] for n, word in enumerate(argv) if word == "--ro-bind-try"]
     assert "/srv/bin/drive" in bound
     assert not {"/srv", "/srv/bin", "/", "/home", "/var"} & set(bound)
 
 
 def test_as_root_another_user_starts_it() -> None:
-    argv = words(Confinement("/app", "network", 130), MOUNTS, "/usr/bin/true", 64_130, 5, 6)
+    argv = words(Confinement("/app", "network", 130), MOUNTS, "/usr/bin/true", 64_130, 5)
     assert argv[argv.index("setpriv") + 1 :][:2] == ["--reuid=64130", "--regid=64130"]
     assert argv.index("setpriv") > argv.index("ALL")
 
 
 def test_on_the_host_it_sees_what_dodo_sees_in_a_process_namespace() -> None:
-    argv = words(Confinement("/app", "host", 130), None, "/usr/bin/true", None, 5, 6)
+    argv = words(Confinement("/app", "host", 130), None, "/usr/bin/true", None, 5)
     assert "--unshare-pid" in argv
     assert argv[argv.index("--dev-bind") :][:3] == ["--dev-bind", "/", "/"]

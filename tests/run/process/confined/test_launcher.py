@@ -15,19 +15,25 @@ from tests.run.helpers import PASS, READY, Bench
 TELLS = "import json; print(json.dumps(dict(os.environ)), flush=True); time.sleep(60)"
 
 
-def launched(program: Path, environment: dict[str, str], *words: str) -> "subprocess.CompletedProcess[bytes]":
+def launched(
+    program: Path, environment: dict[str, str], *words: str
+) -> "tuple[subprocess.CompletedProcess[bytes], bool]":
+    """How it ended, and whether it began."""
     source = launcher.variables(environment)
+    reader, began = os.pipe()
     try:
-        argv = [*launcher.words(source, str(program)), program.name, *words]
-        return subprocess.run(argv, pass_fds=(source,), env={}, capture_output=True, check=False)
+        argv = [*launcher.words(source, began, str(program)), program.name, *words]
+        done = subprocess.run(argv, pass_fds=(source, began), env={}, capture_output=True, check=False)
+        return done, os.read(reader, 9) == launcher.BEGAN
     finally:
-        os.close(source)
+        for descriptor in (source, reader, began):
+            os.close(descriptor)
 
 
 @pytest.mark.parametrize("environment", [{}, {"A": "b=c", "EMPTY": "", "Ü": "\udcff\n"}, {"LONG": "x" * 100_000}])
 def test_a_program_gets_these_variables_and_no_others(environment: dict[str, str]) -> None:
-    result = launched(Path("/usr/bin/env"), environment, "-0")
-    assert result.returncode == 0
+    result, began = launched(Path("/usr/bin/env"), environment, "-0")
+    assert (result.returncode, began) == (0, True)
     assert result.stdout == b"".join(os.fsencode(f"{name}={value}\0") for name, value in environment.items())
 
 
@@ -35,13 +41,13 @@ def test_a_script_without_an_interpreter_is_one_of_the_shell(tmp_path: Path) -> 
     script = tmp_path / "script"
     script.write_text('echo "$1 $A"; exit 3\n')
     script.chmod(0o755)
-    result = launched(script, {"A": "b"}, "first")
-    assert (result.returncode, result.stdout, result.stderr) == (3, b"first b\n", b"")
+    result, began = launched(script, {"A": "b"}, "first")
+    assert (result.returncode, result.stdout, result.stderr, began) == (3, b"first b\n", b"", True)
 
 
 def test_what_cannot_be_started_is_said(tmp_path: Path) -> None:
-    result = launched(tmp_path / "none", {})
-    assert (result.returncode, result.stderr) == (1, f"{tmp_path}/none: No such file or directory\n".encode())
+    result, began = launched(tmp_path / "none", {})
+    assert (result.stderr, began) == (f"{tmp_path}/none: No such file or directory\n".encode(), False)
 
 
 @pytest.mark.slow
