@@ -30,6 +30,16 @@ def registry() -> Path:
     return root() / "tests_registry"
 
 
+def checkout() -> Path | None:
+    """The checkout that DoDo runs from; None for an installed wheel, and in DoDo's image."""
+    return root() if is_checkout(root()) else None
+
+
+def is_checkout(folder: Path) -> bool:
+    """Whether a folder has what installs DoDo."""
+    return (folder / "dodo_dsl").is_dir() and (folder / "scripts" / "setup").is_file()
+
+
 def is_shipped(folder: Path, repository: Path) -> bool:
     """Whether a folder of tests ships with DoDo and is used from another repository than DoDo's checkout."""
     return folder.resolve().is_relative_to(registry().resolve()) and repository.resolve() != root().resolve()

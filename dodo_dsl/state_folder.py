@@ -8,6 +8,7 @@ import contextlib
 import errno
 import os
 import pwd
+import shlex
 import stat
 from pathlib import Path
 
@@ -60,7 +61,8 @@ def _check(folder: Path) -> None:
     if status.st_uid not in (os.geteuid(), 0):
         raise UnsafeFolder(errno.EPERM, f"belongs to user {status.st_uid}, who could change DoDo's state", str(folder))
     if status.st_mode & stat.S_IWOTH:
-        raise UnsafeFolder(errno.EPERM, "all users can write it, and so DoDo's state: chmod 700", str(folder))
+        command = f"{'' if status.st_uid == os.geteuid() else 'sudo '}chmod 700 {shlex.quote(str(folder))}"
+        raise UnsafeFolder(errno.EPERM, f"all users can write it, and so DoDo's state: {command}", str(folder))
     if status.st_mode & stat.S_IWGRP and status.st_uid != 0:
         folder.chmod(stat.S_IMODE(status.st_mode) & ~stat.S_IWGRP)
 

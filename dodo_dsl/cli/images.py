@@ -1,6 +1,7 @@
 """dodo images: build, push and pull images, and say what they are made of."""
 
 import argparse
+import shlex
 import tempfile
 from pathlib import Path
 from typing import TextIO
@@ -91,9 +92,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     else:
         docker_command.require_engine()
     if options.action == "sbom":
-        return _sbom(images, Path(options.output), stdout)
+        return _sbom(options, images, stdout)
     if options.action == "push":
-        return _push(images, options.platform, stdout)
+        return _push(options, images, stdout)
     docker_command.require_buildx()
     own = own_services.dockerfiles(deployment)
     own_services.require_dockerfiles(options.name, own, images)
@@ -148,20 +149,23 @@ def _packages(base_image: str, platform: str, whole: bool, stdout: TextIO) -> Pa
     return wheels.provide(python, wheels.cache_folder(), whole=whole)
 
 
-def _require_built(images: list[Image]) -> None:
+def _require_built(options: argparse.Namespace, images: list[Image]) -> None:
     missing = [image for image in images if not docker_command.is_local(image.reference)]
     if missing:
         platforms = ",".join(dict.fromkeys(image.platform for image in images if image.platform))
         words = [*(["--platform", platforms] if platforms else []), *dict.fromkeys(image.name for image in missing)]
-        command = f"dodo images build {' '.join(words)}"
+        for flag, value in (("--prefix", options.prefix), ("--tag", options.tag)):
+            words += [flag, value] if value else []
+        command = shlex.join(["dodo", "images", "build", *words])
         raise UsageError(f"{missing[0].reference} is not on this machine; build it first: {command}")
     for image in images:
         if image.platform and (found := docker_command.platform(image.reference)) != image.platform:
             raise UsageError(f"{image.reference} is for {found}, not for {image.platform}")
 
 
-def _sbom(images: list[Image], folder: Path, stdout: TextIO) -> int:
-    _require_built(images)
+def _sbom(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> int:
+    folder = Path(options.output)
+    _require_built(options, images)
     folder.mkdir(parents=True, exist_ok=True)
     bills = {"python": sbom.of_environment(), **{i.name: sbom.of_image(i.name, i.reference) for i in images}}
     for name, text in bills.items():
@@ -170,9 +174,10 @@ def _sbom(images: list[Image], folder: Path, stdout: TextIO) -> int:
     return Exit.OK
 
 
-def _push(images: list[Image], platforms: list[str], stdout: TextIO) -> int:
+def _push(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> int:
+    platforms = options.platform
     pushed = of_platforms(images, platforms)
-    _require_built(pushed)
+    _require_built(options, pushed)
     for number, image in enumerate(pushed, 1):
         stdout.write(f"[{number}/{len(pushed)}] {image.reference}\n")
         _send(("push", image.reference), image.reference, stdout)

@@ -6,12 +6,12 @@ import os
 import sys
 from typing import TextIO
 
+from dodo_dsl.cli import extras
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 
 EXAMPLES = """examples:
   dodo lsp                  what an editor starts; it speaks the language server protocol on standard input and output
-  pip install 'dodo-dsl[lsp]'    what it needs beside DoDo
 
 docs/how-to/editors.md has the settings for VS Code, Neovim and PyCharm.
 """
@@ -24,11 +24,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    try:
-        from dodo_dsl.lsp.listeners import serve
-    except ModuleNotFoundError as error:
-        message = f"the package '{error.name}' is missing; install it with: pip install 'dodo-dsl[lsp]'"
-        raise UsageError(message) from error
+    extras.require("this", "lsp")
+    from dodo_dsl.lsp.listeners import serve
+
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError(
             "an editor starts this program and speaks with it; docs/how-to/editors.md says how to set it up"

@@ -9,7 +9,7 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.diagnostics import has_errors, shown_path
 from dodo_dsl.images import docker_command, own_images
 from dodo_dsl.images.names import Image, known
-from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.spec.deployment.deployment import Deployment, build_command
 from dodo_dsl.spec.manifest import load_manifests
 
 Dockerfiles = Mapping[str, Path | None]
@@ -42,8 +42,9 @@ def build(image: Image, dockerfile: Path, stdout: TextIO) -> None:
     """Builds an image; raises UsageError where the one below it is missing, and DockerError."""
     base = own_images.base_of(image, dockerfile)
     if base.startswith(f"{Deployment.image_prefix}/") and not docker_command.is_local(base):
-        name = base.rpartition("/")[2].partition(":")[0]
-        raise UsageError(f"{base} is not on this machine; build it first: dodo images build {name}")
+        prefix, _, last = base.rpartition("/")
+        name, _, tag = last.partition(":")
+        raise UsageError(f"{base} is not on this machine; build it first: {build_command(prefix, tag, name)}")
     code, _ = docker_command.show(own_images.build_words(image, dockerfile), stdout)
     if code:
         file = shown_path(str(dockerfile))

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl import advice
+
 
 class DockerError(Exception):
     """A part of Docker is missing, or a docker command failed; one sentence."""
@@ -14,7 +16,7 @@ class DockerError(Exception):
 def _docker() -> str:
     path = shutil.which("docker")
     if path is None:
-        raise DockerError("the docker command is missing; install Docker Engine with its command line")
+        raise DockerError(f"the docker command is missing: {advice.docker()}")
     return path
 
 
@@ -34,7 +36,7 @@ def require_engine() -> None:
     try:
         ask("version", "--format", "{{.Server.Version}}")
     except DockerError as error:
-        raise DockerError(f"no Docker engine answers: {error}") from None
+        raise DockerError(f"no Docker engine answers ({str(error).rstrip('.')}): {advice.engine()}") from None
 
 
 def require_buildx() -> None:
@@ -42,7 +44,7 @@ def require_buildx() -> None:
     try:
         ask("buildx", "version")
     except DockerError:
-        raise DockerError("docker has no buildx; install the package docker-buildx-plugin") from None
+        raise DockerError(f"docker has no buildx: {advice.docker_plugin('buildx')}") from None
 
 
 def is_local(reference: str) -> bool:

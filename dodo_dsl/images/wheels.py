@@ -87,7 +87,7 @@ def _locked(requirements: Path) -> str:
     words = ["sh", str(root / REQUIREMENTS / "locked"), str(requirements), str(root / LOCK)]
     result = subprocess.run(words, capture_output=True, text=True, check=False)
     if result.returncode:
-        raise WheelsError(f"{requirements.name}: {result.stderr.strip()}; run scripts/lock")
+        raise WheelsError(f"{requirements.name}: {result.stderr.strip()}; run .venv/bin/python scripts/lock")
     return result.stdout
 
 

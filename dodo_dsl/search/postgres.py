@@ -8,7 +8,6 @@ Source: https://www.postgresql.org/docs/current/explicit-locking.html#ADVISORY-L
 
 import contextlib
 import hashlib
-import importlib.util
 import os
 import socket
 import time
@@ -198,10 +197,6 @@ def _connected(parts: Mapping[str, Any]) -> "psycopg.Connection[tuple[Any, ...]]
 def _storable(text: str) -> str:
     """The text without what PostgreSQL does not take."""
     return text.encode(errors="replace").decode().replace("\0", "\ufffd")
-
-
-def is_installed() -> bool:
-    return importlib.util.find_spec("psycopg") is not None
 
 
 @contextlib.contextmanager

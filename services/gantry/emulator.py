@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import shlex
 import subprocess
 import threading
 import time
@@ -139,6 +140,14 @@ def _folder(firmware: str) -> Path:
     for folder in (Path(named),) if named else PLACES:
         if (folder / "rig-emulator").is_file() and (folder / firmware).is_file():
             return folder
-    raise PortError(
-        f"the emulated rig is not built: `make firmware` builds it in DoDo's checkout, or set {FOLDER} to its folder"
-    )
+    raise PortError(f"the emulated rig is not built: {_way(named)}")
+
+
+def _way(named: str | None) -> str:
+    """How to build it, where this program runs."""
+    if named:
+        return f"{FOLDER} is {named}: build it there, or unset {FOLDER}"
+    checkout = PLACES[0].parents[1]
+    if (checkout / "firmware" / "Makefile").is_file():
+        return f"make -C {shlex.quote(str(checkout))} firmware"
+    return f"'make firmware' in a checkout of DoDo, and {FOLDER}=CHECKOUT/build/firmware or 'dodo images build gantry'"

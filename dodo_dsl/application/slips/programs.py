@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application.model import ComposeService
-from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
 from dodo_dsl.source import Scalar
 
 INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
@@ -38,7 +38,7 @@ def _wrong_path(program: Scalar, folder: Path, is_built: bool) -> Iterator[Diagn
     """A service that ``is_built`` as an image has a program that a pipeline's check never sees."""
     own = folder / program.text
     if own.is_file() and not os.access(own, os.X_OK):
-        hint = f"run: chmod +x {shlex.quote(program.text)}"
+        hint = f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
         yield _cannot_start(program, f"'{program.text}' is not executable", hint)
     elif not own.exists():
         beside = own.parent.iterdir() if own.parent.is_dir() else ()

@@ -6,6 +6,7 @@ from typing import TextIO
 import numpy as np
 
 from dodo_dsl import atomic
+from dodo_dsl.cli import extras
 from dodo_dsl.cli.rec.job import Job, tell
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.rec import coco, csv_table, labels
@@ -16,7 +17,6 @@ from dodo_dsl.rec.frames import images_of
 from dodo_dsl.rec.outputs import refuse_existing
 
 MOST_TABLES = 1000
-MCAP_PACKAGES = "mcap mcap-protobuf-support foxglove-schemas-protobuf"
 
 
 def _csv(job: Job) -> None:
@@ -124,12 +124,8 @@ def _video(job: Job) -> None:
 
 
 def _mcap(job: Job) -> None:
-    try:
-        from dodo_dsl.rec.export import mcap_file
-    except ImportError as error:
-        module = (error.name or "mcap").partition(".")[0]
-        reason = f"--mcap needs the module '{module}', which is not installed; install DoDo with its extra 'mcap'"
-        raise NothingSelected(f"{reason}, or: pip install {MCAP_PACKAGES}") from None
+    extras.require("--mcap", "mcap")
+    from dodo_dsl.rec.export import mcap_file
 
     output = job.file(".mcap")
     known, unknown = _known(job)

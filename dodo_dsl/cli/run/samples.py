@@ -1,15 +1,12 @@
 """Tests at samples of their ranges, for ``dodo run --samples``."""
 
-import importlib.util
-
 from dodo_dsl import compiler
 from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.cli import extras
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.instances.pools import of_test
 from dodo_dsl.spec.instances.vary import Values
-
-_NEEDED = "scipy"
 
 
 def sample(checked: compiler.Checked, number: int) -> tuple[compiler.Checked, dict[str, str]]:
@@ -17,8 +14,7 @@ def sample(checked: compiler.Checked, number: int) -> tuple[compiler.Checked, di
 
     With them the slug of each one's test by its own slug. Raises UsageError where no test has a range.
     """
-    if importlib.util.find_spec(_NEEDED) is None:
-        raise UsageError(f"--samples needs {_NEEDED}: pip install 'dodo-dsl[search]'")
+    extras.require("--samples", "search")
     if not any(test.spec.ranges for test in checked.tests):
         raise UsageError("--samples is for tests with ranges: none of these has 'vary'")
     origins: dict[str, str] = {}

@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import importlib.util
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import TextIO, cast
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.cli import selection
+from dodo_dsl.cli import extras, selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import minutes, positive, seed
@@ -55,7 +54,6 @@ _RUNS = 100
 _MOST_RUNS = 1 << 20
 _MOST_BY_TIME = 1 << 14
 """Drives of a search that only its time ends: more than four hours at one a second."""
-_NEEDED = "scipy"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -95,12 +93,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    if importlib.util.find_spec(_NEEDED) is None:
-        raise UsageError(f"this needs {_NEEDED}: pip install 'dodo-dsl[search]'")
+    extras.require("this", "search")
     if options.storage is None and options.study is not None:
         raise UsageError("--study names a search in a database: name that with --storage")
-    if options.storage is not None and not postgres.is_installed():
-        raise UsageError("--storage needs psycopg: pip install 'dodo-dsl[search,storage]'")
+    if options.storage is not None:
+        extras.require("--storage", "storage")
     end_like_interrupt()
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))

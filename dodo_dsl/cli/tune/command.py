@@ -2,15 +2,13 @@
 
 import argparse
 import asyncio
-import importlib.util
 import math
 import time
 from pathlib import Path
 from typing import TextIO, cast
 
 from dodo_dsl import atomic
-from dodo_dsl.cli import selection
-from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli import extras, selection
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
@@ -48,7 +46,6 @@ _RUNS = 50
 _SWEPT = 1
 """Drives of the sweep in a generation: a tuning looks for the best values, and not for an even cover."""
 _MOST_RUNS = 1 << 14
-_NEEDED = "scipy"
 _RIG_MINUTES, _RIG_METRES = 30.0, 100.0
 
 
@@ -84,8 +81,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    if importlib.util.find_spec(_NEEDED) is None:
-        raise UsageError(f"this needs {_NEEDED}: pip install 'dodo-dsl[search]'")
+    extras.require("this", "search")
     end_like_interrupt()
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))

@@ -3,7 +3,9 @@
 Readers are imported where they are needed, as few tests need all of them.
 """
 
+import os
 import re
+import shlex
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -39,7 +41,14 @@ def _pointer(path: Path) -> list[InputError]:
             is_pointer = file.read(len(_POINTER)) == _POINTER
     except OSError:
         return []
-    return [InputError(path, "a Git LFS pointer, not the file", hint="run: git lfs pull")] if is_pointer else []
+    return [InputError(path, "a Git LFS pointer, not the file", hint=f"run: {_lfs(path)}")] if is_pointer else []
+
+
+def _lfs(path: Path) -> str:
+    """What fetches a file, in the folder where the command is typed."""
+    folder = path.resolve().parent
+    below = os.path.relpath(folder) if folder.is_relative_to(Path.cwd()) else str(folder)
+    return "git lfs pull" if below == "." else f"git -C {shlex.quote(below)} lfs pull"
 
 
 def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:

@@ -1,5 +1,7 @@
 """Compressed camera frames of recordings (``opendlv.proxy.ImageReading``) back to pictures, through PyAV."""
 
+import shlex
+import sys
 from typing import Any
 
 import numpy as np
@@ -52,7 +54,7 @@ class VideoDecoder:
             raise VideoError(
                 f"frames of format '{format_[:_SHOWN]}' cannot be decoded, expected one of {', '.join(CODECS)}"
             )
-        self._av = _av()
+        self._av = pyav("decoded")
         self._is_h264 = CODECS[format_] == "h264"
         self._codec: Any = self._av.CodecContext.create(CODECS[format_], "r")
         self._codec.options = {"max_pixels": str(MAX_PIXELS)}
@@ -86,9 +88,11 @@ def has_key_frame(packet: bytes) -> bool:
     return False
 
 
-def _av() -> Any:
+def pyav(purpose: str) -> Any:
+    """PyAV; raises VideoError where it cannot be loaded."""
     try:
         import av
-    except ImportError:
-        raise VideoError("frames cannot be decoded: the package 'av' is not installed (pip install av)") from None
+    except ImportError as error:
+        way = f"{shlex.quote(sys.executable)} -m pip install av; DoDo's image 'vision' has it"
+        raise VideoError(f"frames cannot be {purpose}: the package 'av' cannot be loaded ({error}): {way}") from None
     return av

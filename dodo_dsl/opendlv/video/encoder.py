@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.video.decoder import VideoError
+from dodo_dsl.opendlv.video.decoder import VideoError, pyav
 
 FORMAT = "h264"
 _MICROSECOND = Fraction(1, 1_000_000)
@@ -37,7 +37,7 @@ class VideoEncoder:
     ) -> None:
         if width % 2 or height % 2 or min(width, height) < 2:
             raise VideoError(f"h264 needs an even width and height, not {width} x {height}")
-        self._av = _av()
+        self._av = pyav("encoded")
         self._kind, self._width, self._height = kind, width, height
         self._pixels = _AV_NAMES[kind] if lossless else _PLANAR
         self._next = 0
@@ -79,11 +79,3 @@ def _rate(quality: int, lossless: bool, fast: bool) -> dict[str, str]:
     if lossless:
         return {"preset": "ultrafast", "qp": "0"}
     return {"preset": "ultrafast" if fast else "veryfast", "profile": "baseline", "crf": str(quality)}
-
-
-def _av() -> Any:
-    try:
-        import av
-    except ImportError:
-        raise VideoError("frames cannot be encoded: the package 'av' is not installed (pip install av)") from None
-    return av

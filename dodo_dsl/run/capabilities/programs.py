@@ -2,11 +2,12 @@
 
 import contextlib
 import os
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
-from dodo_dsl import package_data
+from dodo_dsl import advice, package_data
 from dodo_dsl.run.capabilities.finding import Capability
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.protocol import BackendError
@@ -21,7 +22,8 @@ def docker_engine() -> Iterator[Capability]:
     try:
         client = connect()
     except BackendError as error:
-        yield Capability("docker engine", "warning", str(error), "needed for --backend docker and mixed")
+        text, _, way = str(error).partition(": ")
+        yield Capability("docker engine", "warning", f"{text}; --backend docker and mixed need one", way)
         return
     with contextlib.closing(client):
         version = client.version()
@@ -32,13 +34,12 @@ def compose() -> Iterator[Capability]:
     """Whether there is Compose of a version that DoDo supports."""
     text = _output("docker", "compose", "version", "--short")
     numbers = tuple(int(n) for n in text.lstrip("v").split("-")[0].split(".")[:2] if n.isdecimal())
-    advice = "install Compose v2 (docker-compose-plugin); needed for --backend docker and mixed"
-    if not numbers:
-        yield Capability("compose", "warning", "'docker compose' does not run", advice)
-    elif numbers < _COMPOSE:
-        yield Capability("compose", "warning", f"version {text} is older than 2.20", advice)
-    else:
+    if numbers >= _COMPOSE:
         yield Capability("compose", "ok", f"version {text}")
+        return
+    found = f"version {text} is older than 2.20" if numbers else "'docker compose' does not run"
+    way = advice.docker_plugin("compose") if shutil.which("docker") else advice.docker()
+    yield Capability("compose", "warning", f"{found}; --backend docker and mixed need it", way)
 
 
 def _output(*command: str) -> str:
@@ -65,7 +66,5 @@ def emulated_rig() -> Iterator[Capability]:
     if found := emulator_folder():
         yield Capability("emulated rig", "ok", f"is built, in {found}")
     else:
-        advice = f"hil tests on it need it: make firmware in DoDo's checkout, or set {FIRMWARE} to its folder"
-        yield Capability(
-            "emulated rig", "warning", f"is not built: it is not in {' or '.join(map(str, places))}", advice
-        )
+        text = f"is not built: it is not in {' or '.join(map(str, places))}; hil tests need it"
+        yield Capability("emulated rig", "warning", text, advice.firmware(FIRMWARE))

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from dodo_dsl import advice
 from dodo_dsl.run.protocol import BackendError
 
 _CONNECTIONS = 200
@@ -16,8 +17,18 @@ def connect() -> Any:
         client = docker.from_env(max_pool_size=_CONNECTIONS)
         client.ping()
     except (DockerException, OSError) as error:
-        raise BackendError(f"no Docker engine answers ({error}); start one, or use --backend process") from error
+        raise BackendError(f"no Docker engine answers ({_reason(error)}): {advice.engine()}") from error
     return client
+
+
+def _reason(error: Exception) -> str:
+    """What the system says of the engine's socket, without the layers of libraries around it."""
+    below: BaseException | None = error
+    while below is not None:
+        if isinstance(below, OSError) and below.strerror:
+            return below.strerror
+        below = below.__cause__ or below.__context__
+    return str(error)
 
 
 def engine_error(error: Exception) -> str:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import atomic
+from dodo_dsl import advice, atomic
 from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
 from dodo_dsl.application.access.model import AccessFinding
@@ -60,7 +60,7 @@ class Compose:
             raise BackendError(str(error)) from error
         code, out, problem = await self._run("config", "--format", "json")
         if code and _NO_COMPOSE in problem:
-            raise BackendError("the docker command has no 'compose'; install Compose v2 (docker-compose-plugin)")
+            raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
         if code:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         config = json.loads(out)

@@ -138,7 +138,7 @@ class Pulls:
                     return
                 progress.take(line)
         except (DockerException, OSError) as error:
-            raise PullError(image, _reason(engine_error(error))) from error
+            raise PullError(image, _reason(image, engine_error(error))) from error
 
 
 def split_reference(image: str) -> tuple[str, str]:
@@ -150,9 +150,12 @@ def split_reference(image: str) -> tuple[str, str]:
     return (repository, tag) if sign and "/" not in tag else (image, "latest")
 
 
-def _reason(text: str) -> str:
-    if any(word in text for word in ("unauthorized", "denied", "no basic auth")):
-        return f"{text}; the registry requires a login: docker login"
+def _reason(image: str, text: str) -> str:
+    """The engine's text, with how to log in; Docker's own registry says that itself, also of what it does not have."""
+    host = image.partition("/")[0]
+    is_named = "/" in image and ("." in host or ":" in host or host == "localhost")
+    if is_named and any(word in text for word in ("unauthorized", "denied", "no basic auth")):
+        return f"{text}; if the registry requires a login: docker login {host}"
     return text
 
 
@@ -168,7 +171,7 @@ class _Progress:
 
     def take(self, line: dict[str, Any]) -> None:
         if "error" in line:
-            raise PullError(self._image, _reason(str(line["error"])))
+            raise PullError(self._image, _reason(self._image, str(line["error"])))
         if str(line.get("status")).startswith("Retrying") and not self._retried:
             self._retried = True
             self._say(f"pulling {self._image}: the connection broke, the engine retries")

@@ -4,6 +4,7 @@ import ipaddress
 import os
 import posixpath
 import re
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -58,6 +59,13 @@ class Deployment:
     def rig(self, name: str) -> Rig | None:
         """A rig of the deployment, or an emulated one."""
         return rig.emulated(name) if name in rig.EMULATED_RIGS else self.rigs.get(name)
+
+
+def build_command(prefix: str, tag: str, *names: str) -> str:
+    """What builds images of DoDo's with this prefix and tag, also where ``dodo.yml`` says nothing of them."""
+    flags = [*(["--prefix", prefix] if prefix != Deployment.image_prefix else [])]
+    flags += ["--tag", tag] if tag != Deployment.image_tag else []
+    return shlex.join(["dodo", "images", "build", *names, *flags])
 
 
 def find_deployment(start: Path) -> Path | None:

@@ -1,12 +1,12 @@
 """``dodo search`` with drives whose end follows from their values."""
 
 import asyncio
-import importlib.util
 import json
 import os
 import re
 import shutil
 import signal
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import StringIO
@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl import compiler
+from dodo_dsl import advice, compiler
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.search import command
@@ -314,12 +314,9 @@ def test_an_address_in_a_wrong_place_shows_no_password(search: Search, capsys: p
 
 
 def test_a_missing_driver_of_databases_is_said(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "psycopg" else real(name))
-    assert search("example", "--storage", "postgresql://u@h/db") == (
-        2,
-        "dodo search: --storage needs psycopg: pip install 'dodo-dsl[search,storage]'\n",
-    )
+    monkeypatch.setitem(sys.modules, "psycopg", None)
+    said = f"dodo search: --storage needs psycopg: {advice.install('storage')}\n"
+    assert search("example", "--storage", "postgresql://u@h/db") == (2, said)
 
 
 @pytest.mark.parametrize(
@@ -350,5 +347,5 @@ def test_containers_are_refused(search: Search) -> None:
 
 
 def test_what_to_install_is_said(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-    assert search("example") == (2, "dodo search: this needs scipy: pip install 'dodo-dsl[search]'\n")
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    assert search("example") == (2, f"dodo search: this needs scipy: {advice.install('search')}\n")

@@ -18,6 +18,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
 import dodo_dsl.rec.export
+from dodo_dsl import advice
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.messages import versions
 from dodo_dsl.opendlv.messages.message_set import MessageSet
@@ -301,9 +302,8 @@ def test_the_module_that_is_missing_is_named(
     monkeypatch.delattr(dodo_dsl.rec.export, "mcap_file")
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     answer = dodo_rec("export", record(video(1)), "--mcap", "-o", tmp_path / "out.mcap")
-    install = "install DoDo with its extra 'mcap', or: pip install mcap mcap-protobuf-support foxglove-schemas-protobuf"
-    text = f"--mcap needs the module 'mcap', which is not installed; {install}"
-    assert answer == (2, "", f"dodo rec: {text}\n")
+    assert (answer.code, answer.stdout) == (2, "")
+    assert answer.stderr == f"dodo rec: --mcap needs mcap: {advice.install('mcap')}\n"
 
 
 def test_the_same_recording_gives_the_same_file(tmp_path: Path, record: Callable[..., Path]) -> None:

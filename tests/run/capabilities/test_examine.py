@@ -26,8 +26,8 @@ def test_whether_the_emulated_rig_is_built(tmp_path: Path, monkeypatch: pytest.M
     assert (programs.FIRMWARE, programs.EMULATOR_PLACES) == (emulator.FOLDER, emulator.PLACES)
     monkeypatch.setenv(programs.FIRMWARE, str(tmp_path))
     (found,) = programs.emulated_rig()
-    assert (found.state, found.text) == ("warning", f"is not built: it is not in {tmp_path}")
-    assert "make firmware in DoDo's checkout, or set DODO_FIRMWARE to its folder" in found.advice
+    assert (found.state, found.text) == ("warning", f"is not built: it is not in {tmp_path}; hil tests need it")
+    assert found.advice == f"DODO_FIRMWARE is {tmp_path}: build it there, or unset DODO_FIRMWARE"
     for name in ("rig-emulator", "gantry.elf"):
         (tmp_path / name).write_bytes(b"")
     (found,) = programs.emulated_rig()

@@ -67,19 +67,19 @@ class EmptyEngine:
         raise ImageNotFound("not found")
 
 
-def test_an_own_service_without_its_image() -> None:
+def test_images_that_were_never_built() -> None:
     services = (
         PlannedService("evaluation", "judge", "judge", "team/judge:7", ("python", "-m", "my_services.judge")),
         PlannedService("evaluation", "radar", "radar", "elsewhere/radar:1", ("radar",)),
         PlannedService("evaluation", "track", "collision", "team/collision:7", ("python", "-m", "services.collision")),
     )
     hints = own_images.hints(plan(services=services, sandbox_image="team/sandbox:7"))
-    told = "build it from your own Dockerfile on team/base:7: dodo images build judge"
-    assert hints == {"team/judge:7": told}
-    with pytest.raises(BackendError, match=rf"^image team/judge:7 cannot be pulled: not found; {told}$"):
-        asyncio.run(Pulls(EmptyEngine()).provide(["team/judge:7"], [], lambda _: None, hints))
-    with pytest.raises(BackendError, match=r"^image team/collision:7 cannot be pulled: not found$"):
-        asyncio.run(Pulls(EmptyEngine()).provide(["team/collision:7"], [], lambda _: None, hints))
+    own = "build it from your own Dockerfile on team/base:7: dodo images build judge --prefix team --tag 7"
+    shipped = "'dodo images build --prefix team --tag 7' makes it"
+    assert hints == {"team/judge:7": own, "team/collision:7": shipped, "team/sandbox:7": shipped}
+    for name, told in hints.items():
+        with pytest.raises(BackendError, match=rf"^image {name} cannot be pulled: not found; {told}$"):
+            asyncio.run(Pulls(EmptyEngine()).provide([name], [], lambda _: None, hints))
 
 
 @pytest.mark.engine

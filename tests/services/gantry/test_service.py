@@ -306,7 +306,7 @@ def test_a_start_that_is_not_reached(rig: FakeRig) -> None:
         (["--serial=/etc/passwd"], "is not a device"),
         (["--serial=ttyACM0"], "is not a device"),
         (["--serial=/dev/ttyNONE7"], "there is no serial port /dev/ttyNONE7; is the rig plugged in?"),
-        (["--serial=emulated"], "the emulated rig is not built: `make firmware` builds it"),
+        (["--serial=emulated"], "the emulated rig is not built: DODO_FIRMWARE is "),
         (["--serial=/dev/null", "--range-x=0.5"], "the start is out of the rig's ranges: at x = 0.000 m"),
     ],
 )
