@@ -50,6 +50,9 @@ _MAX_TEXT = 100
 UNITS = tuple(_DIMENSION)
 
 
+_SHARES = "write for example 0.5 or 50 %"
+
+
 class QuantityError(ValueError):
     """A value is not a quantity in the expected unit; ``hint`` suggests one, ``fix`` is the only one."""
 
@@ -69,7 +72,7 @@ def _a(noun: str) -> str:
 
 
 def _example(number: str, unit: str) -> str:
-    return f"write for example '{number} {unit}'"
+    return _SHARES if unit == SHARE else f"write for example '{number} {unit}'"
 
 
 def convert(value: object, unit: str) -> Decimal:
@@ -85,10 +88,10 @@ def convert(value: object, unit: str) -> Decimal:
     match = _QUANTITY.fullmatch(text)
     if unit == SHARE and (not match or _DIMENSION.get(match["unit"] or SHARE) != "share"):
         hint, fix = repaired(text, lambda other: _is_quantity(other, unit))
-        raise QuantityError(f"'{text}' is not a share", hint or "write for example 0.5 or 50 %", fix)
+        raise QuantityError(f"'{text}' is not a share", hint or _SHARES, fix)
     if not match:
         hint, fix = repaired(text, lambda other: _is_quantity(other, unit))
-        hint = hint or with_point(text) or _example("1", unit)
+        hint = hint or _pointed(text, unit) or _example("1", unit)
         raise QuantityError(f"'{text}' is not a quantity in {unit}", hint, fix)
     if match["unit"] is None and unit == SHARE:
         return _converted(match["number"], SHARE, unit)
@@ -118,6 +121,16 @@ def with_point(text: str) -> str:
     """A hint about a decimal comma; empty where there is none."""
     point = text.replace(",", ".", 1)
     return f"write '{point}', with a point" if point != text and _QUANTITY.fullmatch(point) else ""
+
+
+def _pointed(text: str, unit: str) -> str:
+    """A hint about a decimal comma, in a quantity of this unit."""
+    if hint := with_point(text):
+        try:
+            convert(text.replace(",", ".", 1), unit)
+        except QuantityError as other:
+            return other.hint
+    return hint
 
 
 def written_unit(text: str) -> str | None:

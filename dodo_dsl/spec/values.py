@@ -169,7 +169,7 @@ def _output(parameter: Parameter, node: Node, _: Path) -> Value:
 def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     items = node.items if isinstance(node, Sequence) else (node,)
     if isinstance(node, Mapping):
-        hint = f"write [{', '.join(list(node.entries)[:3])}]"
+        hint = f"write [{', '.join(node.entries)}]"
         raise ValueProblem(node.span, "wrong-type", f"{_name(parameter)} is a mapping, expected a list", hint)
     texts = []
     for item in items:

@@ -1,8 +1,12 @@
 """What values mean that are no quantities as they are written."""
 
-import pytest
+import re
 
-from dodo_dsl.spec.quantity import QuantityError, convert
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.spec.quantity import UNITS, QuantityError, convert
 from dodo_dsl.spec.quantity_slips import boolean_meant
 
 MENDED = [
@@ -43,3 +47,19 @@ def test_words_for_true_and_false(text: str, meant: str | None) -> None:
     hint, fix = boolean_meant(text)
     assert (fix.new if fix else None) == meant
     assert bool(hint) == bool(meant)
+
+
+NUMBERS = st.sampled_from(("1", "-1", "1,5", "1.5", ".5", "1e3", "1.000,5", "+2", ",", "", "\u22121", "0x1"))
+SIGNS = st.sampled_from(("", " ", "  ", ",", ";", "# x", " # x"))
+
+
+@given(NUMBERS, SIGNS, st.sampled_from(("", *UNITS, "sec", "\u00b0", "hz", "parsecs")), SIGNS, st.sampled_from(UNITS))
+def test_what_a_hint_says_to_write_is_a_quantity(
+    number: str, between: str, written: str, behind: str, unit: str
+) -> None:
+    for value in (f"{number}{between}{written}{behind}", True):
+        try:
+            convert(value, unit)
+        except QuantityError as problem:
+            for meant in re.findall(r"^write (?:for example )?'([^']*)'", problem.hint):
+                convert(meant, unit)

@@ -56,7 +56,9 @@ def _odd(service: ResolvedService) -> Iterator[Diagnostic]:
         argument, text = service.arguments.get(name), service.texts.get(name, "")
         if argument and text.isdigit() and int(text) % 2 and (name, service.texts.get("source")) != ("width", RPICAM):
             message = f"parameter '{name}' is {text}, expected an even number"
-            yield Diagnostic(_span(service, argument), "out-of-range", message, f"write for example {int(text) - 1}")
+            yield Diagnostic(
+                _span(service, argument), "out-of-range", message, f"write for example {max(int(text) - 1, 2)}"
+            )
 
 
 def _exposure(service: ResolvedService, source: str) -> Iterator[Diagnostic]:

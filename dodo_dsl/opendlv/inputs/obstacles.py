@@ -25,7 +25,7 @@ def read(path: Path) -> dict[str, list[Line]]:
 
 def _obstacle(entry: Node) -> tuple[str, list[Line]]:
     value = entry.value
-    if not isinstance(value, dict) or not isinstance(value.get("name"), str) or not value["name"]:
+    if not isinstance(value, dict) or not isinstance(value.get("name"), str) or not value["name"].strip():
         raise MapError(entry.file, "expected an object with a name", entry.place)
     if value["name"] != value["name"].strip():
         what = f"the name '{value['name']}' has blanks around it, with which a test does not find it"

@@ -3,16 +3,21 @@
 import functools
 import itertools
 import json
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import PurePath
 from typing import Any
+
+import yaml
 
 from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix, shown_path
 from dodo_dsl.slips.keys import slip_in_key
-from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.quantity_slips import boolean_meant
+from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.schema.consequences import unindented, without_consequences
 from dodo_dsl.spec.schema.validity import OF_COMPOSE, UNIT, WORDS, check_quantity, is_valid, is_whole, schema_of
 
@@ -69,6 +74,8 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
     errors = itertools.islice(validator.iter_errors(document), MAX_PROBLEMS)
     for error in without_consequences(error for error in errors if not _is_of_rules(error)):
         place = _locate(node, error.absolute_path)
+        place.is_of_file = len(error.absolute_path) == 1
+        place.fits = validator.evolve(schema=error.schema).is_valid
         if not error.absolute_path:
             place.about = validator.schema.get("properties", {})
         found.extend(_TRANSLATORS.get(error.validator, _fallback)(error, place))
@@ -104,7 +111,11 @@ class _Place:
         self.node = node
         self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
         self.name = name
+        self.is_of_file = False
+        """Whether it is a key of the file's own."""
         self.about: dict[str, Any] = {}
+        self.fits: Callable[[object], bool] = lambda _: True
+        """Whether another value would comply with what is wrong here."""
         self.extended: dict[str, Entry] = {}
         """What stands beside it in a file that its own extends."""
 
@@ -192,33 +203,54 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
     message = f"{place.name} {found}, expected {' or '.join(names)}"
-    is_scalar = isinstance(error.instance, int | float)
-    in_quotes = f'write it in quotes: "{error.instance}"' if wanted == "string" and is_scalar else ""
-    hint, fix = error.schema.get(_HINT, in_quotes), None
+    hint, fix = error.schema.get(_HINT) or _of_file(place) or _in_quotes(error, place), None
     if not hint and wanted == "array" and "examples" in error.schema:
-        hint = f"write for example {place.name[1:-1]}: [{', '.join(error.schema['examples'][0])}]"
+        hint = f"write for example {place.name[1:-1]}: {_in_line(error.schema['examples'][0])}"
     if wanted == "string" and place.name.endswith(_PAIRS) and isinstance(error.instance, dict) and error.instance:
         name, value = next((key, entry.value) for key, entry in place.entries.items())
         text = value.text if isinstance(value, Scalar) else "value"
         hint = f'write {name}: "{text}" without the dash, or - {name}={text}'
     if not hint:
-        hint, fix = _meant(error.instance, wanted, place.name)
+        hint, fix = _meant(error.instance, wanted, place)
     span = place.span
     if isinstance(place.node, Sequence) and wanted == "object":
         span, hint = place.node.span, hint or "write 'key: value' in place of list items"
     yield Diagnostic(span, "wrong-type", message, hint, fix=fix)
 
 
-def _meant(value: object, wanted: object, name: str) -> tuple[str, Fix | None]:
+def _of_file(place: _Place) -> str:
+    """A hint for the name of a test, which is that of its file; empty elsewhere, and where that is no name."""
+    file = PurePath(place.span.file).name
+    stem = file.removesuffix(SUFFIX)
+    is_name = place.is_of_file and place.name == "'name'" and stem != file
+    return f"write 'name: {stem}', as the file is called" if is_name and place.fits(stem) else ""
+
+
+def _in_quotes(error: Any, place: _Place) -> str:
+    """A hint for a number or a word that YAML takes for something else than the text that it is."""
+    is_text = error.validator == "enum" or error.validator_value == "string"
+    if not is_text or not isinstance(place.node, Scalar) or error.instance is None:
+        return ""
+    text = place.node.text
+    expected = error.schema.get("x-expect", "")
+    return f'write it in quotes: "{text}"' if place.fits(text) else f"write {expected}" if expected else ""
+
+
+def _meant(value: object, wanted: object, place: _Place) -> tuple[str, Fix | None]:
     """A hint how to write a value of another type, and the only fix; empty and None for most values."""
     if wanted == "boolean" and isinstance(value, str):
         return boolean_meant(value)
     if wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
-        return f"write {value}, without quotation marks", None
-    names = [value] if isinstance(value, str) else list(value)[:3] if isinstance(value, dict) else []
-    if wanted == "array" and names and name.startswith("'"):
-        return f"write {name[1:-1]}: [{', '.join(names)}]", None
+        return (f"write {value}, without quotation marks" if place.fits(int(value)) else ""), None
+    names = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
+    if wanted == "array" and names and place.name.startswith("'") and place.fits(names):
+        return f"write {place.name[1:-1]}: {_in_line(names)}", None
     return "", None
+
+
+def _in_line(value: object) -> str:
+    """YAML in one line."""
+    return str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf)).strip()
 
 
 def _kind(value: object) -> str:
@@ -243,9 +275,12 @@ def _quantity(error: Any, place: _Place) -> Iterator[Diagnostic]:
 def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
     choices = [str(v) for v in error.validator_value]
     message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(choices)}"
-    hint = did_you_mean(str(error.instance), choices)
+    plain_ones = [choice for choice in choices if resolve(choice) == choice]
+    hint = did_you_mean(str(error.instance), plain_ones)
     hint = hint if hint.startswith("did") else ""
-    fix = only_fix(str(error.instance), choices)
+    fix = only_fix(str(error.instance), plain_ones)
+    if isinstance(place.node, Scalar) and place.node.text in choices:
+        hint, fix = _in_quotes(error, place), None
     if "#" in str(error.instance):
         hint, fix = "a comment begins with ' #', after a space", None
     yield Diagnostic(place.span, "wrong-value", message, hint, fix=fix)
@@ -266,11 +301,11 @@ def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
     span = place.span
     if "propertyNames" in error.absolute_schema_path:
         span = place.key(str(error.instance))
-    hint = ""
-    if isinstance(error.instance, str):
-        plain_name = re.sub(r"[^a-z0-9]+", "-", error.instance.lower()).strip("-")
-        fits = re.search(error.schema.get("pattern", ""), plain_name[:40])
-        hint = f"for example '{plain_name[:40]}'" if fits and plain_name not in ("", error.instance) else ""
+    hint = _of_file(place)
+    if not hint and isinstance(error.instance, str):
+        name = re.sub(r"[^a-z0-9]+", "-", error.instance.lower()).strip("-")[:40]
+        is_text = name != error.instance and resolve(name) == name != ""
+        hint = f"for example '{name}'" if is_text and place.fits(name) else ""
     yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} is not allowed here, expected {expected}", hint)
 
 
