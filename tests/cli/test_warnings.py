@@ -3,12 +3,13 @@
 import json
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from dodo_dsl.cli.selection import select
 from dodo_dsl.compiler import Checked
-from dodo_dsl.diagnostics import Diagnostic, Span, format_gitlab, format_json, format_text, has_errors
+from dodo_dsl.diagnostics import Diagnostic, Span, format_gitlab, format_json, format_text, has_errors, told_once
 from tests.check import examples
 
 GOOD = """\
@@ -131,3 +132,15 @@ def test_one_warning_of_several_tests_is_shown_once_with_their_names_or_number(t
     (as_json,), (as_report,) = json.loads(format_json(found)), json.loads(format_gitlab(found))
     assert (as_json["tests"], as_report["description"]) == (tests, said)
     assert as_report["fingerprint"] == json.loads(format_gitlab([_of([])]))[0]["fingerprint"]
+
+
+def test_the_same_warning_in_the_files_of_several_tests_is_shown_once() -> None:
+    def warning(file: str, line: int = 7, severity: Literal["error", "warning"] = "warning") -> Diagnostic:
+        return Diagnostic(Span(f"tests/{file}", line), "clock-answers", "no message", severity=severity)
+
+    same = [warning(f"{name}.dodo.yml", line) for line, name in enumerate("abcd", 1)]
+    other = [warning("c.json"), warning("d.json"), warning("a.dodo.yml", 9, "error"), warning("b.dodo.yml", 9, "error")]
+    first, *rest = told_once([*same, *other], ".dodo.yml")
+    assert (first.span, first.sentence) == (same[0].span, "no message (in 4 tests, such as a)")
+    assert rest == other
+    assert told_once([warning("a.dodo.yml", 1), warning("a.dodo.yml", 2)], ".dodo.yml")[0].tests == ()

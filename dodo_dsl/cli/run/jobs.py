@@ -13,7 +13,7 @@ from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.run.unbuilt import without_unbuilt
 from dodo_dsl.compiler import NoApplication, plan
-from dodo_dsl.diagnostics import has_errors, ordered
+from dodo_dsl.diagnostics import has_errors, ordered, told_once
 from dodo_dsl.emit.output_folder import PLAN_FILE, write
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.model import Plan
@@ -23,6 +23,7 @@ from dodo_dsl.plan.runs import runs
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.rigs.attendance import is_real
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.settings import Settings
 
 
@@ -122,7 +123,7 @@ def compile_tests(
     if settings.clock:
         stdout.write(_kept_clock([s.title for s in checked.specs if s.clock != settings.clock]))
     if not checked.ok:
-        write_diagnostics(stdout, checked.diagnostics)
+        write_diagnostics(stdout, told_once(checked.diagnostics, SUFFIX))
         raise UsageError("the tests above cannot be compiled")
     tests: dict[str, str] = {}
     if samples:
@@ -134,7 +135,7 @@ def compile_tests(
     except NoApplication:
         raise UsageError(NO_APPLICATION) from None
     problems = ordered([*checked.diagnostics, *made.problems])
-    write_diagnostics(stdout, problems)
+    write_diagnostics(stdout, told_once(problems, SUFFIX))
     if has_errors(problems):
         raise UsageError("the tests above cannot be compiled")
     write(made.compiled, made.pipeline, folder)

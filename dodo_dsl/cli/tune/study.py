@@ -17,13 +17,14 @@ from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.search.study import digests
 from dodo_dsl.compiler import Checked
-from dodo_dsl.diagnostics import has_errors, ordered
+from dodo_dsl.diagnostics import has_errors, ordered, told_once
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.run.runner import default_backend
 from dodo_dsl.search.space import Space, space_of, sweep, texts
 from dodo_dsl.spec.instances import vary
 from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.settings import Settings
 
 
@@ -67,7 +68,7 @@ def tune_study(options: argparse.Namespace, work: Path, stdout: TextIO) -> TuneS
     except compiler.NoApplication:
         raise UsageError(NO_APPLICATION) from None
     problems = ordered([*checked.diagnostics, *(made.problems if made else ())])
-    write_diagnostics(stdout, problems)
+    write_diagnostics(stdout, told_once(problems, SUFFIX))
     if made is None or has_errors(problems):
         raise UsageError("the above cannot be compiled")
     space = Space(tunables(checked.application) if checked.application else ())
