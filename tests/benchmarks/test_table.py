@@ -46,7 +46,7 @@ def test_the_table_has_every_row_and_says_what_was_not_measured() -> None:
         "on a processor, 2 cores, 8 GB, Linux 6, Python 3.11.9; load 0.5 to 1.5",
         "",
         "| what | ours          | peer   | theirs        | ratio | quartiles   | rounds | goal       | met     | note |",  # noqa: E501
-        "|------|---------------|--------|---------------|-------|-------------|--------|------------|---------|------|",  # noqa: E501
+        "|------|---------------|--------|---------------|-------|-------------|--------|------------|---------|------|",
         "| bus  | 20 messages/s | a peer | 10 messages/s | 2     | 1.75 to 2.5 | 3      | at least 2 | yes     |      |",  # noqa: E501
         "| pull | not measured  |        |               |       |             |        | at least 1 | unknown | no engine answers |",  # noqa: E501
         "",
