@@ -24,7 +24,7 @@ help:
 	@echo "make test     set up, then every check and every test: a quarter of an hour"
 	@echo "make proof    what takes long to prove: every fault, every mutant of the firmware, the learned driver"
 	@echo "make lint     format, lint, types, imports"
-	@echo "make bench    measure, beside a peer in the same run: ten minutes, a table in build/bench"
+	@echo "make bench    set up, then measure, beside a peer in the same run: ten minutes, a table in build/bench"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
@@ -91,8 +91,7 @@ first: realtime-tests fast-tests
 second: engine-tests slow-tests
 
 bench:
-	@scripts/setup dev
-	@.venv/bin/python -m benchmarks.ledger $(BENCH)
+	@since=$$(date +%s); scripts/install-bench-tools && .venv/bin/python -m benchmarks.ledger --since $$since $(BENCH)
 
 firmware:
 	@scripts/install-firmware-tools

@@ -13,10 +13,11 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import cv2
 import numpy as np
@@ -24,7 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, cost_row, rate_row, report
+from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, rate_row, report
 from benchmarks.pictures.gl_peer import GlPeer, ssim
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose, Pinhole
@@ -91,6 +92,18 @@ def peer(folder: Path) -> GlPeer | None:
         return None
 
 
+def speed_row(ours: Sequence[float], **rest: Any) -> Row:
+    return rate_row("virtual camera", "pictures/s", ours, goal=Goal(3), **rest)
+
+
+def likeness_row(values: Sequence[float]) -> Row:
+    return rate_row("virtual camera, SSIM with the peer at worst", "", values, goal=Goal(0.95, of="value"))
+
+
+def cost_of(condition: str, ours: Sequence[float], without: Sequence[float]) -> Row:
+    return cost_row(f"virtual camera, {condition}", "ms a picture", ours, "no condition", without)
+
+
 def beside(folder: Path, keep: Path | None, budget: Budget) -> None:
     """The rates of both in turns, and how alike their pictures are."""
     camera, gl = Renderer(load_scene(folder), *SIZE, FOVY), peer(folder)
@@ -107,15 +120,16 @@ def beside(folder: Path, keep: Path | None, budget: Budget) -> None:
     draws = [ours, theirs] if gl else [ours]
     columns = list(zip(*([rate(draw) for draw in draws] for _ in budget.rounds(ROUNDS, until=0.4)), strict=True))
     rest = {"peer": "moderngl on llvmpipe", "theirs": columns[1]} if gl else {"note": NO_PEER}
-    row = rate_row("virtual camera", "pictures/s", columns[0], goal=Goal(3), **rest)
+    row = speed_row(columns[0], **rest)
     report(row)
     print(f"virtual-camera {median(row.ours):7.1f} pictures/s")
     if gl is None:
+        plan(likeness_row([]), note=NO_PEER)
         return
     print(f"moderngl       {median(row.theirs):7.1f} pictures/s on {gl.name}")
     print(f"ratio          {median(row.ratios):7.2f} (target 3)")
     alike = [ssim(ours(pose), theirs(pose)) for pose in drive()]
-    report(rate_row("virtual camera, SSIM with the peer at worst", "", [min(alike)], goal=Goal(0.95, of="value")))
+    report(likeness_row([min(alike)]))
     print(f"SSIM           {min(alike):7.4f} at worst, {np.mean(alike):.4f} on average (target 0.95)")
     if keep is not None:
         for number, pose in enumerate(drive()[::10]):
@@ -157,8 +171,7 @@ def costs(folder: Path, budget: Budget) -> Iterator[str]:
     draws = {name: condition(folder, name) for name in CONDITIONS}
     rounds = [{name: 1000 / rate(draw, 4) for name, draw in draws.items()} for _ in budget.rounds(ROUNDS)]
     for name in list(CONDITIONS)[1:]:
-        both = [r[name] for r in rounds], "no condition", [r["nothing"] for r in rounds]
-        report(cost_row(f"virtual camera, {name}", "ms a picture", *both))
+        report(cost_of(name, [r[name] for r in rounds], [r["nothing"] for r in rounds]))
         added = median(r[name] - r["nothing"] for r in rounds)
         times = median(r[name] / r["nothing"] for r in rounds)
         yield f"{name:<14} {added:+7.2f} ms a picture, {times:.2f} times the time"
@@ -177,10 +190,14 @@ def main(argv: list[str]) -> int:
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     budget = Budget.given()
+    first, others = [speed_row([]), likeness_row([])], [cost_of(name, [], []) for name in list(CONDITIONS)[1:]]
+    plan(*first, *others)
     with map_folder() as folder:
-        beside(folder, keep, budget)
-        for line in costs(folder, budget):
-            print(line)
+        with attempt(*first):
+            beside(folder, keep, budget)
+        with attempt(*others):
+            for line in costs(folder, budget):
+                print(line)
     return 0
 
 

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from players import ROOT, cost_of
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
+from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
 
 PLUGINS = (Path.home() / ".docker", Path("/usr/local/lib/docker"), Path("/usr/libexec/docker"), Path("/usr/lib/docker"))
 PLUGIN = next((path for folder in PLUGINS if (path := folder / "cli-plugins" / "docker-compose").is_file()), None)
@@ -107,21 +107,26 @@ def kind_of(matrix: bool) -> str:
     return "of a matrix" if matrix else "specs"
 
 
+def show(number: int, matrix: bool, calls: Sequence[Call]) -> None:
+    check, write, peak, other = (statistics.median(column) for column in zip(*calls, strict=True))
+    ratios = f"{other * number / check:6.1f} {other * number / write:6.1f}" if other else NO_PEER
+    print(f"{number:6d} {kind_of(matrix):11s} {check:6.2f} s  {write:6.2f} s   {peak:6.0f} MiB"
+          f"  {other * 1000:6.1f} ms   {ratios}")  # fmt: skip
+
+
 def main() -> int:
     budget = Budget.given()
     print("instances          check    compile     peak    peer a test   times as fast a test: check, compile")
-    plan(*(row for number, matrix, _ in CASES for row in rows(number, matrix, []) if row.goal))
+    plan(*(row for number, matrix, _ in CASES for row in rows(number, matrix, [])))
     each = 0.0
     for number, matrix, until in CASES:
         if budget.left() < each * number:
             continue
         begin = time.perf_counter()
-        calls = measure(number, matrix, budget, until)
-        each = (time.perf_counter() - begin) / len(calls) / number
-        check, write, peak, other = (statistics.median(column) for column in zip(*calls, strict=True))
-        ratios = f"{other * number / check:6.1f} {other * number / write:6.1f}" if other else NO_PEER
-        print(f"{number:6d} {kind_of(matrix):11s} {check:6.2f} s  {write:6.2f} s   {peak:6.0f} MiB"
-              f"  {other * 1000:6.1f} ms   {ratios}")  # fmt: skip
+        with attempt(*rows(number, matrix, [])):
+            calls = measure(number, matrix, budget, until)
+            each = (time.perf_counter() - begin) / len(calls) / number
+            show(number, matrix, calls)
     return 0
 
 

@@ -4,9 +4,7 @@ First one test: what ``dodo run`` takes beyond compose, command and report inclu
 compose one after the other. Both drive the same cars for the same time. The images must exist (``dodo images build``).
 """
 
-import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -15,10 +13,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from players import ROOT, finished
+from players import IMAGES, ROOT, engine_problem, finished
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
+from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
 
 TESTS = ("sil-closed-straight", "sil-closed-left-curve")
 ROUNDS = 3
@@ -74,13 +72,9 @@ def rows(tests: Sequence[str], own: list[float], other: list[float]) -> list[Row
 
 def main() -> int:
     planned = [*rows(TESTS[:1], [], []), *rows(TESTS, [], [])]
-    if (
-        shutil.which("docker") is None
-        or subprocess.run(["docker", "info"], capture_output=True, check=False).returncode
-    ):
-        note = "no Docker engine answers: nothing to measure"
-        plan(*planned, note=note)
-        print(note)
+    if problem := engine_problem(IMAGES):
+        plan(*planned, note=problem)
+        print(f"{problem}: nothing to measure")
         return 0
     budget = Budget.given()
     plan(*planned)
@@ -92,10 +86,11 @@ def main() -> int:
         for tests, until in ((TESTS[:1], 0.7), (TESTS, 1.0)):
             if budget.left() < longest * len(tests):
                 continue
-            own, other = rounds(tests, folder, budget, until)
-            longest = max(map(sum, zip(own, other, strict=True)))
-            medians = f"{statistics.median(own):5.1f} s, {COMPOSE} {statistics.median(other):5.1f} s"
-            print(f"{len(tests)} at once: dodo run --backend docker {medians}")
+            with attempt(*rows(tests, [], [])):
+                own, other = rounds(tests, folder, budget, until)
+                longest = max(map(sum, zip(own, other, strict=True)))
+                medians = f"{statistics.median(own):5.1f} s, {COMPOSE} {statistics.median(other):5.1f} s"
+                print(f"{len(tests)} at once: dodo run --backend docker {medians}")
     return 0
 
 

@@ -22,11 +22,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 import numpy as np
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, report
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
 from tests.lsp.editor import ROOT, Editor, Message, editor
 
-PEER = shutil.which("yaml-language-server")
-NO_PEER = "yaml-language-server is not installed (npm install -g yaml-language-server)"
+SERVER = "yaml-language-server"
+OWN = ROOT / "build" / "bench" / "node" / "node_modules" / ".bin" / SERVER
+"""Where scripts/install-bench-tools puts it."""
+PEER = str(OWN) if OWN.is_file() else shutil.which(SERVER)
+NO_PEER = f"{SERVER} is not installed (scripts/install-bench-tools, with npm)"
 TESTS, ROUNDS, KEYS, REQUESTS, PAUSES = 100, 5, 10, 4, 2
 PAUSE_S = 0.8
 GOAL = Goal(0.2, of="value")
@@ -128,15 +131,15 @@ def measure(session: Session, times: Times, has_definitions: bool) -> None:
 
 
 def late(values: Sequence[float]) -> list[float]:
-    return [float(np.percentile(values, 95))]
+    return [float(np.percentile(values, 95))] if values else []
 
 
 def rows(ours: Times, theirs: Times) -> list[Row]:
     """A row for each kind of wait; every value of ours has one of the peer's, where it has an answer at all."""
     made = []
     for name in (KEY, LATE, AFTER_PAUSE, *PLACES):
-        pair = [late(times.get(KEY, ())) if name == LATE else times.get(name, []) for times in (ours, theirs) if times]
-        beside = ("yaml-language-server", pair[1]) if len(pair) == 2 and pair[1] else ()
+        pair = [late(times.get(KEY, ())) if name == LATE else times.get(name, []) for times in (ours, theirs)]
+        beside = (SERVER, pair[1]) if pair[1] else ()
         note = "" if theirs and beside else "the peer has no such answer" if theirs else NO_PEER
         made.append(
             cost_row(f"editor, {name}", "s", pair[0], *beside, goal=None if name in PLACES else GOAL, note=note)
@@ -171,6 +174,7 @@ def _rounds(budget: Budget, sessions: Sequence[tuple[Session, Times, bool]], our
 
 
 def main() -> int:
+    plan(*rows({}, {}))
     with tempfile.TemporaryDirectory() as name:
         compare(Path(name).resolve())
     return 0

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from players import ROOT, finished
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, plan, rate_row, report
+from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, rate_row, report
 
 ROUNDS, REPEATS = 3, 10
 SHORT = "sil-closed-straight"
@@ -84,12 +84,20 @@ def speeds_in_turn(folder: Path, budget: Budget) -> None:
     """The tests with a goal in lockstep, each by itself, so that those that came to an end have rows."""
     found: dict[str, list[tuple[float, float]]] = {slug: [] for slug in GOALS}
     for _ in budget.rounds(ROUNDS):
-        for slug, times in found.items():
-            test = next(iter(run(folder / "speeds", slug, "--clock", "lockstep")[0].values()))  # the first of a matrix
-            times.append((test["execution_s"], test["sim_s"]))
-            ours, theirs = (list(column) for column in zip(*times, strict=True))
-            report(speed_row(slug, ours, "real time", theirs))
-            print(f"{slug:24s} {ours[-1]:7.2f} s, {theirs[-1] / ours[-1]:5.1f} times real time", flush=True)
+        for slug, times in list(found.items()):
+            with attempt(speed_row(slug, [])):
+                one_speed(folder, slug, times)
+            if not times:
+                del found[slug]
+
+
+def one_speed(folder: Path, slug: str, times: list[tuple[float, float]]) -> None:
+    """One more round of a test."""
+    test = next(iter(run(folder / "speeds", slug, "--clock", "lockstep")[0].values()))  # the first of a matrix
+    times.append((test["execution_s"], test["sim_s"]))
+    ours, theirs = (list(column) for column in zip(*times, strict=True))
+    report(speed_row(slug, ours, "real time", theirs))
+    print(f"{slug:24s} {ours[-1]:7.2f} s, {theirs[-1] / ours[-1]:5.1f} times real time", flush=True)
 
 
 def one_and_more(folder: Path, budget: Budget) -> None:
@@ -110,7 +118,8 @@ def main() -> int:
     budget = Budget.given()
     plan(*(speed_row(slug, []) for slug in GOALS), *rows_of([], []))
     with tempfile.TemporaryDirectory() as name:
-        one_and_more(Path(name), budget)
+        with attempt(*rows_of([], [])):
+            one_and_more(Path(name), budget)
         if budget.limited:
             speeds_in_turn(Path(name), budget)
         else:

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from players import ROOT, finished
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
+from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
 
 CORES = len(os.sched_getaffinity(0))
 TESTS, FEWER, ROUNDS = 8, 3, 3
@@ -84,10 +84,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         small(folder, tests)
-        rows = [rounds(folder, "lockstep", tests, budget, 0.6)]
-        rows.append(rounds(folder, "realtime", FEWER if budget.limited else tests, budget, 1.0))
-    for row in rows:
-        print(f"{row.what}: {statistics.median(row.ratios):.2f} times as fast as one after the other, {CORES} cores")
+        for clock, number, until in (("lockstep", tests, 0.6), ("realtime", FEWER if budget.limited else tests, 1.0)):
+            with attempt(row_of(clock, number, [], [])):
+                row = rounds(folder, clock, number, budget, until)
+                times = statistics.median(row.ratios)
+                print(f"{row.what}: {times:.2f} times as fast as one after the other, {CORES} cores")
     return 0
 
 

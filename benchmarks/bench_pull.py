@@ -20,15 +20,17 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
+from players import IMAGES, engine_problem
+
+from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
 from dodo_dsl import __version__
 
 PORT = 5917
 HOST = f"127.0.0.1:{PORT}"
-NAMES = ("sandbox", "collision", "dynamic-model", "integrator", "rec-recorder", "virtual-camera")
-LARGEST, PULL = "largest image, unpacked", "cold pull of the suite"
+NAMES = [name for name in IMAGES if name != "clock"]
+LARGEST, PULL, SECONDS = "largest image, unpacked", "cold pull of the suite", "cold pull, seconds"
 GOALS = {LARGEST: Goal(250, of="value"), PULL: Goal(1.15, of="value")}
-UNITS = {LARGEST: "MB", PULL: "x the largest image"}
+UNITS = {LARGEST: "MB", PULL: "x the largest image", SECONDS: "s"}
 MANIFEST = "application/vnd.docker.distribution.manifest.v2+json"
 
 
@@ -142,26 +144,28 @@ def pulls(folder: Path) -> None:
         print(f"{times:.3f} times the largest image")
         if kind == "shared":
             report(cost_row(PULL, UNITS[PULL], [times], goal=GOALS[PULL]))
-    report(cost_row("cold pull, seconds", "s", [found["shared"]], "independent images", [found["alone"]]))
+    report(cost_row(SECONDS, UNITS[SECONDS], [found["shared"]], "independent images", [found["alone"]]))
 
 
 def main() -> int:
-    if (
-        shutil.which("docker") is None
-        or subprocess.run(["docker", "info"], capture_output=True, check=False).returncode
+    planned = [Row(what, unit, goal=GOALS.get(what), less=True) for what, unit in UNITS.items()]
+    plan(*planned)
+    if problem := engine_problem(NAMES):
+        plan(*planned, note=problem)
+        print(f"{problem}: nothing to measure")
+        return 0
+    with attempt(planned[0]):
+        largest_here()
+    needed = [name for name in ("docker-registry", "dockerd") if not shutil.which(name)]
+    if os.getuid() or needed:
+        plan(*planned[1:], note=f"needs {'root' if os.getuid() else needed[0]}")
+        return 0
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name,
+        attempt(*planned[1:]),
+        image_registry(Path(name)),
     ):
-        return absent(LARGEST, "no Docker engine answers") + absent(PULL, "no Docker engine answers")
-    largest_here()
-    if os.getuid() or not shutil.which("docker-registry") or not shutil.which("dockerd"):
-        return absent(PULL, "needs root, docker-registry and dockerd")
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name, image_registry(Path(name)):
         pulls(Path(name))
-    return 0
-
-
-def absent(what: str, why: str) -> int:
-    plan(Row(what, UNITS[what], goal=GOALS[what], less=True), note=why)
-    print(f"{what}: {why}: nothing to measure")
     return 0
 
 

@@ -10,9 +10,10 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
@@ -20,7 +21,7 @@ from bench_rec import drive
 from players import ROOT, Measured, peer, service, tool
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import cost_row, report
+from benchmarks.ledger.row import Row, attempt, cost_row, plan, report
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
@@ -34,6 +35,11 @@ SECONDS = 1.0 if BUDGET.limited else 4.0
 NO_PEER = "pycluon is not installed: no peer to measure against"
 MESSAGE_HZ, FRAME_HZ = 1000, 10
 SIZE = "640x480"
+FRAME_KINDS: tuple[tuple[float, str, tuple[str, ...]], ...] = (
+    (0.75, "default quality", ()),
+    (1.0, "lossless", ("--lossless",)),
+)
+"""The part of the budget by which each is done, its name, and flags of the recorder."""
 FRAMES = ROOT / "tests_registry" / "recordings" / "kiwi-track.rec"
 PEER = tool("cluon-OD4toStdout")
 
@@ -98,6 +104,14 @@ def theirs(path: Path) -> Iterator[Measured]:
         yield measured
 
 
+def message_row(ours_us: Sequence[float], *rest: Any) -> Row:
+    return cost_row("recorder, processor time of a message", "us", ours_us, *rest, note="" if PEER else NO_PEER)
+
+
+def frame_row(kind: str, costs: Sequence[float]) -> Row:
+    return cost_row(f"recorder, processor time of a frame, {kind}", "ms", costs)
+
+
 def messages_only(folder: Path) -> None:
     envelopes = drive(round(SECONDS * MESSAGE_HZ))
     recorders = {"rec-recorder": ours, **({"cluon-OD4toStdout": theirs} if PEER else {})}
@@ -110,7 +124,7 @@ def messages_only(folder: Path) -> None:
             found[name].append((*shares, len(list(read_envelopes(path)))))
     ours_us, *theirs_us = ([(busy - none) / MESSAGE_HZ * 1e6 for none, busy, _ in rounds] for rounds in found.values())
     rest = ("cluon-OD4toStdout", theirs_us[0]) if PEER else ()
-    report(cost_row("recorder, processor time of a message", "us", ours_us, *rest, note="" if PEER else NO_PEER))
+    report(message_row(ours_us, *rest))
     print(f"messages only, {MESSAGE_HZ} a second:")
     for name, rounds in found.items():
         none, busy, count = (statistics.median(column) for column in zip(*rounds, strict=True))
@@ -130,7 +144,7 @@ def frames_as_well(folder: Path, until: float, kind: str, *flags: str) -> None:
         recorded = len(list(read_envelopes(path)))
         rounds.append((none, busy, recorded, path.stat().st_size / max(recorded, 1)))
     costs = [(busy - none) / FRAME_HZ * 1e3 for none, busy, *_ in rounds]
-    report(cost_row(f"recorder, processor time of a frame, {kind}", "ms", costs))
+    report(frame_row(kind, costs))
     none, busy, count, size = (statistics.median(column) for column in zip(*rounds, strict=True))
     cost = (busy - none) / FRAME_HZ * 1e3
     print(
@@ -140,11 +154,14 @@ def frames_as_well(folder: Path, until: float, kind: str, *flags: str) -> None:
 
 
 def main() -> int:
+    plan(message_row([]), *(frame_row(kind, []) for _, kind, *_ in FRAME_KINDS))
     with tempfile.TemporaryDirectory() as name:
-        messages_only(Path(name))
+        with attempt(message_row([])):
+            messages_only(Path(name))
         print(f"frames of {SIZE} at {FRAME_HZ} Hz:")
-        frames_as_well(Path(name), 0.75, "default quality")
-        frames_as_well(Path(name), 1.0, "lossless", "--lossless")
+        for until, kind, flags in FRAME_KINDS:
+            with attempt(frame_row(kind, [])):
+                frames_as_well(Path(name), until, kind, *flags)
     if not PEER:
         print(NO_PEER)
     return 0

@@ -26,7 +26,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import cost_row, report
+from benchmarks.ledger.row import Row, attempt, cost_row, plan, report
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from tests.services.gantry.fake_rig import FakeRig
@@ -39,6 +39,7 @@ SETTLE = 3.0
 PARTS = 4  # of the drive, which are the rounds of the ledger
 LONG, SHORT = 40.0, 8.0  # seconds of the drive, alone and in the ledger
 TICKS = os.sysconf("SC_CLK_TCK")
+LATENCIES = ("picture in memory to request", "picture due to request")
 Shares = dict[str, list[float]]
 Processes = dict[str, "subprocess.Popen[bytes]"]
 
@@ -90,7 +91,7 @@ def running(programs: dict[str, list[str]], folder: Path) -> Iterator[Processes]
                 [sys.executable, *own, f"--cid={CID}", *flags], cwd=ROOT, env=environment, stdout=subprocess.PIPE
             )
             if own[0] == "-m" and processes[name].stdout.readline() != b'{"dodo": "ready"}\n':  # type: ignore[union-attr]
-                sys.exit(f"{name} did not become ready")
+                raise RuntimeError(f"{name} did not become ready")
         time.sleep(SETTLE)
         yield processes
     finally:
@@ -159,14 +160,18 @@ def measured(programs: dict[str, list[str]], folder: Path, seconds: float, memor
             marks.append((time.monotonic(), used(processes)))
         ended = [name for name, process in processes.items() if process.poll() is not None]
     if ended:
-        sys.exit(f"ended too soon: {', '.join(ended)}")
+        raise RuntimeError(f"ended too soon: {', '.join(ended)}")
     if watcher is not None:
         both = sorted(heard.keys() & watcher.shown.keys())
-        show("picture in memory to request", [(heard[time] - watcher.shown[time]) / 1000 for time in both])
-        show("picture due to request", [(heard[time] - time) / 1000 for time in both])
+        show(LATENCIES[0], [(heard[time] - watcher.shown[time]) / 1000 for time in both])
+        show(LATENCIES[1], [(heard[time] - time) / 1000 for time in both])
         print(f"pictures: {len(watcher.shown)} seen, {len(both)} answered")
     spans = list(itertools.pairwise(marks))
     return {n: [100 * (b[n] - a[n]) / (end - begin) for (begin, a), (end, b) in spans] for n in processes}
+
+
+def share_row(name: str, parts: Sequence[float]) -> Row:
+    return cost_row(f"{name.replace('_', '-')}, processor", "% of a core", parts)
 
 
 def main() -> None:
@@ -174,11 +179,19 @@ def main() -> None:
     memory = f"bench-{uuid.uuid4().hex[:8]}"
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        shares = measured(in_the_drive(memory, folder), folder, seconds, f"{memory}.argb")
+        shares: Shares = {}
         with FakeRig(folder / "rig") as rig:
-            shares.update(measured(alone(memory, rig), folder, seconds / 2, None))
-    for name, parts in shares.items():
-        report(cost_row(f"{name.replace('_', '-')}, processor", "% of a core", parts))
+            drive, others = in_the_drive(memory, folder), alone(memory, rig)
+            waits = [cost_row(name, "ms", []) for name in LATENCIES]
+            plan(*waits, *(share_row(name, []) for name in (*drive, *others)))
+            for programs, time_s, watched, rows in (
+                (drive, seconds, f"{memory}.argb", waits),
+                (others, seconds / 2, None, []),
+            ):
+                with attempt(*rows, *(share_row(name, []) for name in programs)):
+                    found = measured(programs, folder, time_s, watched)
+                    report(*(share_row(name, parts) for name, parts in found.items()))
+                    shares.update(found)
     print(f"processor, percent of a core (load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores):")
     for name, parts in sorted(shares.items(), key=lambda item: -sum(item[1])):
         print(f"  {name.replace('_', '-'):<18} {sum(parts) / len(parts):5.1f} %")

@@ -6,19 +6,18 @@ exist (``dodo images build``), and the application's are built before.
 """
 
 import json
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from players import ROOT, finished
+from players import IMAGES, ROOT, engine_problem, finished
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
+from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
 
 TEST = "sil-closed-straight"
 ROUNDS = 5
@@ -47,36 +46,42 @@ def theirs(folder: Path) -> float:
 
 
 def rows(found: dict[str, list[float]]) -> list[Row]:
-    compared = [cost_row(f"set-up, {way}", "s", found[way], COMPOSE, found[COMPOSE]) for way in WAYS]
-    mixed = cost_row(
-        "set-up, mixed, beside docker", "s", found["mixed"], "set-up, docker", found["docker"], goal=Goal(1)
-    )
-    return [*compared, mixed]
+    """Of the rounds that both sides of a row have."""
+    return [
+        *(_row(f"set-up, {way}", found[way], COMPOSE, found[COMPOSE]) for way in WAYS),
+        _row("set-up, mixed, beside docker", found["mixed"], "set-up, docker", found["docker"], Goal(1)),
+    ]
+
+
+def _row(what: str, own: list[float], peer: str, theirs: list[float], goal: Goal | None = None) -> Row:
+    both = min(len(own), len(theirs))
+    return cost_row(what, "s", own[: both or None], peer if both else "", theirs[:both], goal=goal)
 
 
 def main() -> int:
     found: dict[str, list[float]] = {way: [] for way in (*WAYS, COMPOSE)}
-    if (
-        shutil.which("docker") is None
-        or subprocess.run(["docker", "info"], capture_output=True, check=False).returncode
-    ):
-        note = "no Docker engine answers: nothing to measure"
-        plan(*rows(found), note=note)
-        print(note)
-        return 0
     budget = Budget.given()
     plan(*rows(found))
+    ways = [*WAYS, COMPOSE]
+    if problem := engine_problem(IMAGES):
+        plan(*rows(found), note=problem)
+        ways = ["process"]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         compiled = [sys.executable, "-m", "dodo_dsl", "compile", TEST, "-o", str(folder / "generated")]
         if code := finished(compiled, ROOT):
             raise RuntimeError(f"dodo compile ended with {code}")
-        ours("docker", folder)  # builds the application's images
+        if not problem:
+            with attempt():
+                ours("docker", folder)  # builds the application's images
         for number in budget.rounds(ROUNDS):
-            order = [*WAYS, COMPOSE]
-            for way in order if number % 2 else reversed(order):
-                found[way].append(theirs(folder / "generated" / TEST) if way == COMPOSE else ours(way, folder))
-            report(*rows(found))
+            for way in list(ways if number % 2 else reversed(ways)):
+                try:
+                    found[way].append(theirs(folder / "generated" / TEST) if way == COMPOSE else ours(way, folder))
+                except RuntimeError as error:
+                    problem = str(error)
+                    ways.remove(way)
+            report(*(replace(row, note="" if row.theirs else problem) for row in rows(found)))
     for way, times in found.items():
         print(f"{way}: {', '.join(f'{seconds:.2f}' for seconds in sorted(times))} s")
     return 0

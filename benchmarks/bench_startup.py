@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 from players import ROOT, Cost, cost_of
 
 from benchmarks.ledger.budget import Budget
-from benchmarks.ledger.row import Goal, Row, cost_row, report
+from benchmarks.ledger.row import Goal, Row, cost_row, plan, report
 
 ROUNDS = 15
 BIN = Path(sys.executable).parent
@@ -70,6 +70,7 @@ def main() -> int:
     budget = Budget.given()
     commands = {name: [path, *words[1:]] for name, words in PEERS.items() if (path := program(words[0]))}
     found = Found({name: [] for name in OURS}, {name: [] for name in commands})
+    plan(*rows(found))
     for name in list(commands):
         try:
             cost_of(commands[name], ROOT)  # and fills the system's cache

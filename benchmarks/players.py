@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -9,7 +10,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, NamedTuple
 
+from dodo_dsl import __version__
+
 ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ("sandbox", "clock", "collision", "dynamic-model", "integrator", "rec-recorder", "virtual-camera")
+"""Those of a closed loop."""
 _MEASURE = """
 import os, sys, time
 begin = time.perf_counter()
@@ -54,6 +59,19 @@ def cost_of(command: Sequence[str | Path], folder: Path) -> Cost:
     if code:
         raise RuntimeError(f"{' '.join(map(str, command))} ended with {code:.0f}: {found.stderr.strip()[:500]}")
     return Cost(*numbers)
+
+
+def engine_problem(images: Sequence[str] = ()) -> str:
+    """Why tests cannot run in containers here; empty where they can. ``images`` are names of DoDo's."""
+    if shutil.which("docker") is None:
+        return "the docker command is missing"
+    for words, text in ((["info"], "no Docker engine answers"), (["compose", "version"], "Compose v2 is missing")):
+        if subprocess.run(["docker", *words], capture_output=True, check=False).returncode:
+            return text
+    for image in (f"dodo/{name}:{__version__}" for name in images):
+        if subprocess.run(["docker", "image", "inspect", image], capture_output=True, check=False).returncode:
+            return f"there is no image {image} (dodo images build)"
+    return ""
 
 
 def finished(command: Sequence[str | Path], folder: Path, environment: dict[str, str] | None = None) -> int:

@@ -2,13 +2,17 @@
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+import traceback
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 FILE_VARIABLE = "DODO_BENCH_ROWS"
 NOT_REACHED = "no time was left for it"
+MOST_LETTERS = 300
+"""Of the reason why a benchmark failed."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,13 @@ def cost_row(
     return Row(what, unit, own, peer, other, ratios, less=True, **rest)
 
 
+_measured: set[str] = set()
+"""The rows with values that this process has reported."""
+
+
 def report(*rows: Row) -> None:
     """Hands rows to the ledger, if it started this process; a later row of the same name replaces an earlier one."""
+    _measured.update(row.what for row in rows if row.ours)
     name = os.environ.get(FILE_VARIABLE)
     if name:
         with Path(name).open("a") as file:
@@ -81,6 +90,17 @@ def report(*rows: Row) -> None:
 def plan(*rows: Row, note: str = NOT_REACHED) -> None:
     """Reports rows that a benchmark means to measure, with the reason if it does not come to them."""
     report(*(replace(row, note=note) for row in rows))
+
+
+@contextmanager
+def attempt(*planned: Row) -> Iterator[None]:
+    """A part of a benchmark. Where it fails, its rows that have no values say why, and what comes after it goes on."""
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is the reason
+        traceback.print_exc()
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        plan(*(row for row in planned if row.what not in _measured), note=reason[:MOST_LETTERS])
 
 
 def read_rows(path: Path) -> list[Row]:

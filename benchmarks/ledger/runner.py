@@ -36,10 +36,17 @@ SECONDS = {
 OTHERS = 40
 RESERVE = 0.85
 """Of its budget a benchmark plans with this part, so that it ends by itself."""
+INTERRUPTED = "interrupted"
 GRACE = 10.0
 """Seconds to clean up for one that did not end."""
-MOST_LETTERS = 300
-"""Of the reason why a benchmark failed."""
+
+
+class Interrupted(Exception):
+    """Somebody ended the benchmark, and all that were to follow; what it had measured is kept."""
+
+    def __init__(self, bench: Bench) -> None:
+        super().__init__(bench.trouble)
+        self.bench = bench
 
 
 def scripts(checkout: Path) -> list[Path]:
@@ -49,7 +56,7 @@ def scripts(checkout: Path) -> list[Path]:
 def run(script: Path, seconds: float) -> Bench:
     """One benchmark of the checkout that the script is in; one that does not end in time is ended.
 
-    The rows that it did not come to say why, if it failed or was ended.
+    The rows that it did not come to say why, if it failed or was ended. Raises Interrupted.
     """
     checkout = script.parents[1]
     with tempfile.TemporaryDirectory() as folder:
@@ -61,12 +68,16 @@ def run(script: Path, seconds: float) -> Bench:
             budget.VARIABLE: str(seconds * RESERVE),
         }
         begin, load = time.monotonic(), os.getloadavg()[0]
-        with _started([sys.executable, str(script)], checkout, environment, errors) as process:
-            code = _wait(process, seconds)
+        code, is_interrupted = None, False
+        try:
+            with _started([sys.executable, str(script)], checkout, environment, errors) as process:
+                code = _wait(process, seconds)
+        except KeyboardInterrupt:
+            is_interrupted = True
         took = time.monotonic() - begin
         said = errors.read_text(errors="replace")
         sys.stderr.write(said)
-        trouble = _trouble(code, seconds, said)
+        trouble = INTERRUPTED if is_interrupted else _trouble(code, seconds, said)
         found = tuple(
             replace(one, note=trouble) if trouble and one.note == row.NOT_REACHED else one
             for one in row.read_rows(rows)
@@ -74,7 +85,16 @@ def run(script: Path, seconds: float) -> Bench:
     if not found:
         trouble = trouble or "reported no row"
         found = (row.Row(script.stem, "", note=trouble),)
-    return Bench(script.stem, found, round(took, 1), seconds, (load, os.getloadavg()[0]), trouble, bool(code))
+    bench = Bench(script.stem, found, round(took, 1), seconds, (load, os.getloadavg()[0]), trouble, bool(code))
+    if is_interrupted:
+        raise Interrupted(bench)
+    return bench
+
+
+def not_run(script: Path) -> Bench:
+    """One that an interrupt left no time for."""
+    load = os.getloadavg()[0]
+    return Bench(script.stem, (row.Row(script.stem, "", note="interrupted before it"),), 0.0, 0.0, (load, load))
 
 
 def _trouble(code: int | None, seconds: float, said: str) -> str:
@@ -84,7 +104,7 @@ def _trouble(code: int | None, seconds: float, said: str) -> str:
     if not code:
         return ""
     reasons = [line for line in said.splitlines() if line[:1].strip() and not line.startswith("Traceback")]
-    return f"ended with {code}" + (f": {reasons[0][:MOST_LETTERS]}" if reasons else "")
+    return f"ended with {code}" + (f": {reasons[0][: row.MOST_LETTERS]}" if reasons else "")
 
 
 def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> int | None:
@@ -113,10 +133,12 @@ def _started(
     try:
         yield process
     finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGINT)
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(GRACE)
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        try:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGINT)
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(GRACE)
+        finally:  # also where somebody does not wait for that
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()

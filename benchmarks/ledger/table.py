@@ -1,13 +1,13 @@
 """The ledger as a table in Markdown, whose columns are aligned, so that it reads as well in a terminal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from benchmarks.ledger.compare import Change
 from benchmarks.ledger.ledger import Bench, Ledger
 from benchmarks.ledger.row import Row
 from benchmarks.ledger.spread import Spread
 
-HEAD = ("what", "ours", "peer", "theirs", "ratio", "quartiles", "rounds", "goal", "met")
+HEAD = ("what", "ours", "peer", "theirs", "ratio", "quartiles", "rounds", "goal", "met", "note")
 CHANGES = ("what", "before", "quartiles", "after", "quartiles", "result")
 
 
@@ -57,23 +57,13 @@ def ledger_table(ledger: Ledger) -> str:
         "",
         *aligned(HEAD, [_cells(row) for row in rows.values()]),
     ]
-    notes = [f"- {note}: {', '.join(names)}" for note, names in by_note(rows).items()]
-    notes += [f"- {bench.trouble}: {bench.name}" for bench in ledger.benches if bench.trouble and is_news(bench)]
+    notes = [f"- {bench.trouble}: {bench.name}" for bench in ledger.benches if bench.trouble and is_news(bench)]
     return "\n".join([*lines, *([""] if notes else []), *notes]) + "\n"
 
 
 def is_news(bench: Bench) -> bool:
     """Whether no row says the benchmark's trouble."""
     return bench.trouble not in {row.note for row in bench.rows}
-
-
-def by_note(rows: Mapping[str, Row]) -> dict[str, list[str]]:
-    """What has the same note."""
-    found: dict[str, list[str]] = {}
-    for row in rows.values():
-        if row.note:
-            found.setdefault(row.note, []).append(row.what)
-    return found
 
 
 def change_table(changes: Sequence[Change], before: str, after: str) -> str:
@@ -83,8 +73,9 @@ def change_table(changes: Sequence[Change], before: str, after: str) -> str:
 
 
 def aligned(head: Sequence[str], cells: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a Markdown table."""
-    widths = [max(len(row[column]) for row in (head, *cells)) for column in range(len(head))]
+    """Lines of a Markdown table; its last column is as wide as its head, as sentences may be in it."""
+    widths = [max(len(row[column]) for row in (head, *cells)) for column in range(len(head) - 1)]
+    widths.append(len(head[-1]))
     lines = [" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in (head, *cells)]
     return [f"| {lines[0]} |", f"|{'|'.join('-' * (width + 2) for width in widths)}|", *(f"| {s} |" for s in lines[1:])]
 
@@ -102,6 +93,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         str(spread.rounds) if spread else "",
         goal_text(row),
         "" if row.goal is None else "unknown" if met is None else "yes" if met else "no",
+        " ".join(row.note.replace("|", "/").split()),
     )
 
 

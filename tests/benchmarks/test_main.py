@@ -1,6 +1,7 @@
 """The command, with runs of benchmarks that need no time."""
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from benchmarks.ledger import __main__ as command
 from benchmarks.ledger.ledger import Bench
 from benchmarks.ledger.row import Row
+from benchmarks.ledger.runner import Interrupted
 from tests.benchmarks.rows import ledger, rated
 
 Runs = list[tuple[str, Path, float]]
@@ -43,9 +45,43 @@ def test_it_writes_both_files_and_prints_the_table(
     assert json.loads((tmp_path / "ledger.json").read_text())["benches"][1]["name"] == "bench_rec"
 
 
-def test_one_that_failed_fails_the_command(tmp_path: Path, runs: Callable[..., Runs]) -> None:
-    runs(rated(1, 2, 3), failed=True)
-    assert command.main(["bus", "-o", str(tmp_path)]) == 1
+def test_one_that_failed_takes_no_others_with_it(tmp_path: Path, runs: Callable[..., Runs]) -> None:
+    noted = runs(rated(1, 2, 3), failed=True)
+    assert command.main(["bus", "rec", "-o", str(tmp_path)]) == 0
+    assert len(noted) == 2 and "- ended with 3: bench_bus" in (tmp_path / "ledger.md").read_text()
+
+
+def test_an_interrupt_keeps_what_was_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The table is there, in its files, too; rows that were not measured say why."""
+
+    def run(script: Path, seconds: float) -> Bench:
+        load = (0.0, 0.0)
+        if script.stem == "bench_compile":
+            row = rated(4, 5, 6, what="half")
+            raise Interrupted(Bench(script.stem, (row,), 1.0, seconds, load, "interrupted"))
+        return Bench(script.stem, (rated(1, 2, 3, what=script.stem),), 1.0, seconds, load)
+
+    monkeypatch.setattr(command, "run", run)
+    assert command.main(["bus", "camera", "compile", "rec", "-o", str(tmp_path)]) == 130
+    table = (tmp_path / "ledger.md").read_text()
+    assert table in capsys.readouterr().out
+    rows = {line.split("|")[1].strip(): line.split("|")[2].strip() for line in table.splitlines() if "|" in line}
+    assert rows["bench_bus"] == rows["bench_camera"] == "20 messages/s"
+    assert (rows["half"], rows["bench_rec"]) == ("50 messages/s", "not measured")
+    assert "| interrupted before it |" in table
+
+
+def test_the_set_up_counts(tmp_path: Path, runs: Callable[..., Runs]) -> None:
+    """And what one benchmark takes too long goes off the others."""
+    noted = runs(rated(1, 2, 3))
+    began = time.time() - command.ALL_IN_ALL + command.TOTAL / 4
+    assert command.main(["-o", str(tmp_path), "--since", str(began)]) == 0
+    assert noted[0][2] == pytest.approx(command.SECONDS["bench_bus"] / 4, rel=0.05)
+    noted.clear()
+    assert command.main(["-o", str(tmp_path), "--since", "1"]) == 0
+    assert {seconds for *_, seconds in noted} == {command.LEAST}
 
 
 @pytest.mark.parametrize(("before", "code", "verdict"), [((5, 6, 7), 1, "worse"), ((1, 2, 3), 0, "within the spread")])

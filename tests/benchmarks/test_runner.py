@@ -4,13 +4,14 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from benchmarks.ledger import runner
 from benchmarks.ledger.row import Row, rate_row
-from benchmarks.ledger.runner import GRACE, SECONDS, run, scripts
+from benchmarks.ledger.runner import GRACE, SECONDS, Interrupted, run, scripts
 
 ROOT = Path(__file__).parents[2]
 REPORTS = """
@@ -96,6 +97,62 @@ def test_one_that_hangs_is_ended_with_its_children_and_keeps_its_rows(
     while is_running(int(up.read_text())):
         assert time.monotonic() < patience, "its child is still there"
         time.sleep(0.01)
+
+
+@pytest.mark.parametrize("is_patient", [True, False])
+def test_an_interrupt_ends_it_and_keeps_its_rows(
+    is_patient: bool, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where somebody does not wait until it has cleaned up, nothing of it is left either."""
+    up = folder.parent / "child"
+
+    def interrupted(process: "subprocess.Popen[bytes]", _seconds: float) -> int | None:
+        while not up.exists() and process.poll() is None:
+            time.sleep(0.01)
+        if not is_patient:
+            monkeypatch.setattr(process, "wait", once_more(process.wait))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "_wait", interrupted)
+    (folder / "bench_a.py").write_text(f"{REPORTS}\n{HANGS}")
+    with pytest.raises(Interrupted) as raised:
+        run(folder / "bench_a.py", 60)
+    assert (raised.value.bench.rows, raised.value.bench.trouble) == ((ROW,), "interrupted")
+    patience = time.monotonic() + 20
+    while is_running(int(up.read_text())):
+        assert time.monotonic() < patience, "its child is still there"
+        time.sleep(0.01)
+
+
+def once_more(wait: Callable[..., int]) -> Callable[..., int]:
+    """Whose first call is interrupted."""
+    calls = []
+
+    def called(*words: float) -> int:
+        calls.append(words)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return wait(*words)
+
+    return called
+
+
+def test_a_part_that_fails_leaves_the_others(folder: Path) -> None:
+    text = """
+from benchmarks.ledger.row import attempt, plan, rate_row, report
+one, two, three = (rate_row(name, "1/s", []) for name in "abc")
+plan(one, two, three)
+with attempt(one, two):
+    report(rate_row("a", "1/s", [1]))
+    int("x")
+with attempt(three):
+    report(rate_row("c", "1/s", [3]))
+"""
+    (folder / "bench_a.py").write_text(f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{text}")
+    bench = run(folder / "bench_a.py", 60)
+    why = "ValueError: invalid literal for int() with base 10: 'x'"
+    expected = [((1.0,), ""), ((), why), ((3.0,), "")]
+    assert ([(row.ours, row.note) for row in bench.rows], bench.failed) == (expected, False)
 
 
 def test_one_without_rows_has_a_row_that_says_why(folder: Path) -> None:

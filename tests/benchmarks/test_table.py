@@ -45,19 +45,18 @@ def test_the_table_has_every_row_and_says_what_was_not_measured() -> None:
         "Commit abc, 2026-01-02 03:04 UTC, 12 s",
         "on a processor, 2 cores, 8 GB, Linux 6, Python 3.11.9; load 0.5 to 1.5",
         "",
-        "| what | ours          | peer   | theirs        | ratio | quartiles   | rounds | goal       | met     |",
-        "|------|---------------|--------|---------------|-------|-------------|--------|------------|---------|",
-        "| bus  | 20 messages/s | a peer | 10 messages/s | 2     | 1.75 to 2.5 | 3      | at least 2 | yes     |",
-        "| pull | not measured  |        |               |       |             |        | at least 1 | unknown |",
+        "| what | ours          | peer   | theirs        | ratio | quartiles   | rounds | goal       | met     | note |",  # noqa: E501
+        "|------|---------------|--------|---------------|-------|-------------|--------|------------|---------|------|",
+        "| bus  | 20 messages/s | a peer | 10 messages/s | 2     | 1.75 to 2.5 | 3      | at least 2 | yes     |      |",  # noqa: E501
+        "| pull | not measured  |        |               |       |             |        | at least 1 | unknown | no engine answers |",  # noqa: E501
         "",
-        "- no engine answers: pull",
         "- did not end in 40 s, and was ended: bench_bus",
     ]
 
 
 def test_trouble_that_a_row_tells_is_told_once() -> None:
     text = ledger_table(ledger(Row("bench_bus", "", note="ended with 3"), trouble="ended with 3"))
-    assert text.splitlines()[-2:] == ["", "- ended with 3: bench_bus"]
+    assert text.count("ended with 3") == 1
 
 
 def test_the_table_of_changes() -> None:
