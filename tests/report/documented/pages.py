@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.pictures import contact_sheet, trace_picture
-from tests.pictures import palette
-from tests.pictures.likeness import Picture, Place
+from tests.report.documented import palette
+from tests.report.documented.likeness import Picture, Place
 from tests.report.viewer.chromium import Chromium, Page
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
 TRACE, SHEET = "trace.svg", "virtual-camera.png"
 
