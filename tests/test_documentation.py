@@ -55,6 +55,15 @@ def dodo(*words: str) -> tuple[int, str]:
     return result.returncode, result.stdout + result.stderr
 
 
+def test_the_message_in_the_readme_is_what_dodo_says(newcomer: Path) -> None:
+    (newcomer / SPEC).write_text(block("evaluation:").replace("freq: 10 Hz", "freq: 10"))
+    (newcomer / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\n")
+    (shown,) = re.findall(r"\n    \$ dodo compile --check\n((?:    .*\n)+)", README)
+    stdout = StringIO()
+    assert main(["compile", "--check"], stdout, stdout) == 2
+    assert stdout.getvalue().splitlines() == [line.removeprefix("    ") for line in shown.splitlines()]
+
+
 def test_the_blocks_of_the_readme_compile_together(newcomer: Path) -> None:
     """Shipped tests that its application cannot feed are left out, and said; they are nobody's mistake."""
     stdout, stderr = StringIO(), StringIO()

@@ -42,6 +42,7 @@ class Chromium:
         self._answers, answers = os.pipe()
         words = [str(PROGRAM), "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
                  "--no-first-run", "--disable-extensions", "--disable-background-networking", "--remote-debugging-pipe",
+                 "--disable-quic", "--disable-component-update", "--disable-sync",
                  f"--user-data-dir={profile}", "about:blank"]  # fmt: skip
         joined = ["bash", "-c", f'exec "$@" 3<&{commands} 4>&{answers}', "bash", *words]
         self._process = subprocess.Popen(
