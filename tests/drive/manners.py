@@ -6,6 +6,7 @@ copies        answers each picture once, with its sample time
 own-times     the same with sample times of its own
 twice         says everything twice, the second time something else
 slow          takes its time every tenth picture
+leaks         keeps 20 MB of each picture
 restarts      replaces itself with a new process every twentieth picture
 stops         answers no more after ten pictures, and goes on looking
 silent        waits for nothing and says nothing
@@ -21,6 +22,7 @@ from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryErro
 
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 MANNERS = FLAGS["manner"].split(",")
+KEPT: list[bytearray] = []
 REQUESTS = ("opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest")
 
 
@@ -46,6 +48,8 @@ def answer(session: Session, memory: SharedMemory, number: int) -> None:
     print(f"picture {sampled} {digest.hex()}", flush=True)
     if "slow" in MANNERS and number % 10 == 0:
         time.sleep(0.3)
+    if "leaks" in MANNERS:
+        KEPT.append(bytearray(digest) * (20_000_000 // len(digest)))
     if "stops" in MANNERS and number >= 10:
         return
     share = picture[2_000_000 % len(picture) :: 4001].count(picture[-4]) / max(1, len(picture) // 4001)

@@ -39,6 +39,8 @@ WRONG: list[tuple[str, Any, str]] = [
     ("cid", 255, "cid"),
     ("seed", 1 << 32, "seed"),
     ("lockstep", {"readers": 0, "wall_timeout_s": 1}, "lockstep"),
+    ("resources", {"max_memory_mb": "200"}, "resources"),
+    ("resources", {"max_processor_share": -0.1}, "resources"),
     ("messages", ["../x.odvd"], "messages"),
     ("messages", ["/x.odvd"], "messages"),
     ("import_paths", ["a\0b"], "import path"),

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dodo_dsl.outcome import MachineLoad, NotRun, Response, Wait
+from dodo_dsl.outcome import MachineLoad, NotRun, Response, ServiceUse, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import GivenReport
@@ -37,6 +37,7 @@ STRANGE = [
     {"more": 1},
     {"machine": 3},
     {"machine": {}},
+    {"resources": [{"service": "a"}]},
     {"goals": [{"check": "time"}]},
     {"goals": [{"check": "time", "zero": 1, "one": 1, "weight": 1}]},
     {"goals": [{"check": "time", "zero": math.nan, "one": 1, "weight": 1}]},
@@ -66,6 +67,20 @@ def test_the_load_of_the_machine_is_kept_in_milliseconds(tmp_path: Path, load: M
     rough = replace(LOAD, others_share=0.61049, application=Wait(1.00049, 2.0, 1.9, "app"))
     (tmp_path / "results.json").write_text(results.to_json([replace(OUTCOME, machine=rough)]))
     assert results.load(tmp_path / "results.json")[0].machine == LOAD
+
+
+def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
+    uses = (
+        ServiceUse("steering", 1.23456, 0.25049, 150_000_000, 5e6, 2_000_000_000),
+        ServiceUse("vision", 2.0, None, 1_460_000_000, None, None),
+    )
+    write_report(tmp_path, [replace(OUTCOME, resources=uses)], {})
+    first, second = results.load(tmp_path / "results.json")[0].resources
+    assert (first, second) == (replace(uses[0], processor_s=1.235, processor_share=0.25), uses[1])
+    page = (tmp_path / "index.html").read_text()
+    for shown in ("1.23 s (25 %)", "150 MB", "300 MB/min", "1,460 MB", "not known"):
+        assert f">{shown}</td>" in page
+    assert second.in_words() == "2.00 s of processor time, up to 1,460 MB of memory"
 
 
 @pytest.mark.parametrize("number", ["1" + "0" * 400, "-1" + "0" * 400, "1e999", "NaN", "1" * 5000])

@@ -1,8 +1,9 @@
 """One test from set-up to outcome, on a backend that reports given events."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -17,7 +18,9 @@ from dodo_dsl.run.engine import (
     Engine,
 )
 from dodo_dsl.run.load import shortage
+from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
+from dodo_dsl.run.load.use_judgement import UNSEEN
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
@@ -37,6 +40,7 @@ from dodo_dsl.run.protocol import (
     VerdictEvent,
 )
 from dodo_dsl.run.standing import Standing
+from dodo_dsl.spec.resource_limits import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
 
 ENDED = Exited("track", 0)
@@ -153,6 +157,56 @@ def test_what_is_not_measured() -> None:
     assert (found.outcome, found.machine) == ("failed", MachineLoad(5.0))
     stepped = on(BUSY, (5.0, FAILED), (5.0, ENDED), (5.0, Time(5.0, last=True)), tested=plan(lockstep=9.0))
     assert (stepped.outcome, stepped.machine) == ("failed", None), "lockstep waits for a busy machine"
+
+
+def using(used: Callable[[float], Mapping[str, Used] | None], **more: Any) -> ScriptedBackend:
+    """A test of 5 s, in lockstep of 20 s test time."""
+    events = [(0.0, Time(0.0, False)), (5.0, Time(20.0, False)), (5.0, PASSED), (5.0, ENDED), (5.0, Time(20.0, True))]
+    return ScriptedBackend(plan(**more), {**READY, "begin": events}, uses=used)
+
+
+def leaking(now: float) -> Mapping[str, Used]:
+    """By 400 MB in all."""
+    return {"app": Used(0.5 * now, 100_000_000 + round(80e6 * (now - 2.0)), 2_000_000_000)}
+
+
+@pytest.mark.parametrize(("lockstep", "seconds"), [(0.0, 5.0), (60.0, 20.0)])
+def test_what_the_application_used_is_by_the_test_s_own_time(lockstep: float, seconds: float) -> None:
+    found = outcome(using(leaking, lockstep=lockstep))
+    (use,) = found.resources
+    assert (found.outcome, use.service, use.memory_limit_bytes) == ("passed", "app", 2_000_000_000)
+    assert (use.processor_s, use.processor_share) == (pytest.approx(2.5), pytest.approx(2.5 / seconds))
+    assert use.peak_memory_bytes == pytest.approx(500e6, rel=0.01)
+    assert use.memory_growth_bytes_per_s == pytest.approx(400e6 / seconds, rel=0.01)
+    (note,) = found.notes
+    assert f"it would reach its limit of 2,000 MB in {1500 / (400 / seconds):.0f} s" in note
+
+
+def test_limits_of_what_the_application_uses_are_judged_before_it_has_passed() -> None:
+    backend = using(leaking, resources=ResourceLimits(max_memory_mb=200.0))
+    told: list[str] = []
+    found, _ = run(Engine(backend.plan, backend, lambda _: None, passed=lambda: told.append("passed")).run())
+    assert (found.outcome, told) == ("failed", [])
+    assert found.reason == "application service 'app' used 500 MB of memory, at most 200 MB"
+    assert [(check["name"], check["ok"]) for check in found.checks] == [("peak-memory-app", False)]
+
+
+def test_a_crash_has_figures_too() -> None:
+    backend = using(leaking, resources=ResourceLimits(max_memory_mb=200.0))
+    backend = replace(backend, stages={**READY, "begin": [(2.0, Exited("app", 3))]})
+    found = outcome(backend)
+    assert found.reason == "application service 'app' ended with exit code 3 after 2.0 s, before the test was decided"
+    assert found.resources[0].peak_memory_bytes > 200e6
+
+
+def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
+    def broken(now: float) -> None:
+        raise OSError("gone")
+
+    found = outcome(using(broken, resources=ResourceLimits(max_memory_mb=200.0)))
+    assert (found.outcome, found.resources) == ("passed", ())
+    assert found.notes == (UNSEEN, "what the application used was not measured to the end: OSError: gone")[::-1]
+    assert outcome(using(lambda _: None)).notes == ()
 
 
 def test_a_meter_that_breaks_costs_no_verdict() -> None:

@@ -7,6 +7,7 @@ import pytest
 from dodo_dsl.spec.load import load_spec
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location
+from dodo_dsl.spec.resource_limits import ResourceLimits
 from tests.check import examples
 
 
@@ -49,6 +50,31 @@ def test_a_spec(tmp_path: Path) -> None:
 def test_when_pictures_are_kept(tmp_path: Path, record: str, frames: tuple[str, float | None]) -> None:
     (spec,), problems = loaded(tmp_path, f"{examples.SPEC}{record}\n")
     assert (problems, (spec.frames, spec.frames_hz)) == ([], frames)
+
+
+@pytest.mark.parametrize(
+    ("resources", "expected", "problems"),
+    [
+        ("", None, []),
+        ("resources: {max-memory: 0.2 GB}", ResourceLimits(200.0), []),
+        ("resources: {max-memory-growth: 2 MB/s}", ResourceLimits(None, 120.0), []),
+        ("resources: {max-memory-growth: 0 kB/min}", ResourceLimits(None, 0.0), []),
+        (
+            "resources: {max-processor-time: 500 ms, max-processor-share: 50 %}",
+            ResourceLimits(None, None, 0.5, 0.5),
+            [],
+        ),
+        ("resources: {max-memory: 1 kB}", ResourceLimits(), ["out-of-range"]),
+        ("resources: {max-memory: 200}", ResourceLimits(), ["wrong-unit"]),
+        ("resources: {memory: 200 MB}", ResourceLimits(), ["unknown-key"]),
+        ("resources: {}", ResourceLimits(), ["missing-key"]),
+    ],
+)
+def test_limits_of_resources(
+    tmp_path: Path, resources: str, expected: ResourceLimits | None, problems: list[str]
+) -> None:
+    (spec,), found = loaded(tmp_path, f"{examples.SPEC}{resources}\n")
+    assert (spec.resources, found) == (expected, problems)
 
 
 def test_instances(tmp_path: Path) -> None:

@@ -85,7 +85,7 @@ def _growth_note(use: ServiceUse) -> str:
     left_s = (limit - use.peak_memory_bytes) / growth if growth and limit else SOON_S
     if left_s >= SOON_S or not growth:
         return ""
-    soon = "at once" if left_s < 1 else f"in {left_s:.0f} s" if left_s < _MINUTE_S else f"in {left_s / 60:.0f} min"
+    soon = "at once" if left_s < 1 else f"in {left_s:.0f} s" if left_s < 2 * _MINUTE_S else f"in {left_s / 60:.0f} min"
     return (
         f"the memory of application service '{use.service}' grows by {megabytes(growth)} in a second of test time, to "
         f"{megabytes(use.peak_memory_bytes)} so far: it would reach its limit of {megabytes(limit or 0)} {soon}"

@@ -100,13 +100,10 @@ def growth(points: Sequence[Point]) -> float | None:
     It is the median slope of all pairs of points (Theil and Sen), as single points may be anywhere. 0 where memory does
     not rise by LEAST_RISE, or not in each half of this half. None where there are too few points to tell.
     """
-    middle_s = (points[0][0] + points[-1][0]) / 2 if points else 0.0
-    found = [point for point in points if point[0] >= middle_s]
-    step = -(-len(found) // _MOST_POINTS) or 1
-    found = found[::-step][::-1]
-    slopes = [(b - a) / (end - begin) for (begin, a), (end, b) in itertools.combinations(found, 2) if end > begin]
-    if len(found) < _LEAST_POINTS or not slopes:
+    found = _second_half(points)
+    if len(found) < _LEAST_POINTS:
         return None
+    slopes = [(b - a) / (end - begin) for (begin, a), (end, b) in itertools.combinations(found, 2)]
     slope, rise = statistics.median(slopes), statistics.median(slopes) * (found[-1][0] - found[0][0])
     third = max(len(found) // 3, 1)
     sizes = [size for _, size in found]
@@ -114,3 +111,16 @@ def growth(points: Sequence[Point]) -> float | None:
     central = sizes[third:-third]
     rises = statistics.median_low(central) - low, high - statistics.median_high(central)
     return slope if rise >= LEAST_RISE and min(rises) >= _LEAST_SHARE * rise else 0.0
+
+
+def _second_half(points: Sequence[Point]) -> list[Point]:
+    """The last point of each of _MOST_POINTS parts of the time: where a test stands still, many are of one time."""
+    if not points or points[-1][0] <= points[0][0]:
+        return []
+    middle_s, end_s = (points[0][0] + points[-1][0]) / 2, points[-1][0]
+    parts = {
+        int(_MOST_POINTS * (at_s - middle_s) / (end_s - middle_s)): (at_s, size)
+        for at_s, size in points
+        if at_s >= middle_s
+    }
+    return list(parts.values())

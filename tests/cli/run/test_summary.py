@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dodo_dsl.cli.display.verbosity import Verbosity
 from dodo_dsl.cli.run import summary
-from dodo_dsl.outcome import NotRun
+from dodo_dsl.outcome import NotRun, ServiceUse
 from tests.report.test_report_folder import OUTCOME
 
 PASSED = replace(OUTCOME, name="ok", slug="ok", outcome="passed", reason="reached it", setup_s=1.0, execution_s=2.25)
@@ -46,14 +46,17 @@ def test_quiet_names_only_what_did_not_pass() -> None:
     assert stream.getvalue() == "FAILED  test  hit wall\n1 passed, 1 failed, 0 in error\n"
 
 
-def test_verbose_shows_checks_and_what_services_complained_of(tmp_path: Path) -> None:
+def test_verbose_shows_checks_use_and_what_services_complained_of(tmp_path: Path) -> None:
     (tmp_path / "application.steering.log").write_text("frame 0\nwarning: late\x07\nTraceback\n  File x\n")
     (tmp_path / "evaluation.track.log").write_text('{"dodo": "ready"}\n' + "error: no map\n" * 22)
     passed = replace(PASSED, checks=({"name": "gap", "value": 0.5, "limit": {"min": 0.1}, "unit": "m", "ok": True},))
+    passed = replace(passed, resources=(ServiceUse("steering", 1.5, 0.25, 150_000_000, 5e6, None),))
     stream = StringIO()
     summary.write(stream, [passed], {"ok": "ok"}, [], Verbosity.VERBOSE, {"ok": tmp_path})
-    assert stream.getvalue().splitlines()[2:8] == [
+    used = "1.50 s of processor time (25 % of a processor), up to 150 MB of memory, growing by 300 MB/min"
+    assert stream.getvalue().splitlines()[2:9] == [
         "        ok   gap: 0.5 m (at least 0.1 m)",
+        f"        steering: {used}",
         "        steering: warning: late�",
         "        steering: Traceback",
         "        steering:   File x",

@@ -38,6 +38,12 @@ def test_growth(sizes: list[float], expected: float) -> None:
     assert found == (pytest.approx(expected) if isinstance(expected, float) else expected)
 
 
+def test_a_test_that_stands_still_counts_by_its_time() -> None:
+    """As in lockstep, where the last answer does not come for two seconds."""
+    drive = [(0.1 * n, 100 * MB + n * 20 * MB) for n in range(11)]
+    assert growth([*[(0.0, MB)] * 50, *drive, *[drive[-1]] * 200]) == pytest.approx(200 * MB)
+
+
 @pytest.mark.parametrize("count", [0, 1, 2, 3])
 def test_too_short_to_tell(count: int) -> None:
     assert growth([(float(n), n * 50 * MB) for n in range(count)]) is None
