@@ -10,8 +10,9 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         that it must not see, "confined" the application's confinement or null;
                         {"do": "close"}; {"do": "probe"}; {"do": "send", "cid", "data"}; {"do": "load"};
                         {"do": "listeners"}; {"do": "keep"} with the descriptors of outputs and logs
-    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or {"unstartable": id, "why"};
-                        {"exited": id, "code", "used", "failed"}; {"load": snapshot or null};
+    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
+                        {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
+                        {"load": snapshot or null};
                         {"listeners": names of what listens on a bus, or null};
                         {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
                         ``confined.missing`` has it}
