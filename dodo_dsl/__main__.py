@@ -40,7 +40,7 @@ def _start_again_in_utf8() -> None:
     Whatever the locale, names of files are bytes, and specs, messages and reports are UTF-8.
     """
     words = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
-    os.execve(sys.executable, words, {**os.environ, "PYTHONUTF8": "1"})
+    os.execve(sys.executable, words, {**os.environ, "PYTHONUTF8": "1"})  # noqa: S606  (the same program)
 
 
 def _refuse_closed() -> int:

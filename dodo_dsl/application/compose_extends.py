@@ -76,5 +76,5 @@ def moved(service: Node, folder: Path, to: Path) -> Node:
     """A service of one folder with its paths as seen from another."""
     if not isinstance(service, source.Mapping) or folder == to:
         return service
-    base = Path(os.path.relpath(folder, to)).as_posix()
+    base = compose_paths.escaped(Path(os.path.relpath(folder, to)).as_posix())
     return compose_paths.mapped_service(service, lambda path: compose_paths.rebased(path, base))

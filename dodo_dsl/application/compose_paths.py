@@ -4,9 +4,11 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import interpolation
+from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Entry, Node, Scalar
 
 Change = Callable[[str], str]
@@ -18,7 +20,7 @@ _REMOTE = ("/", "~", "git@", "github.com/", "service:", "target:")
 
 
 def rebased(path: str, base: str) -> str:
-    """A path as seen from another folder, from which ``base`` is the path's own folder.
+    """A path as seen from another folder, from which ``base``, as it is ``escaped`` there, is the path's own folder.
 
     Absolute paths, URLs and variables stay; ``${PWD}`` is the compose file's folder, where compose is started, and a
     variable's default is a path too.
@@ -31,6 +33,29 @@ def rebased(path: str, base: str) -> str:
     joined = f"{base}/{path.removeprefix('./')}"
     joined = joined if "$" in joined else os.path.normpath(joined)
     return joined if joined.startswith((".", "/")) else f"./{joined}"
+
+
+def escaped(text: str) -> str:
+    """A path as a compose file has it, in which a dollar sign alone begins a variable."""
+    return text.replace("$", "$$")
+
+
+def escaped_values(value: Any) -> Any:
+    """Values of JSON with all their texts escaped."""
+    return _texts(value, escaped)
+
+
+def unescaped(value: Any) -> Any:
+    """What ``docker compose config`` shows, which escapes all texts, as they are."""
+    return _texts(value, lambda text: text.replace("$$", "$"))
+
+
+def _texts(value: Any, change: Change) -> Any:
+    if isinstance(value, dict):
+        return {key: _texts(each, change) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_texts(each, change) for each in value]
+    return change(value) if isinstance(value, str) else value
 
 
 def _as_relative(path: str) -> str:
@@ -117,11 +142,40 @@ def _volume(node: Node, change: Change) -> Node:
         is_bind = bind and isinstance(kind, Scalar) and kind.value == "bind"
         return _mapped(node, {"source": _scalar}, change) if is_bind else node
 
-    def before_colon(text: str) -> str:
-        origin, *others = interpolation.split_outside(text, ":")
-        return ":".join([change(origin), *others]) if others and is_path(origin) else text
+    if not isinstance(node, Scalar) or not isinstance(node.value, str):
+        return node
+    origin, *others = interpolation.split_outside(node.value, ":")
+    if not others or not is_path(origin):
+        return node
+    changed = change(origin)
+    if len(interpolation.split_outside(changed, ":")) > 1:
+        return _long_volume(node.span, changed, *others)
+    return _scalar(node, lambda _: ":".join([changed, *others]))
 
-    return _scalar(node, before_colon)
+
+_BIND_OPTIONS = {
+    **dict.fromkeys(("z", "Z"), "selinux"),
+    **dict.fromkeys(("shared", "rshared", "slave", "rslave", "private", "rprivate"), "propagation"),
+}
+
+
+def _long_volume(span: Span, origin: str, target: str, options: str = "") -> source.Mapping:
+    """A mount whose origin has a colon, which the short form cannot say; the folder must be there."""
+    words = options.split(",")
+    bind: dict[str, source.Plain] = {"create_host_path": False}
+    for word in words:
+        if key := _BIND_OPTIONS.get(word):
+            bind[key] = word
+    mount: dict[str, source.Plain] = {"type": "bind", "source": origin, "target": target, "read_only": "ro" in words}
+    return _mapping(span, {**_scalars(span, mount), "bind": _mapping(span, _scalars(span, bind))})
+
+
+def _mapping(span: Span, nodes: Mapping[str, Node]) -> source.Mapping:
+    return source.Mapping(span, {key: Entry(span, node) for key, node in nodes.items()})
+
+
+def _scalars(span: Span, values: Mapping[str, source.Plain]) -> dict[str, Node]:
+    return {key: Scalar(span, value, str(value)) for key, value in values.items()}
 
 
 def _security(node: Node, change: Change) -> Node:

@@ -81,7 +81,7 @@ def _included(
 def _joined(
     files: ComposeFiles, document: source.Mapping, part: source.Mapping, project: Path, folder: Path
 ) -> source.Mapping:
-    base = Path(os.path.relpath(project, folder)).as_posix()
+    base = compose_paths.escaped(Path(os.path.relpath(project, folder)).as_posix())
     named = {key: entry.value for key, entry in part.entries.items() if key in _NAMED}
     for key, node in compose_paths.mapped_rest(named, lambda path: compose_paths.rebased(path, base)).items():
         mine = document.get(key)

@@ -1,13 +1,23 @@
 """A planned service as a container: command, volumes and what it waits for."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, PlannedService
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
+FILES_MOUNT: Mapping[str, Any] = {
+    "type": "bind",
+    "source": "./files",
+    "target": FILES,
+    "read_only": True,
+    "bind": {"create_host_path": False},
+}
+"""In the long form, as the folder above may have a colon in its name."""
 _TRIES_A_SECOND = 2
 
 
@@ -21,7 +31,7 @@ class Container:
     name: str
     image: str
     command: tuple[str, ...]
-    volumes: tuple[str, ...]
+    volumes: tuple[str | Mapping[str, Any], ...]
     ready_file: str
     ready_tries: int
     after: tuple[tuple[str, str], ...]
@@ -67,11 +77,11 @@ def _environment(plan: Plan, service: PlannedService) -> tuple[tuple[str, str], 
     return tuple((name, value) for name, value in own.items() if value)
 
 
-def _volumes(plan: Plan, service: PlannedService) -> tuple[str, ...]:
+def _volumes(plan: Plan, service: PlannedService) -> tuple[str | Mapping[str, Any], ...]:
     kinds = {flag.kind for flag in service.flags}
-    volumes = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
+    volumes: list[str | Mapping[str, Any]] = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
     if "path" in kinds or plan.messages:
-        volumes.append(f"./files:{FILES}:ro")
+        volumes.append(FILES_MOUNT)
     if "report" in kinds:
         volumes.append(f"report:{REPORT}")
     return tuple(volumes)

@@ -5,6 +5,7 @@ import errno
 import filecmp
 import json
 import shutil
+import stat
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -67,10 +68,10 @@ def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[
     with atomic.new_folder(folder) as stage:
         for name, text in files:
             (stage / name).write_text(text, encoding="utf-8")
-        for parent in sorted({(stage / FILES / copy.target).parent for copy in copies}):
-            parent.mkdir(parents=True, exist_ok=True)
         for copy in copies:
+            (stage / FILES / copy.target).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(copy.source, stage / FILES / copy.target)
+        _open_to_containers(stage / FILES)
 
 
 def _write_copies(folder: Path, wanted: Sequence[FileCopy]) -> None:
@@ -81,6 +82,16 @@ def _write_copies(folder: Path, wanted: Sequence[FileCopy]) -> None:
                 shutil.copyfile(copy.source, part)
     for path in _surplus(folder, wanted):
         path.unlink()
+    _open_to_containers(folder)
+
+
+def _open_to_containers(folder: Path) -> None:
+    """Everybody may read the files, whatever the umask, as users of containers must; the folder above may be closed."""
+    for path in (folder, *folder.rglob("*")) if folder.is_dir() else ():
+        more = 0o555 if path.is_dir() else 0o444
+        mode = path.stat().st_mode
+        if mode & more != more:
+            path.chmod(stat.S_IMODE(mode) | more)
 
 
 def _surplus(folder: Path, wanted: Sequence[FileCopy]) -> Iterator[Path]:

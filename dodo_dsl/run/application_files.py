@@ -16,7 +16,7 @@ def application_paths(application: Application, folder: Path) -> HostPaths:
     """Its repository and what the deployment allows; ``folder`` is the compiled test's."""
     own = (folder / application.folder).resolve()
     roots = (*repository(own), *((folder / root).resolve() for root in application.access.roots))
-    return HostPaths(own, roots, tuple(map(Path, application.access.paths)))
+    return HostPaths(own, roots, tuple(map(Path, application.access.paths)), literal=True)
 
 
 def secrets_of(application: Application, folder: Path, outside: Mapping[str, str]) -> dict[str, str]:

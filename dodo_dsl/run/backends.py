@@ -94,12 +94,12 @@ class Processes:
             note(f"removed what a killed run left: {left}")
         wanted = {self._isolation or plan.isolation for plan in plans}
         self._start_fork_server(plans if "network" in wanted else ())
-        if self._isolation is None and "network" in wanted:
-            if refusal := await asyncio.to_thread(host_isolation.isolation_refusal, self._fork_server):
-                remedy = f"{refusal.remedy}, or trust" if refusal.remedy else "trust"
-                way_out = f"{remedy} the application and run with --isolation host"
-                self._problem = f"the application cannot be isolated on this machine: {refusal}; {way_out}"
-                return
+        is_needed = self._isolation is None and "network" in wanted
+        if is_needed and (refusal := await asyncio.to_thread(host_isolation.isolation_refusal, self._fork_server)):
+            remedy = f"{refusal.remedy}, or trust" if refusal.remedy else "trust"
+            way_out = f"{remedy} the application and run with --isolation host"
+            self._problem = f"the application cannot be isolated on this machine: {refusal}; {way_out}"
+            return
         if "host" in wanted or any(is_real(plan) for plan in plans):
             why = await asyncio.to_thread(host_isolation.process_namespace_refusal)
             self._is_apart = not why

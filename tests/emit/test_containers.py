@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.emit.containers import containers
+from dodo_dsl.emit.containers import FILES_MOUNT, containers
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from tests.run.helpers import Bench
 
@@ -29,7 +29,7 @@ def plan(tmp_path: Path) -> Plan:
 def test_paths_and_dollars_of_a_command(plan: Plan) -> None:
     (camera,) = containers(plan, "environment")
     assert camera.command == ("--map=/dodo/files/a/$$b.json", "--rec=/dodo/report/x.rec", "--cid=130")
-    assert camera.volumes == ("tmp:/tmp", "./files:/dodo/files:ro", "report:/dodo/report")
+    assert camera.volumes == ("tmp:/tmp", FILES_MOUNT, "report:/dodo/report")
     assert (camera.ready_file, camera.ready_tries) == ("/tmp/dodo-ready-camera", 125)
 
 
@@ -54,7 +54,7 @@ def test_environment_has_what_has_a_value(plan: Plan) -> None:
         "DODO_ODVD": "/dodo/files/a.odvd:/dodo/files/b.odvd",
         "DODO_RIG": "desk",
     }
-    assert "./files:/dodo/files:ro" in vehicle.volumes, "the messages are there"
+    assert FILES_MOUNT in vehicle.volumes, "the messages are there"
 
 
 def test_only_the_service_that_moves_the_rig_may_open_terminals(plan: Plan) -> None:

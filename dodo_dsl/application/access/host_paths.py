@@ -28,11 +28,15 @@ def repository(folder: Path) -> tuple[Path, ...]:
 
 @dataclass(frozen=True)
 class HostPaths:
-    """Judges paths that are relative to ``folder``; ``roots`` and ``allowed`` hold what may be used as it is."""
+    """Judges paths that are relative to ``folder``; ``roots`` and ``allowed`` hold what may be used as it is.
+
+    A path with a variable is judged when that is filled in: then paths are ``literal``, and a dollar sign is one.
+    """
 
     folder: Path
     roots: tuple[Path, ...]
     allowed: tuple[Path, ...] = ()
+    literal: bool = False
 
     def whole(self, text: str) -> str:
         """A path as the engine would see it, without ``..``; symbolic links stay."""
@@ -44,15 +48,18 @@ class HostPaths:
         path = self.whole(text)
         return _below(path, places) and _below(_real(path), [Path(_real(p)) for p in places])
 
+    def _is_open(self, text: str) -> bool:
+        return "$" in text and not self.literal
+
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
-        if "$" in text or self.is_own(text):
+        if self._is_open(text) or self.is_own(text):
             return ""
         return f"'{written or text}' {self._where(text)}"
 
     def mount_problem(self, text: str, read_only: bool) -> tuple[str, str]:
         """Why a path may not be mounted, and what to do; empty when it may."""
-        if "$" in text or self.is_own(text):
+        if self._is_open(text) or self.is_own(text):
             return "", ""
         path = _real(self.whole(text))
         is_tmp = text.startswith("/") and _below(path, [Path(_TMP)])

@@ -96,7 +96,7 @@ def _options(name: str, options: dict[str, Any], paths: HostPaths) -> Iterator[A
 
 
 def _bind_problem(device: str, read_only: bool, paths: HostPaths) -> tuple[str, str]:
-    if "$" in device:
+    if "$" in device and not paths.literal:
         return "", ""
     seen = host_access.Mount(paths.whole(device), "", read_only)
     if host_access.is_machine(seen) or host_access.is_hardware(seen) or host_access.is_of_machine(seen.source):

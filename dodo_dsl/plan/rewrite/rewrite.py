@@ -54,6 +54,7 @@ def plan_application(
     """
     application = with_variables(application, given)
     base = _relative(application.folder, folder)
+    written = compose_paths.escaped(base)
     names = frozenset(application.services)
     containers, known, ports = application.containers, application.known, application.access.ports
     setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits, ports)
@@ -63,7 +64,7 @@ def plan_application(
 
     def change(path: str) -> str:
         path_variables.update(interpolation.names(path) if path.startswith("$") else ())
-        return compose_paths.rebased(path, base)
+        return compose_paths.rebased(path, written)
 
     services = {
         name: _copied(service, compose_paths.mapped_service(service.node, change), setting, changes)

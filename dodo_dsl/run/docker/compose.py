@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import advice, atomic
+from dodo_dsl.application import compose_paths
 from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
 from dodo_dsl.application.access.model import AccessFinding
@@ -63,7 +64,7 @@ class Compose:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
         if code:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
-        config = json.loads(out)
+        config = compose_paths.unescaped(json.loads(out))
         self._refuse(compiled_findings(config, self._test))
         self._take(config)
 
@@ -159,7 +160,7 @@ class Compose:
                 for service in self.plan.services
                 if service.name in self.services
             }
-            given.update(self._masks())
+            given.update(compose_paths.escaped_values(self._masks()))
             keys.write_text(json.dumps({"services": given}), encoding="utf-8")
             files = os.pathsep.join([*self._files(Path(folder)), str(keys)])
             for subnet in subnets:

@@ -8,8 +8,9 @@ from typing import Any
 
 def masks(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> list[dict[str, Any]]:
     """The mounts that hide them, as ``docker compose config`` shows the service and the file's ``volumes``."""
-    targets = dict.fromkeys(_targets(service, volumes, hidden))
-    return [{"type": "tmpfs", "target": target, "read_only": True} for target in targets]
+    targets = list(dict.fromkeys(map(Path, _targets(service, volumes, hidden))))
+    outer = [target for target in targets if not any(parent in targets for parent in target.parents)]
+    return [{"type": "tmpfs", "target": str(target), "read_only": True} for target in outer]
 
 
 def _targets(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> Iterator[str]:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.application import compose_paths
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.mixed.holder import holder
@@ -27,8 +28,10 @@ class ApplicationCompose(Compose):
             network = config["networks"]["default"]
             planned = network["ipam"]["config"][0]["subnet"]
             subnet = {"config": [{"subnet": f"${{DODO_SUBNET:-{planned}}}"}]}
-            own["networks"] = {"default": {"driver_opts": network.get("driver_opts") or {}, "ipam": subnet}}
-            own["volumes"] = {_TMP: {"driver_opts": self._volumes[_TMP].get("driver_opts") or {}}}
+            options = compose_paths.escaped_values(network.get("driver_opts") or {})
+            own["networks"] = {"default": {"driver_opts": options, "ipam": subnet}}
+            options = compose_paths.escaped_values(self._volumes[_TMP].get("driver_opts") or {})
+            own["volumes"] = {_TMP: {"driver_opts": options}}
             self.services[SANDBOX] = own["services"][SANDBOX]
         self._replacing = replacing(self.services, names, own)
 

@@ -78,9 +78,9 @@ def unshare() -> None:
 
 
 def refusal() -> str:
-    """Why the kernel refuses this process further namespaces with mounts of their own, in a child; empty when it allows.
+    """Why the kernel refuses this process further namespaces with mounts of their own; empty when it allows them.
 
-    As bubblewrap makes them: without root within a user namespace.
+    A child tries it as bubblewrap would: without root within a user namespace.
     """
     reader, writer = os.pipe()
     child = os.fork()

@@ -11,8 +11,9 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         {"do": "close"}; {"do": "probe"}; {"do": "send", "cid", "data"}; {"do": "load"};
                         {"do": "listeners"}; {"do": "use", "names": [service, ...]};
                         {"do": "keep"} with the descriptors of outputs and logs
-    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or {"unstartable": id, "why"};
-                        {"exited": id, "code", "used", "failed"}; {"load": snapshot or null};
+    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
+                        {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
+                        {"load": snapshot or null};
                         {"listeners": names of what listens on a bus, or null};
                         {"use": {service: [seconds on processors, bytes of memory]} or null};
                         {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as

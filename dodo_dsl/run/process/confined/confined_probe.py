@@ -1,4 +1,4 @@
-"""Whether an application can be confined on this machine, and where it cannot, whether the machine lacks what that takes."""
+"""Whether an application can be confined on this machine, and if not, whether the machine lacks what that takes."""
 
 import os
 import shutil

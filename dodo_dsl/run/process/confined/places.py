@@ -1,4 +1,4 @@
-"""What a sandbox prepares once for the application: its ``/tmp``, a home, its folder with writes apart, and what it reads.
+"""What a sandbox prepares once for the application: ``/tmp``, a home, its folder with writes apart, what it reads.
 
 The user's umask decides about none of these folders: the application's user must enter them.
 """
