@@ -51,7 +51,7 @@ DEBUG = "DODO_DEBUG"
 
 _EXAMPLES = """examples:
   dodo list                          the tests of the deployment
-  dodo compile --check               every problem of every test; writes nothing
+  dodo compile --check               the problems of all tests; writes nothing
   dodo run sil-closed-straight       run one test and judge the application
   dodo run --level sil -j 2          all simulations, two at a time
 

@@ -16,7 +16,7 @@ from dodo_dsl.report.viewer.encoded import packed, script, shown
 from dodo_dsl.report.viewer.names import BEFORE, DATA, LOGS, PAGE, SHARED
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
 
-VERSION = 1
+VERSION = 2
 _OF_BEFORE = f'<script defer src="{BEFORE}"></script>\n'
 
 
