@@ -1,6 +1,8 @@
 """A planned service as a container: command, volumes and what it waits for."""
 
 import math
+import shlex
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
@@ -51,6 +53,12 @@ def containers(plan: Plan, layer: str) -> list[Container]:
         )
         for service in plan.layer(layer)
     ]
+
+
+def copy_command(volumes: Iterable[str]) -> str:
+    """What the service does that copies files of the repository: links stay links, and nothing follows them."""
+    copies = [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in volumes]
+    return " && ".join([*copies, "touch /run/copied", "exec sleep infinity"])
 
 
 def _word(flag: Flag) -> str:

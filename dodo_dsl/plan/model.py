@@ -70,7 +70,8 @@ class Application:
 
     ``variables`` are those of its ``.env``, as compose interpolates them. ``hidden`` are folders of tests within its
     own, relative to it. ``secrets`` are other variables, each with the file that sets it, relative to the compiled
-    test's folder as the roots of ``access`` are.
+    test's folder as the roots of ``access`` are. ``copies`` are volumes of the test, each with the folder of the
+    repository that is copied into it before the application starts.
     """
 
     folder: str
@@ -82,6 +83,7 @@ class Application:
     hidden: tuple[str, ...] = ()
     secrets: dict[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
+    copies: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,13 @@ def written(attack: dict[str, Any], folder: Path) -> Path:
     (repository / ".env").write_text(attack.get("env", ""))
     for name, target in attack.get("links", {}).items():
         (repository / name).symlink_to(target)
+    for name, text in attack.get("files", {}).items():
+        (repository / name).parent.mkdir(exist_ok=True)
+        (repository / name).write_text(text)
     service = {"image": "team/driver", "command": "--cid=111", **attack.get("service", {})}
     file = repository / "docker-compose.yml"
-    file.write_text(yaml.safe_dump({"services": {"driver": service}, **attack.get("file", {})}))
+    text = yaml.safe_dump({"services": {"driver": service}, **attack.get("file", {})})
+    file.write_text(text.replace("{repo}", str(repository)))
     return file
 
 
@@ -60,6 +64,8 @@ def test_what_is_refused(attack: dict[str, Any], tmp_path: Path) -> None:
     assert {problem.rule for problem in errors} <= {"application-isolation", "unknown-key"}
     for problem in errors:
         assert Path(problem.span.file).name == "docker-compose.yml"
+        assert problem.span.line and problem.span.column
+        assert "links" not in attack or "symbolic link" in problem.message
         assert problem.hint or problem.rule == "application-isolation"
 
 
@@ -109,7 +115,7 @@ def test_what_is_stopped_at_run_time(attack: dict[str, Any], tmp_path: Path, mon
         path.write_text(file.text)
     folder, report = tmp_path / "generated" / "t", tmp_path / "report"
     for name, value in attack["set"].items():
-        monkeypatch.setenv(name, value)
+        monkeypatch.setenv(name, value.replace("{repo}", str(tmp_path / "team")))
     with pytest.raises(BackendError, match="the application may not have ") as refused:
         asyncio.run(Compose(plan(application), folder, report, "dodo-t", print).read())
     assert str(refused.value).startswith(f"the application may not have {attack['says']}: "), refused.value

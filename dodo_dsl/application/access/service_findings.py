@@ -42,10 +42,10 @@ def service_findings(name: str, service: dict[str, Any], around: Surroundings) -
     """Everything that ``service`` may not have; ``name`` is how messages call it."""
     yield from key_findings(f"'{name}'", _WITHOUT_SPECIAL, service, around.compiled)
     yield from _namespaces(service, around)
-    yield from mount_findings(name, service, around.paths, around.volumes, around.ports)
+    yield from mount_findings(name, service, around.paths, around.volumes, around.ports, around.compiled)
     yield from _strangers(service, around)
     yield from _files(service, around.paths)
-    yield from _hardware(name, service, around.ports)
+    yield from _hardware(name, service, around)
     yield from limit_findings(name, service, around.limits, around.compiled)
     yield from _confinement(name, service)
     yield from _hooks(name, service)
@@ -94,20 +94,25 @@ def _files(service: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]
             yield AccessFinding(steps, problem, ASK)
 
 
-def _hardware(name: str, service: dict[str, Any], ports: tuple[str, ...]) -> Iterator[AccessFinding]:
+def _hardware(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
     if host_access.is_true(service.get("privileged", False)):
         yield AccessFinding(("privileged",), f"'privileged' of '{name}' {_WITHOUT}", kind="privilege")
-    yield from _devices(name, service, ports)
+    yield from _devices(name, service, around)
     for item, word in enumerate(_items(service.get("cap_add"))):
         if not host_access.is_harmless_capability(word):
             yield AccessFinding(("cap_add", item), f"capability '{word}' of '{name}' {_WITHOUT}", kind="privilege")
 
 
-def _devices(name: str, service: dict[str, Any], ports: tuple[str, ...]) -> Iterator[AccessFinding]:
+def _devices(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
+    ports = around.ports
     for item, word in enumerate(_items(service.get("devices"))):
         shown = word.get("source") if isinstance(word, dict) else word
         steps = ("devices", item, "source") if isinstance(word, dict) else ("devices", item)
-        if host_access.is_of_machine(shown):
+        source = rig_ports.source(word)
+        if link := around.paths.link(source):
+            message = f"device '{shown}' is a symbolic link to '{link}', outside the repository"
+            yield AccessFinding(steps, message, "name the device itself")
+        elif host_access.is_of_machine(shown) or any(map(host_access.is_of_machine, around.paths.names(source))):
             message = f"device '{shown}' gives access to the host's disks or memory"
             yield AccessFinding(steps, message, "remove it")
         elif rig_ports.holds_port(rig_ports.source(word), ports):

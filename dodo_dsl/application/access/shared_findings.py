@@ -8,7 +8,7 @@ from typing import Any
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compose_keys import CONFIG, NETWORK, SECRET, TOP, VOLUME, Rows
-from dodo_dsl.application.access.host_paths import ASK, HostPaths
+from dodo_dsl.application.access.host_paths import ASK, INSIDE, HostPaths
 from dodo_dsl.application.access.model import AccessFinding, key_findings
 
 OWN_VOLUMES = ("tmp", "report")
@@ -86,7 +86,7 @@ def _options(name: str, options: dict[str, Any], paths: HostPaths) -> Iterator[A
     if {"bind", "rbind"} & set(words):
         if not all(_BIND_OPTIONS.fullmatch(word) for word in words):
             yield AccessFinding(("o",), f"'{flags}' of the volume '{name}' has other options than bind, ro and rw")
-        problem, hint = _bind_problem(device, "ro" in words, paths)
+        problem, hint = _bind_problem(device, paths)
         if problem:
             yield AccessFinding(("device",), problem, hint)
     elif kind != "tmpfs" or not all(_TMPFS_OPTIONS.fullmatch(word) for word in words):
@@ -95,10 +95,13 @@ def _options(name: str, options: dict[str, Any], paths: HostPaths) -> Iterator[A
         yield AccessFinding(("type",) if kind else ("o",) if flags else (), message, hint)
 
 
-def _bind_problem(device: str, read_only: bool, paths: HostPaths) -> tuple[str, str]:
+def _bind_problem(device: str, paths: HostPaths) -> tuple[str, str]:
     if "$" in device:
         return "", ""
-    seen = host_access.Mount(paths.whole(device), "", read_only)
-    if host_access.is_machine(seen) or host_access.is_hardware(seen) or host_access.is_of_machine(seen.source):
-        return f"'{device}' belongs to the host, so tests would share it", "mount a folder of the repository"
-    return paths.mount_problem(device, read_only)
+    if link := paths.link(device):
+        return f"'{device}' is a symbolic link to '{link}', outside the repository", INSIDE
+    for name in paths.names(device):
+        seen = host_access.Mount(name, "", read_only=False)
+        if host_access.is_machine(seen) or host_access.is_hardware(seen) or host_access.is_of_machine(name):
+            return f"'{device}' belongs to the host, so tests would share it", "mount a folder of the repository"
+    return paths.mount_problem(device)

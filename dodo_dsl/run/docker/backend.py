@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.bus import announce_begin
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
@@ -28,6 +28,9 @@ _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
 _MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
 """How often, and how long each time, the engine's word is awaited that it was for memory: it may come late."""
+
+_COPY_S = 600.0
+"""The longest that copies of the repository's files may take."""
 
 
 class DockerBackend:
@@ -65,6 +68,7 @@ class DockerBackend:
         self._outputs: dict[str, ServiceOutput] = {}
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
+        self._copied, self._copy_problem = asyncio.Event(), ""
         self.left_behind = False
 
     async def open(self) -> None:
@@ -80,8 +84,9 @@ class DockerBackend:
             self._containers = await asyncio.to_thread(self._find_containers)
             self._processes = ContainerProcesses(self._containers)
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
-            if SANDBOX in self._containers:
-                await asyncio.to_thread(self._containers[SANDBOX].start)
+            for name in (SANDBOX, FILES):
+                if name in self._containers:
+                    await asyncio.to_thread(self._containers[name].start)
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
@@ -92,6 +97,8 @@ class DockerBackend:
     def _take(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
         if action == "oom":
             self._out_of_memory.add(name)
+        elif name == FILES:
+            self._take_of_copies(action)
         elif action == "health_status: healthy":
             self._events.put_nowait(Ready(name))
         elif action == "die" and name in self._outputs:
@@ -99,6 +106,39 @@ class DockerBackend:
             task.add_done_callback(lambda t: t.exception())
         elif action == "die":
             self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+
+    def _take_of_copies(self, action: str) -> None:
+        if action == "health_status: healthy":
+            self._copied.set()
+        elif action == "die" and not self._copied.is_set():
+            task = asyncio.ensure_future(self._not_copied())
+            task.add_done_callback(lambda t: t.exception())
+
+    async def _not_copied(self) -> None:
+        from docker.errors import DockerException
+
+        said = b""
+        with contextlib.suppress(DockerException, OSError):
+            said = await asyncio.to_thread(self._containers[FILES].logs, tail=1)
+        why = said.decode("utf-8", "replace").strip() or "the program that copies them ended"
+        self._copy_problem = f"the application's files cannot be copied: {why}"
+        self._copied.set()
+
+    async def _wait_for_copies(self) -> None:
+        """Until the application has its own copies of the repository's files; raises BackendError."""
+        from docker.errors import DockerException
+
+        if FILES not in self._containers:
+            return
+        try:
+            await asyncio.wait_for(self._copied.wait(), _COPY_S)
+        except TimeoutError:
+            hint = "mount large folders read-only (:ro)"
+            raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}") from None
+        if self._copy_problem:
+            raise BackendError(self._copy_problem)
+        with contextlib.suppress(DockerException, OSError):
+            await asyncio.to_thread(self._containers[FILES].kill)
 
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
@@ -126,6 +166,7 @@ class DockerBackend:
         names = [s.name for s in self.plan.layer(layer)]
         if layer == "application":
             names = [s.name for s in self.plan.application.services if s.name in self._containers]
+            await self._wait_for_copies()
         evaluators = {s.name for s in self.plan.services if s.judge}
         for name in names:
             self._outputs[name] = ServiceOutput(

@@ -15,7 +15,7 @@ from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
 from dodo_dsl.application.access.model import AccessFinding
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
@@ -48,7 +48,7 @@ class Compose:
         self._volumes: dict[str, Any] = {}
         self._images: dict[str, str] = {}
         self._say = say
-        self._paths = application_paths(plan.application, folder)
+        self._paths = replace(application_paths(plan.application, folder), tmp=plan.isolation == "host")
         outside = secret_variables.visible(os.environ, plan.application.access.passed)
         self._outside = {**secrets_of(plan.application, folder, outside), **outside}
 
@@ -178,7 +178,8 @@ class Compose:
     def _masks(self) -> dict[str, Any]:
         """What hides the tests from the application's services."""
         hidden = hidden_folders(self.plan.application, self.folder, self.report)
-        names = [service.name for service in self.plan.application.services if service.name in self.services]
+        every = (*(service.name for service in self.plan.application.services), FILES)
+        names = [name for name in every if name in self.services]
         found = {name: masks(self.services[name], self._volumes, hidden) for name in names}
         return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}
 

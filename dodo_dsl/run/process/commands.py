@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate
+from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate, own_dotenv
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
@@ -87,7 +87,7 @@ class Commands:
         inherited = application_environment(passed)
         outside = {**own_environment(passed), **inherited}
         cids = {name: str(self.slot.cid) for name in CID_VARIABLES}
-        variables = {**dotenv_file(folder / ".env", outside), **outside}
+        variables = {**own_dotenv(folder, outside), **outside}
         variables.update({name: cid for name, cid in cids.items() if name in self.plan.application.variables})
         own: dict[str, str] = {}
         paths = application_paths(self.plan.application, self.folder)
