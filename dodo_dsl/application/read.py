@@ -69,8 +69,10 @@ def read_application(
     found.extend(tunable_problems(application))
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
     refused = {problem.span for problem in found}
-    withheld = secret_problems.withheld(nodes, files.variables, access.passed)
+    withheld = secret_problems.withheld(nodes, files.variables, access.passed, os.environ)
     found.extend(problem for problem in withheld if problem.span not in refused)
+    found.extend(secret_problems.written(nodes))
+    found.extend(secret_problems.in_files(_own_files(application)))
     found.extend(secret_problems.left_out(files.secrets))
     return (None if has_errors(found) else application), found
 
@@ -120,6 +122,14 @@ def _shared(document: source.Mapping, application: ApplicationSource) -> Iterato
     cut = volume_findings(raw.get("volumes") or {}, application.limits, compiled=False)
     for finding in (*shared_findings(raw, application.paths, application.access.passed), *cut):
         yield diagnostic(finding, document, document.span)
+
+
+def _own_files(application: ApplicationSource) -> list[Path]:
+    """The files of ``env_file`` that the application may read, each once."""
+    words = {file.path for service in application.services.values() for file in service.env_files}
+    texts = sorted(filled.text(word, application.known) for word in words)
+    own = (text for text in texts if "$" not in text and application.paths.is_own(text))
+    return list(dict.fromkeys(Path(application.paths.whole(text)) for text in own))
 
 
 def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:

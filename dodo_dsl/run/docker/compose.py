@@ -49,7 +49,7 @@ class Compose:
         self._images: dict[str, str] = {}
         self._say = say
         self._paths = replace(application_paths(plan.application, folder), tmp=plan.isolation == "host")
-        outside = secret_variables.visible(os.environ, plan.application.access.passed)
+        outside = secret_variables.allowed(os.environ, plan.application.access.passed)
         self._outside = {**secrets_of(plan.application, folder, outside), **outside}
 
     async def read(self) -> None:
@@ -187,11 +187,10 @@ class Compose:
         self, *words: str, subnet: str = "", log: Path | None = None, project: str = "", files: str = ""
     ) -> tuple[int, str, str]:
         """Exit code, standard output and the last line of standard error of a compose command."""
-        environment = {**self._outside, **self._images, "COMPOSE_PROGRESS": "plain"}
-        environment["COMPOSE_PROJECT_NAME"] = project or self.project
+        own = {"COMPOSE_PROGRESS": "plain", "COMPOSE_PROJECT_NAME": project or self.project, RUNNER_VARIABLE: "dodo"}
+        environment = {**secret_variables.of_client(os.environ), **self._outside, **self._images, **own}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
             environment.pop(name, None)  # the test's own .env sets them
-        environment[RUNNER_VARIABLE] = "dodo"
         if files:
             environment["COMPOSE_FILE"] = files
         if subnet:
