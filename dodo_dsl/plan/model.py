@@ -120,7 +120,7 @@ class Pooled:
 
 @dataclass(frozen=True)
 class Plan:
-    """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation.
+    """One instance of a test. Times in seconds, ``subnet`` an IPv4 network or empty under host isolation.
 
     ``lockstep`` is None in real time, ``rig`` empty below level hil; ``more_tags`` are those of the rig's runner beside
     ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,

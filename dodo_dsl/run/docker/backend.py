@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import ipaddress
 import os
 import signal
 import threading
@@ -258,6 +259,13 @@ class DockerBackend:
 
 
 def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
-    """The planned subnet, then the rest of the deployment's."""
+    """The planned subnet, then the rest of the deployment's of the same size."""
     yield first
-    yield from (subnet for subnet in all_subnets if subnet != first)
+    length = int(first.partition("/")[2]) if first else 32
+    seen = {first}
+    for text in all_subnets:
+        network = ipaddress.IPv4Network(text)
+        same = str(network.supernet(new_prefix=length)) if length < network.prefixlen else text
+        if same not in seen:
+            seen.add(same)
+            yield same
