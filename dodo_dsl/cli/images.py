@@ -24,7 +24,7 @@ EXAMPLES = """examples:
   dodo images push --prefix registry.example.org/dodo
   dodo images push --platform linux/amd64,linux/arm64 --prefix registry.example.org/dodo
   dodo images pull --for kiwi-dynamic                 on the rig's computer, before its first test
-  dodo images builds > builds.json                    the application's own, checked, for docker buildx bake
+  dodo images builds > builds.yml                    the application's own, checked, for docker buildx bake
   dodo images sbom --output build/sbom                a bill of materials of each image, and of this Python
 """
 _INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"

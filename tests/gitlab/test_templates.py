@@ -350,7 +350,7 @@ def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Cal
     calls = (tmp_path / "calls.txt").read_text()
     assert "secret" not in calls + result.stdout
     assert (tmp_path / "calls.txt.token").read_text() == "secret"
-    checked = tmp_path / "private/docker/builds.json"
+    checked = tmp_path / "private/docker/builds.yml"
     assert f"buildx bake --file {checked} --set lane-finder.tags=" in calls
     assert json.loads(checked.read_text())["services"]["steering"] == {"build": {"context": str(tmp_path / "app")}}
     assert "secret" not in (tmp_path / "calls.txt.environment").read_text()
