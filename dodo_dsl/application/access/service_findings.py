@@ -19,6 +19,9 @@ PROFILE_HINT = "give the service a profile, so that it starts with 'docker compo
 RUNTIMES = ("nvidia", "runc", "runsc")
 HOOKS = ("pre_start", "post_start", "pre_stop")
 _WITHOUT = "is left out of sil and dil tests, which have no hardware"
+_CDI = "is a description of the host, which can mount anything"
+_GRAPHICS = ("", "nvidia", "amd")
+_RESERVED: Steps = ("deploy", "resources", "reservations", "devices")
 _RULE_OF_CHARACTERS = re.compile(r"c [0-9*]+:[0-9*]+ [rwm]+")
 
 
@@ -112,6 +115,8 @@ def _devices(name: str, service: dict[str, Any], around: Surroundings) -> Iterat
         if link := around.paths.link(source):
             message = f"device '{shown}' is a symbolic link to '{link}', outside the repository"
             yield AccessFinding(steps, message, "name the device itself")
+        elif "=" in source and not source.startswith("/"):
+            yield AccessFinding(steps, f"device '{shown}' {_CDI}", "name a file below /dev")
         elif host_access.is_of_machine(shown) or any(map(host_access.is_of_machine, around.paths.names(source))):
             message = f"device '{shown}' gives access to the host's disks or memory"
             yield AccessFinding(steps, message, "remove it")
@@ -119,6 +124,7 @@ def _devices(name: str, service: dict[str, Any], around: Surroundings) -> Iterat
             yield _port(steps, f"device '{shown}' of '{name}'")
         else:
             yield AccessFinding(steps, f"device '{shown}' of '{name}' {_WITHOUT}", kind="hardware")
+    yield from _processors(name, service)
     for item, word in enumerate(_items(service.get("device_cgroup_rules"))):
         steps = ("device_cgroup_rules", item)
         if rig_ports.is_rule_for_port(word, ports):
@@ -128,6 +134,19 @@ def _devices(name: str, service: dict[str, Any], around: Surroundings) -> Iterat
         else:
             message = f"the rule '{word}' gives access to the host's disks"
             yield AccessFinding(steps, message, "name character devices, for example c 81:* rw")
+
+
+def _processors(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
+    """Requests of graphics processors that ask for other devices."""
+    reserved: Any = service.get("deploy")
+    for key in ("resources", "reservations", "devices"):
+        reserved = reserved.get(key) if isinstance(reserved, dict) else None
+    for way, written in ((("gpus",), service.get("gpus")), (_RESERVED, reserved)):
+        for item, request in enumerate(written if isinstance(written, list) else ()):
+            driver = str(request.get("driver") or "") if isinstance(request, dict) else ""
+            if driver.lower() not in _GRAPHICS and "$" not in driver:
+                message = f"the driver '{driver}' of a device of '{name}' {_CDI}"
+                yield AccessFinding((*way, item, "driver"), message, "use nvidia, or no driver")
 
 
 def _port(steps: Steps, what: str) -> AccessFinding:

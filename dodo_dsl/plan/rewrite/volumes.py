@@ -94,7 +94,7 @@ def own_volumes(
     File systems in memory get no more than a service may have; ``known`` are variables whose values are known. A folder
     of the repository is one of the ``copies``, or else only to be read.
     """
-    found = {}
+    found: dict[str, Any] = {}
     for excess in list(volume_excesses(filled.value(volumes or {}, known or {}), limits)):
         put(volumes, excess)
         changes.append(f"volume {excess.steps[0]}: o is {excess.allowed}")
@@ -104,8 +104,10 @@ def own_volumes(
             options["o"] = ",".join([*(word for word in options["o"].split(",") if word != "rw"), "ro"])
             changes.append(f"volume {own_name(name)}: is only read")
         if own_name(name) in copies:
-            found[own_name(name)] = {key: value for key, value in about.items() if key == "labels"}
+            found[own_name(name)] = {}
             continue
+        if isinstance(about, dict) and about.pop("labels", None):
+            changes.append(f"volume {own_name(name)}: labels removed, programs of the host act on them")
         is_external = host_access.is_external(about)
         if isinstance(about, dict) and "name" in about and not is_external:
             changes.append(f"volume {own_name(name)}: name removed, each test has its own")

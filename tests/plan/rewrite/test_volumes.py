@@ -51,13 +51,17 @@ def test_without_volumes() -> None:
 
 def test_top_level_volumes() -> None:
     changes: list[str] = []
-    written = {"a": None, "tmp": {"name": "x", "driver": "local"}, "shared": {"name": "y", "external": True}}
+    shared = {"name": "y", "external": True}
+    written: dict[str, Any] = {"a": {"labels": ["x"]}, "tmp": {"name": "x", "driver": "local"}, "shared": shared}
     assert own_volumes(written, changes) == {
-        "a": None,
+        "a": {},
         "application-tmp": {"driver": "local"},
         "shared": {"name": "y", "external": True},
     }
-    assert changes == ["volume application-tmp: name removed, each test has its own"]
+    assert changes == [
+        "volume a: labels removed, programs of the host act on them",
+        "volume application-tmp: name removed, each test has its own",
+    ]
     assert own_volumes(None, changes) == {}
     assert (own_name("report"), own_name("a")) == ("application-report", "a")
 
@@ -118,7 +122,7 @@ def test_copies_of_long_forms_and_of_volumes(team: Path) -> None:
     (own,), (volume,), sources = mounts(team, [bind], ["bound:/b:ro"], volumes=bound)
     assert own == {"type": "volume", "source": "files-0", "target": "/d", "volume": {"nocopy": True}}
     assert (volume, sources) == ("bound:/b:ro,nocopy", {"files-0": "./data", "bound": "./data"})
-    assert own_volumes(bound, [], sources) == {"bound": {"labels": {"a": "b"}}, "files-0": {}}
+    assert own_volumes(bound, [], sources) == {"bound": {}, "files-0": {}}
 
 
 def test_volumes_that_nobody_knows_are_only_read() -> None:
