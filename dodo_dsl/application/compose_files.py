@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dodo_dsl import source
+from dodo_dsl.application.access.host_paths import HostPaths, repository
 from dodo_dsl.application.access.secret_variables import holds_secret, is_steering
 from dodo_dsl.application.interpolation import dotenv
 from dodo_dsl.diagnostics import Diagnostic, Span
@@ -17,10 +18,14 @@ _MAX_ENV = 1 << 20
 
 
 class ComposeFiles:
-    """Documents by path, ``variables`` of their ``.env`` files and ``problems``; ``secrets`` has files by variable."""
+    """Documents by path, ``variables`` of their ``.env`` files and ``problems``; ``secrets`` has files by variable.
 
-    def __init__(self, reader: Reader = read) -> None:
+    ``roots`` are the folders of the repository, which holds all of them.
+    """
+
+    def __init__(self, reader: Reader = read, roots: tuple[Path, ...] = ()) -> None:
         self._reader = reader
+        self._roots = roots
         self.problems: list[Diagnostic] = []
         self.variables: dict[str, str] = {}
         self.secrets: dict[str, Path] = {}
@@ -70,6 +75,8 @@ class ComposeFiles:
             self.problem(word.span, f"'{text}' may differ between machines, expected a relative path", hint)
             return None
         file = Path(os.path.normpath(folder / text))
+        if not self.holds(word, folder):
+            return None
         if file.is_symlink() or not file.is_file():
             link = f"'{text}' is a symbolic link, expected a regular file"
             self.problem(word.span, link if file.is_symlink() else f"there is no file '{text}'")
@@ -78,6 +85,14 @@ class ComposeFiles:
             self.problem(word.span, f"the application has more than {MAX_FILES} files")
             return None
         return file
+
+    def holds(self, word: Scalar, folder: Path) -> bool:
+        """Whether the repository holds what a file in ``folder`` names; a problem says so where it does not."""
+        roots = self._roots or repository(folder.resolve())
+        problem = HostPaths(folder.resolve(), roots).file_problem(word.text)
+        if problem:
+            self.problems.append(Diagnostic(word.span, "application-isolation", problem, "keep it in the repository"))
+        return not problem
 
     def gather(self, file: Path | None, span: Span) -> None:
         """Adds the variables of an ``.env`` file, if there is one."""

@@ -19,13 +19,16 @@ CONTAINER_CAPABILITIES = frozenset(
 HARDWARE_KEYS = ("devices", "device_cgroup_rules")
 NAMESPACES = ("network_mode", "ipc", "pid")
 
-_PLAIN_DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+PLAIN_DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
 _OF_MACHINE = re.compile(
     r"/dev/(mem|kmem|port|kmsg|(s|h|v|xv)d[a-z]\d*|(nvme|mmcblk|loop|nbd|mtd|zram|ram|vhost|tpm|watchdog)[^/]*"
     r"|(dm-|md|sr|sg|bsg/)[^/]*|(mapper|disk|block|char|cpu)(/.*)?|kvm|fuse|btrfs-control|snapshot|userfaultfd)"
 )
 """Devices that are no hardware of a robot: disks, memory and the kernel's own."""
-_OF_DESKTOP = re.compile(r"/(var/)?run/user/\d+/(pulse|pipewire|wayland)[^/]*(/native)?$")
+_OF_DESKTOP = re.compile(
+    r"/(var/)?run/user/\d+/(pulse|pipewire|wayland)[^/]*(/native)?|/tmp/\.X11-unix(/.*)?|(.*/)?\.Xauthority"
+)
+_FALSE = ("false", "f", "0", "no", "n", "off", "")
 _WHOLE = ("/", "/run", "/var/run", "/var", "/var/lib/docker")
 _SOCKET = re.compile(r"(docker|podman|containerd|crio)\.sock$")
 
@@ -46,11 +49,25 @@ def mount(volume: Any) -> Mount:
     """A mount from its short or its long form."""
     if isinstance(volume, dict):
         origin, target = str(volume.get("source") or ""), str(volume.get("target") or "")
-        return Mount(_clean(origin), _clean(target), volume.get("read_only") is True)
+        return Mount(_clean(origin), _clean(target), is_true(volume.get("read_only") or False))
     parts = split_outside(str(volume), ":")
     if len(parts) == 1:
         return Mount("", _clean(parts[0]))
-    return Mount(_clean(parts[0]), _clean(parts[1]), "ro" in ",".join(parts[2:]).split(","))
+    access = [word for word in mount_options(volume) if word in ("ro", "rw")]
+    return Mount(_clean(parts[0]), _clean(parts[1]), access[-1:] == ["ro"])
+
+
+def mount_options(volume: Any) -> list[str]:
+    """The words after a short form's second colon; of ``ro`` and ``rw``, the last one counts."""
+    parts = split_outside(volume, ":") if isinstance(volume, str) else []
+    return [word for part in parts[2:] for word in part.split(",")]
+
+
+def is_bind(volume: Any, source: str) -> bool:
+    """Whether a mount shows a path of the host, and no volume."""
+    if isinstance(volume, dict):
+        return volume.get("type") not in ("tmpfs", "image") and (volume.get("type") == "bind" or is_path(source))
+    return is_path(source)
 
 
 def named_volume(volume: Any) -> str:
@@ -71,11 +88,16 @@ def is_shared_memory(found: Mount) -> bool:
     return found.below("/dev/shm")
 
 
+def is_token(found: Mount) -> bool:
+    """A mount of a file of ``/tmp`` at its own place, by which programs find shared memory; the test's own has it."""
+    return found.below("/tmp") and found.source == found.target and not _OF_DESKTOP.fullmatch(found.source)
+
+
 def is_hardware(found: Mount) -> bool:
     """A mount of devices, of their settings in the kernel, or of a user's sound and screen."""
-    if is_shared_memory(found) or found.source in _PLAIN_DEVICES:
+    if is_shared_memory(found) or found.source in PLAIN_DEVICES:
         return False
-    is_device = found.below("/dev") or bool(_OF_DESKTOP.match(found.source))
+    is_device = found.below("/dev") or bool(_OF_DESKTOP.fullmatch(found.source))
     return is_device or (found.below("/sys") and not found.read_only)
 
 
@@ -101,7 +123,14 @@ def is_confining(option: object) -> bool:
 
 
 def is_true(value: object) -> bool:
-    return value is True or (isinstance(value, str) and value.lower() not in ("false", ""))
+    """Whether compose reads a value as true, or may do so once its variables are filled in."""
+    return value is True or (isinstance(value, str) and value.strip().lower() not in _FALSE)
+
+
+def is_bound(volume: object) -> bool:
+    """Whether a top-level volume is a folder of the host."""
+    options = volume.get("driver_opts") if isinstance(volume, dict) else None
+    return isinstance(options, dict) and bool({"bind", "rbind"} & set(str(options.get("o") or "").split(",")))
 
 
 def is_external(volume: object) -> bool:

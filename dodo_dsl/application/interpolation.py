@@ -136,6 +136,12 @@ def dotenv(text: str) -> dict[str, str]:
     return found
 
 
+def own_dotenv(folder: Path, known: Mapping[str, str]) -> dict[str, str]:
+    """The variables of the ``.env`` in a folder as compose would read it; a symbolic link is not followed."""
+    path = folder / ".env"
+    return {} if path.is_symlink() else dotenv_file(path, known)
+
+
 def dotenv_file(path: Path, known: Mapping[str, str]) -> dict[str, str]:
     """The variables of a ``.env`` file, interpolated with earlier ones and ``known``; none without a file."""
     if not path.is_file():

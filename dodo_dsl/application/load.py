@@ -70,6 +70,8 @@ def _included(
     if circle or len(found) < len(names):
         return document
     place = words.get("project_directory")
+    if isinstance(place, Scalar) and not files.holds(place, folder):
+        return document
     project = Path(os.path.normpath(folder / place.text)) if isinstance(place, Scalar) else found[0].parent
     part = _all(files, found, project, chain)
     own = [files.other(word, folder) for word in scalars(words.get("env_file"))] or [project / ".env"]

@@ -14,6 +14,8 @@ from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 SANDBOX = "sandbox"
+FILES = "dodo-files"
+"""The service that copies the files of the repository to which an application may write."""
 KEYS = ("x-dodo", "x-dodo-process")
 
 Word = tuple[str, Span]

@@ -11,6 +11,7 @@ from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.access import filled, secret_problems
 from dodo_dsl.application.access.access_diagnostics import diagnostic
 from dodo_dsl.application.access.filled import known_variables
+from dodo_dsl.application.access.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.access.limit_findings import volume_findings
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.access.shared_findings import shared_findings
@@ -23,7 +24,7 @@ from dodo_dsl.application.service_environment import cid_variables, env_files
 from dodo_dsl.application.service_problems import unknown_keys
 from dodo_dsl.application.slips.variables import variable_problems
 from dodo_dsl.application.tunables import tunable_problems
-from dodo_dsl.diagnostics import Diagnostic, has_errors
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Reader
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.schema.validation import validate
@@ -43,9 +44,13 @@ def read_application(
     ``access`` is what the deployment allows it, ``limits`` are the highest that it may set.
     """
     paths = [path] if isinstance(path, Path) else list(path)
-    files = ComposeFiles(reader)
-    document = load(files, paths)
+    roots = (*repository(paths[0].resolve().parent), *map(Path, access.roots))
+    files = ComposeFiles(reader, roots)
     found = files.problems
+    found.extend(_links(paths))
+    if found:
+        return None, found
+    document = load(files, paths)
     services = document.get("services") if document else None
     if isinstance(services, source.Mapping):
         found.extend(itertools.chain.from_iterable(unknown_keys(e.value) for e in services.entries.values()))
@@ -64,10 +69,20 @@ def read_application(
     found.extend(tunable_problems(application))
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
     refused = {problem.span for problem in found}
-    withheld = secret_problems.withheld(nodes, files.variables, access.passed)
+    withheld = secret_problems.withheld(nodes, files.variables, access.passed, os.environ)
     found.extend(problem for problem in withheld if problem.span not in refused)
+    found.extend(secret_problems.written(nodes))
+    found.extend(secret_problems.in_files(_own_files(application)))
     found.extend(secret_problems.left_out(files.secrets))
     return (None if has_errors(found) else application), found
+
+
+def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
+    """Files that symbolic links lead out of the repository in which they are named."""
+    for path in paths:
+        if out := link_out(path):
+            message = f"the file is a symbolic link to '{out}', outside the repository"
+            yield Diagnostic(Span(str(path)), "application-isolation", message, INSIDE)
 
 
 def _application(
@@ -109,6 +124,14 @@ def _shared(document: source.Mapping, application: ApplicationSource) -> Iterato
     cut = volume_findings(raw.get("volumes") or {}, application.limits, compiled=False)
     for finding in (*shared_findings(raw, application.paths, application.access.passed), *cut):
         yield diagnostic(finding, document, document.span)
+
+
+def _own_files(application: ApplicationSource) -> list[Path]:
+    """The files of ``env_file`` that the application may read, each once."""
+    words = {file.path for service in application.services.values() for file in service.env_files}
+    texts = sorted(filled.text(word, application.known) for word in words)
+    own = (text for text in texts if "$" not in text and application.paths.is_own(text))
+    return list(dict.fromkeys(Path(application.paths.whole(text)) for text in own))
 
 
 def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:

@@ -16,6 +16,9 @@ from dodo_dsl.source import Node
 
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 
+_LONGEST = 63
+"""A service's name is also one in the test's network (RFC 1035)."""
+
 
 @dataclass(frozen=True)
 class Written:
@@ -74,6 +77,8 @@ def _name(written: Written) -> Iterator[Diagnostic]:
     name = written.name
     if name == SANDBOX or name.startswith("dodo-"):
         yield _bad(written.key, f"the name '{name}' is reserved for DoDo's own services")
+    if len(name) > _LONGEST:
+        yield _bad(written.key, f"the name of a service has {len(name)} characters, expected at most {_LONGEST}")
     if not any(written.plain.get(key) for key in ("image", "build", "x-dodo-process")):
         yield _bad(written.key, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
 

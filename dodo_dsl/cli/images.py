@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import atomic
-from dodo_dsl.cli import image_pull, own_services, selection
+from dodo_dsl.cli import image_builds, image_pull, own_services, selection
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
@@ -25,6 +25,7 @@ EXAMPLES = """examples:
   dodo images push --prefix registry.example.org/dodo
   dodo images push --platform linux/amd64,linux/arm64 --prefix registry.example.org/dodo
   dodo images pull --for kiwi-dynamic                 on the rig's computer, before its first test
+  dodo images builds > builds.yml                    the application's own, checked, for docker buildx bake
   dodo images sbom --output build/sbom                a bill of materials of each image, and of this Python
 """
 _INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"
@@ -45,6 +46,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     _action(actions, "push", "push images to their registry; log in with 'docker login' first")
     text = "pull the images that the tests of a rig need, if there is room for them"
     image_pull.add(actions.add_parser("pull", help=text, description=text))
+    text = "check the application's builds, and write them as a compose file for 'docker buildx bake'"
+    image_builds.add(actions.add_parser("builds", help=text, description=text))
     sbom = _action(actions, "sbom", "write what built images, and the Python that runs DoDo, are made of (CycloneDX)")
     sbom.add_argument("--no-images", action="store_true", help="only the Python that runs DoDo; needs no Docker engine")
     sbom.add_argument("-o", "--output", metavar="DIR", default="build/sbom", help="folder (default: build/sbom)")
@@ -85,6 +88,8 @@ def _platforms(text: str) -> list[str]:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.action == "pull":
         return image_pull.pull(options, stdout)
+    if options.action == "builds":
+        return image_builds.show(options, stdout, stderr)
     deployment = selection.checked_deployment()
     images = _chosen(options, deployment)
     if options.action == "sbom" and options.no_images:

@@ -90,6 +90,7 @@ def parser(called: Collection[str] = tuple(COMMANDS)) -> argparse.ArgumentParser
 def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     """Runs one command. What it cannot do is one sentence here, and an exit code; so is argparse's SystemExit."""
     stdout, stderr = harmless_stream(stdout), harmless_stream(stderr)
+    os.environ.pop("DODO_SEARCH_STORAGE", None)  # jobs of a pipeline have it for their command line alone
     try:
         options = parser(argv[:1]).parse_args(argv)
     except SystemExit as stop:

@@ -1,7 +1,8 @@
 """A planned service as a container: command, volumes and what it waits for."""
 
 import math
-from collections.abc import Mapping
+import shlex
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,6 +62,12 @@ def containers(plan: Plan, layer: str) -> list[Container]:
         )
         for service in plan.layer(layer)
     ]
+
+
+def copy_command(volumes: Iterable[str]) -> str:
+    """What the service does that copies files of the repository: links stay links, and nothing follows them."""
+    copies = [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in volumes]
+    return " && ".join([*copies, "touch /run/copied", "exec sleep infinity"])
 
 
 def _word(flag: Flag) -> str:

@@ -11,7 +11,8 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
-from dodo_dsl.emit.containers import containers
+from dodo_dsl.application.model import FILES
+from dodo_dsl.emit.containers import containers, copy_command
 from dodo_dsl.emit.job_options import NO_OPTIONS, JobOptions
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
@@ -110,6 +111,9 @@ def render_plan(plan: Plan) -> list[File]:
                 services=containers(plan, layer),
                 own_network=own_network,
                 sandbox=own_network and layer == LAYERS[0],
+                copies=plan.application.copies if layer == LAYERS[0] else {},
+                files_service=FILES,
+                copy_command=copy_command(plan.application.copies),
             ),
         )
         for layer in LAYERS

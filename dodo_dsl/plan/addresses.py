@@ -25,13 +25,30 @@ def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
     return [given[i] for i in range(len(isolations))]
 
 
-def subnets(network: ipaddress.IPv4Network) -> list[str]:
-    """Every /28 of the deployment's network, in order."""
-    return [subnet(index, network) for index in range(1 << (28 - network.prefixlen))]
+SMALLEST = 28
+"""The prefix of the smallest subnet of a test, with room for 13 containers."""
+_TAKEN = 3
+"""Addresses of a subnet that no container gets: the network's, the engine's own, and that of broadcasts."""
 
 
-def subnet(index: int, network: ipaddress.IPv4Network) -> str:
-    """The ``index``-th /28 of the deployment's network; the range starts again when it is used up."""
-    count = 1 << (28 - network.prefixlen)
-    base = int(network.network_address) + 16 * (index % count)
-    return f"{ipaddress.IPv4Address(base)}/28"
+def prefix(containers: int) -> int:
+    """The length of the prefix of the smallest subnet in which each container has an address."""
+    return min(SMALLEST, 32 - (containers + _TAKEN - 1).bit_length())
+
+
+def subnets(network: ipaddress.IPv4Network, length: int = SMALLEST) -> list[str]:
+    """Every subnet of a length in the deployment's network, in order."""
+    return [str(part) for part in network.subnets(new_prefix=length)] if length >= network.prefixlen else []
+
+
+def subnet(index: int, network: ipaddress.IPv4Network, containers: int = 1) -> str:
+    """The ``index``-th subnet of the deployment's network with room for so many containers.
+
+    The range starts again when it is used up. Raises OutOfAddresses where it is smaller than one.
+    """
+    length = prefix(containers)
+    if length < network.prefixlen:
+        raise OutOfAddresses(f"a test has {containers} containers and so needs a /{length}, but 'subnets' is {network}")
+    count = 1 << (length - network.prefixlen)
+    base = int(network.network_address) + (1 << (32 - length)) * (index % count)
+    return f"{ipaddress.IPv4Address(base)}/{length}"

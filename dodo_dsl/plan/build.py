@@ -205,7 +205,7 @@ class _Builder:
             isolation=isolated,
             seed=spec.seed,
             cid=self.cid,
-            subnet=addresses.subnet(self.index, self.deployment.subnets) if isolated == "network" else "",
+            subnet=self._subnet(services) if isolated == "network" else "",
             tag=rig.tag if rig else "sil",
             sandbox_image=self._image("sandbox"),
             services=services,
@@ -223,6 +223,17 @@ class _Builder:
             import_paths=self.imports,
             source_map=self.places,
         )
+
+    def _subnet(self, services: Sequence[PlannedService]) -> str:
+        """The test's subnet, with an address for each service, and for the container that holds the network."""
+        containers = 1 + len(services) + len(self.application.services)
+        try:
+            return addresses.subnet(self.index, self.deployment.subnets, containers)
+        except addresses.OutOfAddresses as error:
+            hint = "give 'subnets' in dodo.yml more, such as 10.213.0.0/16"
+            span = Span(str(self.deployment.file)) if self.deployment.file else self.spec.span("name")
+            self.problems.append(Diagnostic(span, "out-of-range", str(error), hint))
+            return ""
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)

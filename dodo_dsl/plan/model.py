@@ -71,7 +71,8 @@ class Application:
 
     ``variables`` are those of its ``.env``, as compose interpolates them. ``hidden`` are folders of tests within its
     own, relative to it. ``secrets`` are other variables, each with the file that sets it, relative to the compiled
-    test's folder as the roots of ``access`` are.
+    test's folder as the roots of ``access`` are. ``copies`` are volumes of the test, each with the folder of the
+    repository that is copied into it before the application starts.
     """
 
     folder: str
@@ -83,6 +84,7 @@ class Application:
     hidden: tuple[str, ...] = ()
     secrets: dict[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
+    copies: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ class Pooled:
 
 @dataclass(frozen=True)
 class Plan:
-    """One instance of a test. Times in seconds, ``subnet`` an IPv4 /28 or empty under host isolation.
+    """One instance of a test. Times in seconds, ``subnet`` an IPv4 network or empty under host isolation.
 
     ``lockstep`` is None in real time, ``rig`` empty below level hil; ``more_tags`` are those of the rig's runner beside
     ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,

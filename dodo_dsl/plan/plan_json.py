@@ -116,6 +116,7 @@ def _problem(plan: Plan) -> str:
         "environment": all(isinstance(s.environment, dict) for s in plan.application.services),
         "variable": all(isinstance(v, str) for v in plan.application.variables.values()),
         "secret": all(isinstance(text, str) for pair in plan.application.secrets.items() for text in pair),
+        "copy": all(isinstance(text, str) for pair in plan.application.copies.items() for text in pair),
         "access": _is_access(plan.application.access),
         "resources": plan.resources is None or is_valid(plan.resources),
         "message": all(isinstance(m, str) for s in plan.application.services for m in (*s.inputs, *s.outputs)),

@@ -7,7 +7,7 @@ from pathlib import Path
 from dodo_dsl.application.access.host_paths import HostPaths, repository
 from dodo_dsl.application.access.model import AccessFinding
 from dodo_dsl.application.access.secret_variables import is_steering
-from dodo_dsl.application.interpolation import dotenv_file, interpolate
+from dodo_dsl.application.interpolation import dotenv_file, interpolate, own_dotenv
 from dodo_dsl.outcome import NEXT_REPORT
 from dodo_dsl.plan.model import Application
 
@@ -28,7 +28,7 @@ def secrets_of(application: Application, folder: Path, outside: Mapping[str, str
 
 def env_file_findings(application: Application, paths: HostPaths, known: Mapping[str, str]) -> Iterator[AccessFinding]:
     """Files of ``env_file`` that are not the application's; raises EnvironmentProblem for a variable without value."""
-    variables = {**application.variables, **dotenv_file(paths.folder / ".env", known), **known}
+    variables = {**application.variables, **own_dotenv(paths.folder, known), **known}
     for service in application.services:
         for item, path in enumerate(service.env_files):
             if problem := paths.file_problem(interpolate(path, variables)):

@@ -55,7 +55,7 @@ def test_files_of_the_repository(tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "a.yml").write_text("a: 1\n")
     (tmp_path / "link.yml").symlink_to("a.yml")
-    files = ComposeFiles()
+    files = ComposeFiles(roots=(tmp_path,))
     assert files.other(word("../a.yml"), tmp_path / "sub") == tmp_path / "a.yml"
     assert files.problems == []
     for text in ("link.yml", "sub", "/a.yml", "~/a.yml", "${HOME}/a.yml", "https://example.org/a.yml", "git@x:a"):

@@ -13,6 +13,8 @@ from dodo_dsl.application.host_access import Mount
     [
         ("/a:/b", Mount("/a", "/b")),
         ("/a/:/b//c:ro", Mount("/a", "/b/c", read_only=True)),
+        ("/a:/b:ro,rw", Mount("/a", "/b")),
+        ({"source": "/a", "target": "/b", "read_only": "True"}, Mount("/a", "/b", read_only=True)),
         ("name:/b:z,ro", Mount("name", "/b", read_only=True)),
         ("/b", Mount("", "/b")),
         ("${A:-/x:y}:/b", Mount("${A:-/x:y}", "/b")),
@@ -40,6 +42,8 @@ def test_mounts(volume: object, expected: Mount) -> None:
         ("/var/run/docker.sock", False, True, False),
         ("/run/user/1000/podman/podman.sock", False, True, False),
         ("/tmp", False, False, False),
+        ("/tmp/.X11-unix", True, False, False),
+        ("~/.Xauthority", True, False, False),
     ],
 )
 def test_what_a_mount_gives_access_to(source: str, hardware: bool, machine: bool, memory: bool) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import diagnostics
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import plain
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text
@@ -19,6 +20,8 @@ from tests.emit.readers import compose
 
 FOLDER = Path(__file__).parent
 STYLES = sorted(p.name for p in (FOLDER / "good").iterdir())
+PATHS = ("/opt/models", *(str(Path.home() / name) for name in ("kiwi-recordings", "models", "recordings")))
+"""What 'paths' in dodo.yml names: styles mount these folders of the host."""
 WAYS = ("network", "host", "hil")
 
 
@@ -29,7 +32,7 @@ def files(folder: Path) -> list[Path]:
 
 def plan(folder: Path, way: str, out: Path) -> tuple[Plan, str]:
     """The Plan of a test with the application in a folder, and the text about its problems."""
-    source, problems = read_application(files(folder))
+    source, problems = read_application(files(folder), Access(paths=PATHS))
     assert source is not None, format_text(problems)
     hil = way == "hil"
     isolation = "network" if way == "network" else "host"

@@ -62,7 +62,7 @@ class Crate:
             return {
                 "image": IMAGE,
                 "entrypoint": ["python3", "-u", script],
-                "volumes": [f"{self.bench.folder}:/scripts", "tmp:/tmp"],
+                "volumes": [f"{self.bench.folder}:/scripts:ro", "tmp:/tmp"],
                 "init": True,
                 "stop_grace_period": "1s",
             }

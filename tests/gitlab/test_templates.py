@@ -31,9 +31,11 @@ BAKE = {
 
 # What `docker buildx bake` prints and writes, as buildx 0.13 does it; what it is told stands in calls.txt.
 DOCKER = f"""#!/bin/sh
-echo "$PWD: $@" >> "$CALLS"
+calls=$(dirname "$0")/../calls.txt
+echo "$@" >> "$calls"
+env > "$calls.environment"
 case "$*" in
-login*) cat > "$CALLS.token" ;;
+login*) cat > "$calls.token" ;;
 *--print*) echo '{json.dumps(BAKE, indent=2)}' ;;
 *--push*) while [ "$1" != --metadata-file ]; do shift; done
           echo '{json.dumps({"x": {"containerimage.digest": DIGEST}}, indent=2)}' > "$2" ;;
@@ -309,16 +311,24 @@ def run_script(job: dict[str, Any], folder: Path, variables: dict[str, str]) -> 
     )
 
 
-def run_images(tmp_path: Path, docker: str, **inputs: Any) -> "subprocess.CompletedProcess[str]":
+BUILT = "services: {lane-finder: {build: ., command: --cid=111}, steering: {build: {context: ., ssh: [default]}}}\n"
+
+
+def run_images(tmp_path: Path, docker: str, compose: str = BUILT, **inputs: Any) -> "subprocess.CompletedProcess[str]":
     config = included(APPLICATION, **inputs)
     job = config["dodo-images"]
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin/docker").write_text(docker)
     (tmp_path / "bin/docker").chmod(0o755)
     (tmp_path / "app").mkdir()
+    (tmp_path / "app/docker-compose.yml").write_text(compose)
+    (tmp_path / "bin/dodo").write_text(f'#!/bin/sh\nexec {sys.executable} -P -m dodo_dsl "$@"\n')
+    (tmp_path / "bin/dodo").chmod(0o755)
     environment = {
         "PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}",
-        "CALLS": str(tmp_path / "calls.txt"),
+        "HOME": str(tmp_path),
+        "DOCKER_CONFIG": str(tmp_path / "private/docker"),
+        "PYTHONPATH": str(package_data.root()),
         "CI_JOB_TOKEN": "secret",
         "CI_REGISTRY": "registry.example.org",
         "CI_REGISTRY_IMAGE": "registry.example.org/team/car",
@@ -340,7 +350,10 @@ def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Cal
     calls = (tmp_path / "calls.txt").read_text()
     assert "secret" not in calls + result.stdout
     assert (tmp_path / "calls.txt.token").read_text() == "secret"
-    assert f"{tmp_path}/app: buildx bake --file docker-compose.yml --set lane-finder.tags=" in calls
+    checked = tmp_path / "private/docker/builds.yml"
+    assert f"buildx bake --file {checked} --set lane-finder.tags=" in calls
+    assert json.loads(checked.read_text())["services"]["steering"] == {"build": {"context": str(tmp_path / "app")}}
+    assert "secret" not in (tmp_path / "calls.txt.environment").read_text()
     image = "registry.example.org/team/car"
     images = {
         "DODO_IMAGE_LANE_FINDER": f"{image}/lane-finder@{DIGEST}",
@@ -353,6 +366,14 @@ def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Cal
     assert job["variables"] == images
     assert job["trigger"] == {"project": "team/deployment", "branch": "main", "strategy": "depend"}
     accepted(downstream)
+
+
+@pytest.mark.parametrize("build", ["/", "{context: ., network: host}", "{context: ., dockerfile: ../../x}"])
+def test_nothing_is_built_that_is_not_checked(tmp_path: Path, build: str) -> None:
+    result = run_images(tmp_path, DOCKER, f"services: {{a: {{build: {build}, command: --cid=111}}}}\n")
+    assert result.returncode == 1
+    assert "error[application-isolation]" in result.stderr
+    assert "bake" not in (tmp_path / "calls.txt").read_text()
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,14 @@
 """Attacks by compose files are refused, left out, or stopped at run time."""
 
 import asyncio
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.emit.render import render_plan
@@ -33,17 +35,23 @@ def written(attack: dict[str, Any], folder: Path) -> Path:
     (repository / ".env").write_text(attack.get("env", ""))
     for name, target in attack.get("links", {}).items():
         (repository / name).symlink_to(target)
+    for name, text in attack.get("files", {}).items():
+        (repository / name).parent.mkdir(exist_ok=True)
+        (repository / name).write_text(text)
     service = {"image": "team/driver", "command": "--cid=111", **attack.get("service", {})}
     file = repository / "docker-compose.yml"
-    file.write_text(yaml.safe_dump({"services": {"driver": service}, **attack.get("file", {})}))
+    text = yaml.safe_dump({"services": {"driver": service}, **attack.get("file", {})})
+    file.write_text(text.replace("{repo}", str(repository)))
     return file
 
 
-def found(attack: dict[str, Any], folder: Path, way: str = "network") -> tuple[Application | None, list[Diagnostic]]:
-    source, problems = read_application(written(attack, folder))
+def found(
+    attack: dict[str, Any], folder: Path, passed: Iterable[str] = ()
+) -> tuple[Application | None, list[Diagnostic]]:
+    source, problems = read_application(written(attack, folder), Access(passed=tuple(passed)))
     if source is None:
         return None, problems
-    return plan_application(source, 140, way, folder / "generated" / "t", (JUDGE.name,)), problems
+    return plan_application(source, 140, "network", folder / "generated" / "t", (JUDGE.name,)), problems
 
 
 def plan(application: Application) -> Plan:
@@ -60,6 +68,8 @@ def test_what_is_refused(attack: dict[str, Any], tmp_path: Path) -> None:
     assert {problem.rule for problem in errors} <= {"application-isolation", "unknown-key"}
     for problem in errors:
         assert Path(problem.span.file).name == "docker-compose.yml"
+        assert problem.span.line and problem.span.column
+        assert "links" not in attack or "symbolic link" in problem.message
         assert problem.hint or problem.rule == "application-isolation"
 
 
@@ -101,7 +111,7 @@ def test_what_is_stopped_at_run_time(attack: dict[str, Any], tmp_path: Path, mon
     """What only the engine would see is stopped before anything is created."""
     compose()
     monkeypatch.delenv("X", raising=False)
-    application, problems = found(attack, tmp_path)
+    application, problems = found(attack, tmp_path, attack["set"])
     assert application is not None, problems
     for file in render_plan(plan(application)):
         path = tmp_path / "generated" / file.path
@@ -109,7 +119,7 @@ def test_what_is_stopped_at_run_time(attack: dict[str, Any], tmp_path: Path, mon
         path.write_text(file.text)
     folder, report = tmp_path / "generated" / "t", tmp_path / "report"
     for name, value in attack["set"].items():
-        monkeypatch.setenv(name, value)
+        monkeypatch.setenv(name, value.replace("{repo}", str(tmp_path / "team")))
     with pytest.raises(BackendError, match="the application may not have ") as refused:
         asyncio.run(Compose(plan(application), folder, report, "dodo-t", print).read())
     assert str(refused.value).startswith(f"the application may not have {attack['says']}: "), refused.value
@@ -120,6 +130,44 @@ def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
     application, problems = found({}, tmp_path)
     assert application is not None
     assert problems == []
+
+
+SECRETS = {
+    **dict.fromkeys(("DATABASE_URL", "DODO_SEARCH_STORAGE"), "postgresql://dodo:s3cr3t@server/dodo"),
+    **dict.fromkeys(("PGPASS", "GITLAB_PAT", "CI_JOB_TOKEN", "INNOCENT"), SECRET),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("passed", [(), ("INNOCENT",)])
+def test_secrets_of_the_host_stay_there(
+    passed: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of DoDo's environment the application gets what is passed, in whatever way its file names more."""
+    compose()
+    for name, value in SECRETS.items():
+        monkeypatch.setenv(name, value)
+    words = [f"${{{name}}}" for name in SECRETS]
+    service = {
+        "environment": [*SECRETS, *(f"{name}_2={word}" for name, word in zip(SECRETS, words, strict=True))],
+        "command": ["--cid=111", *words],
+        "labels": {"l": " ".join(words)},
+        "healthcheck": {"test": ["CMD", "echo", *words]},
+        "build": {"context": ".", "args": [*SECRETS], "dockerfile_inline": f"FROM scratch\n# {' '.join(words)}"},
+    }
+    application, problems = found({"service": service}, tmp_path, passed)
+    assert application is not None
+    named = {problem.message.split("'")[1] for problem in problems if problem.rule == "application-secret"}
+    assert named == {*SECRETS} - {*passed}
+    for file in render_plan(plan(application)):
+        path = tmp_path / "generated" / file.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(file.text)
+    test = Compose(plan(application), tmp_path / "generated" / "t", tmp_path / "report", "dodo-t", print)
+    asyncio.run(test.read())
+    text = yaml.safe_dump(test.services)
+    assert (SECRET in text) == bool(passed)
+    assert "postgresql" not in text
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.plan.addresses import OutOfAddresses, cids, subnet
+from dodo_dsl.plan.addresses import OutOfAddresses, cids, prefix, subnet, subnets
 from dodo_dsl.spec.deployment.deployment import Deployment
 
 RANGE = Deployment.cids
@@ -39,3 +39,18 @@ def test_subnets_are_apart_and_begin_anew() -> None:
     assert len(set(subnets)) == 16
     assert all(s.subnet_of(network) for s in subnets)
     assert subnet(16, network) == str(subnets[0])
+
+
+@pytest.mark.parametrize(("containers", "length"), [(1, 28), (13, 28), (14, 27), (29, 27), (30, 26), (300, 23)])
+def test_subnets_grow_with_the_application(containers: int, length: int) -> None:
+    network = ipaddress.IPv4Network("10.213.0.0/16")
+    assert prefix(containers) == length
+    found = [ipaddress.IPv4Network(subnet(n, network, containers)) for n in range(20)]
+    assert {part.prefixlen for part in found} == {length}
+    assert len(set(found)) == 20 and all(part.subnet_of(network) for part in found)
+    assert subnets(network, length)[:20] == list(map(str, found))
+
+
+def test_a_subnet_that_is_too_small_for_the_application() -> None:
+    with pytest.raises(OutOfAddresses, match="14 containers and so needs a /27"):
+        subnet(0, ipaddress.IPv4Network("10.213.0.0/28"), 14)

@@ -9,8 +9,10 @@ from dodo_dsl.application.access.build_findings import short_name
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.limit_findings import volume_findings
 from dodo_dsl.application.access.model import Access, AccessFinding, Steps
+from dodo_dsl.application.access.mount_findings import mount_findings
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
 from dodo_dsl.application.access.shared_findings import OWN_VOLUMES, shared_findings
+from dodo_dsl.application.model import FILES
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _SERVICES = "services"
@@ -37,13 +39,26 @@ def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator
     volumes = rest.get("volumes") or {}
     others = {name: about for name, about in volumes.items() if name not in OWN_VOLUMES}
     yield from volume_findings(others, test.limits, compiled=True)
+    yield from _written(others, test.paths)
     around = Surroundings(test.paths, {}, volumes, compiled=True, ports=test.access.ports, limits=test.limits)
     for name, service in config.get(_SERVICES, {}).items():
         if name in test.application:
             every = [*service_findings(name, service, around), *_of_others(name, service, test)]
             yield from (f.below(_SERVICES, name) for f in every if not _is_allowed(f, test.access))
+        elif name == FILES:
+            mounts = mount_findings(name, service, test.paths, volumes, test.access.ports, compiled=True)
+            yield from (f.below(_SERVICES, name) for f in mounts)
         elif name not in test.own:
             yield AccessFinding((_SERVICES, name), f"the test has no service '{name}'")
+
+
+def _written(volumes: Mapping[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
+    """Volumes that are folders of the host, and could be written to although dodo.yml does not name them."""
+    for name, about in volumes.items():
+        options = about.get("driver_opts") if host_access.is_bound(about) else {}
+        device = str(options.get("device") or "")
+        if device and "ro" not in str(options.get("o")).split(",") and not paths.is_writable(device):
+            yield AccessFinding(("volumes", name, "driver_opts", "o"), f"'{device}' is mounted to be written to")
 
 
 def _is_allowed(finding: AccessFinding, access: Access) -> bool:

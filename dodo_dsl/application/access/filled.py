@@ -15,7 +15,7 @@ def known_variables(
 ) -> dict[str, str]:
     """The variables that compose would fill in: those ``outside`` first, then those of the application's ``.env``."""
     found: dict[str, str] = {}
-    seen = {**secret_variables.visible(outside, passed), "PWD": folder}
+    seen = {**secret_variables.allowed(outside, passed), "PWD": folder}
     for name, value in own.items():
         found[name] = text(value, {**found, **seen})
     return {**found, **seen}

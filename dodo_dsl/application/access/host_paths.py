@@ -1,99 +1,138 @@
-"""Paths of the host in a compose file: files of the repository, and folders that an application may mount."""
+"""Paths of the host in a compose file: files of the repository, and what else an application may mount."""
 
+import contextlib
 import os
-import re
+import pwd
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-ASK = "keep it in the repository, or allow it with 'paths' in dodo.yml"
-_INSIDE = "keep it in the repository, or write the whole path"
+from dodo_dsl.application import host_access
 
-_FOLDERS = ("/opt", "/srv", "/mnt", "/media", "/data", "/tmp")
-_TO_READ = ("/usr/share", "/usr/local", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
-            "/run/udev", "/sys")  # fmt: skip
-_TMP = "/tmp"
-"""What is named there may be mounted, even where the repository lies in it: nobody keeps repositories there."""
-_DEVICES = ("/dev", "/sys")
-_HOMES = re.compile(r"/(?:home/[^/]+|root|Users/[^/]+)(?:/|$)")
-_OF_X11 = ".Xauthority"
+ASK = "keep it in the repository, or allow it with 'paths' in dodo.yml"
+INSIDE = "put the files themselves in its place"
+
+TO_READ = ("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
+           "/run/udev", "/sys")  # fmt: skip
+"""What all users of a machine may read, and nobody keeps own files in."""
+_TMP, _MEMORY = "/tmp", "/dev/shm"
 
 
 def repository(folder: Path) -> tuple[Path, ...]:
-    """The roots of what belongs to an application: the nearest folders with ``.git`` and ``dodo.yml``, or its own."""
-    above = (folder, *folder.parents)
+    """The roots of what belongs to an application: the nearest folders with ``.git`` and ``dodo.yml``, or its own.
+
+    A user's home, which may be kept in git as well, is none.
+    """
+    above = [place for place in (folder, *folder.parents) if not _is_home(place)]
     found = (next((f for f in above if (f / name).exists()), None) for name in (".git", "dodo.yml"))
     return tuple(dict.fromkeys(f for f in found if f is not None)) or (folder,)
 
 
+def link_out(file: Path) -> str:
+    """Where a file leads to, if its symbolic links leave a repository in which it is named; else empty."""
+    whole, real = Path(os.path.abspath(file)), Path(_real(file))  # noqa: PTH100  (links stay)
+    named = (place for place in whole.parents if not _is_home(place))
+    roots = (place for place in named if any((place / name).exists() for name in (".git", "dodo.yml")))
+    return "" if all(real.is_relative_to(_real(root)) for root in roots) else str(real)
+
+
+def _is_home(folder: Path) -> bool:
+    homes = ["/", os.environ.get("HOME") or "/"]
+    with contextlib.suppress(KeyError):  # a user without an entry
+        homes.append(pwd.getpwuid(os.getuid()).pw_dir)
+    return str(folder) in {name for home in homes for name in (home, _real(home))}
+
+
 @dataclass(frozen=True)
 class HostPaths:
-    """Judges paths that are relative to ``folder``; ``roots`` and ``allowed`` hold what may be used as it is.
+    """Judges paths that are relative to ``folder``; ``roots`` are the repository's, ``allowed`` what dodo.yml names.
 
-    A path with a variable is judged when that is filled in: then paths are ``literal``, and a dollar sign is one.
+    ``tmp`` tells that the host's ``/tmp`` and shared memory may be mounted, or are the test's own. A path with a
+    variable is judged when that is filled in: then paths are ``literal``, and a dollar sign is one.
     """
 
     folder: Path
     roots: tuple[Path, ...]
     allowed: tuple[Path, ...] = ()
+    tmp: bool = True
     literal: bool = False
 
     def whole(self, text: str) -> str:
         """A path as the engine would see it, without ``..``; symbolic links stay."""
         return os.path.normpath(self.folder / Path(_expanded(text)))
 
+    def names(self, text: str) -> tuple[str, ...]:
+        """The path as it is written, and where its symbolic links lead: with ``..`` resolved before and after them."""
+        written = self.folder / _expanded(text)
+        return tuple(dict.fromkeys((self.whole(text), _real(self.whole(text)), _real(written))))
+
     def is_own(self, text: str) -> bool:
         """Whether a path, and what its symbolic links lead to, lie in the repository or below an allowed path."""
-        places = (*self.roots, *self.allowed)
-        path = self.whole(text)
-        return _below(path, places) and _below(_real(path), [Path(_real(p)) for p in places])
+        return _below(self.whole(text), self._places) and not self.link(text)
 
-    def _is_open(self, text: str) -> bool:
+    def is_of_repository(self, text: str) -> bool:
+        """Whether a path that is the application's own is a file of the repository, and so nobody's to write to."""
+        return any(_below(name, self._real_roots) for name in self.names(text))
+
+    def is_writable(self, text: str) -> bool:
+        """Whether an application may write to the path itself: to what dodo.yml names, and to ``/tmp``."""
+        whole = self.whole(text)
+        if self.tmp and (whole == _TMP or all(_below(name, [_MEMORY]) for name in self.names(text))):
+            return True
+        return whole in host_access.PLAIN_DEVICES or (self.is_own(text) and not self.is_of_repository(text))
+
+    def is_only_read(self, text: str) -> bool:
+        """Whether an application may read the path itself, and not write to it."""
+        return not self.is_writable(text) and (self.is_own(text) or self._is_to_read(text))
+
+    def link(self, text: str) -> str:
+        """Where symbolic links lead to that leave the repository and the allowed paths; empty without such a link."""
+        if not _below(self.whole(text), self._places):
+            return ""
+        places = [_real(place) for place in self._places]
+        return next((name for name in self.names(text)[1:] if not _below(name, places)), "")
+
+    def is_open(self, text: str) -> bool:
+        """Whether a path has a variable, so that it cannot be judged yet."""
         return "$" in text and not self.literal
 
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
-        if self._is_open(text) or self.is_own(text):
+        if self.is_open(text) or self.is_own(text):
             return ""
         return f"'{written or text}' {self._where(text)}"
 
-    def mount_problem(self, text: str, read_only: bool) -> tuple[str, str]:
-        """Why a path may not be mounted, and what to do; empty when it may."""
-        if self._is_open(text) or self.is_own(text):
+    def mount_problem(self, text: str) -> tuple[str, str]:
+        """Why a path may not be mounted, and what to do; empty when it may, if only to be read."""
+        if self.is_open(text) or self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
             return "", ""
-        path = _real(self.whole(text))
-        is_tmp = text.startswith("/") and _below(path, [Path(_TMP)])
-        if not is_tmp and any(_below(str(root), [Path(path)]) for root in self.roots):
-            return f"'{text}' holds the whole repository and more", _INSIDE
+        if self.link(text):
+            return f"'{text}' {self._where(text)}", INSIDE
+        if any(_below(str(root), self.names(text)) for root in self.roots):
+            return f"'{text}' holds the whole repository and more", "mount the folders that the service needs"
         if not text.startswith(("/", "~")):
-            return f"'{text}' {self._where(text)}", _INSIDE
-        if self._is_folder_to_mount(path) or _below(path, map(Path, _DEVICES)):
-            return "", ""
-        if _below(path, map(Path, _TO_READ)):
-            return ("", "") if read_only else (f"'{text}' belongs to the host", "mount it read-only (:ro)")
+            return f"'{text}' {self._where(text)}", ASK
         return f"'{text}' belongs to the host, so tests would share it", ASK
 
-    def _is_folder_to_mount(self, path: str) -> bool:
-        home = _HOMES.match(path)
-        if home is None:
-            own = _expanded("~")
-            return _below(path, map(Path, _FOLDERS)) or (_below(path, [Path(own)]) and _is_plain(path[len(own) + 1 :]))
-        return _is_plain(path[home.end() :])
+    @property
+    def _places(self) -> tuple[Path, ...]:
+        return (*self.roots, *self.allowed)
+
+    @property
+    def _real_roots(self) -> list[str]:
+        return [name for root in self.roots for name in (str(root), _real(root))]
+
+    def _is_to_read(self, text: str) -> bool:
+        places = (*TO_READ, *map(_real, TO_READ))
+        return all(_below(name, places) for name in self.names(text))
 
     def _where(self, text: str) -> str:
-        path = self.whole(text)
-        real = _real(path)
-        if _below(path, (*self.roots, *self.allowed)):
-            return f"is a symbolic link to '{real}', outside the repository"
+        if link := self.link(text):
+            return f"is a symbolic link to '{link}', outside the repository"
         return "is outside the repository"
 
 
-def _is_plain(rest: str) -> bool:
-    """Whether a path within a home folder is one of the user's data, and no file of settings or keys."""
-    return bool(rest) and (not rest.startswith(".") or rest == _OF_X11)
-
-
-def _below(path: str, places: "Sequence[Path] | map[Path]") -> bool:
+def _below(path: str, places: "Sequence[Path | str]") -> bool:
     return any(path == str(place) or path.startswith(f"{str(place).rstrip('/')}/") for place in places)
 
 

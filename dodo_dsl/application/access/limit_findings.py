@@ -22,6 +22,9 @@ _DEPLOY = ("deploy", "resources", "limits")
 _SIZE = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?)\s*([kmgtp]?)(?:i?b)?\s*", re.IGNORECASE | re.ASCII)
 _POWERS = {letter: 1024**power for power, letter in enumerate(("", "k", "m", "g", "t", "p"))}
 _SIZES_OF_TMPFS = ("size=", "nr_blocks=")
+_MOST_LOGS = 10
+_UNLIMITED = ("", "0", "-1")
+"""Sizes of a log that a test's copy replaces by its own."""
 _PERIOD = 100_000
 """us: the engine's default of ``cpu_period``."""
 
@@ -75,6 +78,7 @@ def service_excesses(service: Mapping[str, Any], limits: SandboxLimits) -> Itera
     for base in (("ulimits",), ("build", "ulimits")):
         yield from _ulimits(base, _at(service, base), limits)
     yield from _tmpfs(service, limits)
+    yield from _logs(service, limits)
 
 
 def volume_excesses(volumes: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess]:
@@ -136,6 +140,21 @@ def _quota(service: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess
     most = limits.cpus * _number(period)
     if math.isfinite(most) and _above(most, _number, True)(quota):
         yield Excess(("cpu_quota",), int(most), "cpus", f"{limits.cpus:g} processors")
+
+
+def _logs(service: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess]:
+    """All files of a log together are no larger than one that a program may write."""
+    steps = ("logging", "options")
+    options = _at(service, steps)
+    if not isinstance(options, dict) or "$" in str(options.get("max-file")):
+        return
+    files = _number(options.get("max-file") or 1)
+    if files > _MOST_LOGS:
+        yield Excess((*steps, "max-file"), str(_MOST_LOGS), "", str(_MOST_LOGS))
+    most = int(limits.file_size // max(1, min(files, _MOST_LOGS)))
+    written = options.get("max-size")
+    if written is not None and str(written).strip() not in _UNLIMITED and _above(most, size)(written):
+        yield Excess((*steps, "max-size"), str(most), "file-size", _text(most, "file-size"))
 
 
 def _ulimits(base: Steps, written: Any, limits: SandboxLimits) -> Iterator[Excess]:

@@ -8,18 +8,26 @@ from dodo_dsl.application.access import rig_ports
 from dodo_dsl.application.access.compose_keys import MOUNT
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.model import AccessFinding, Steps, key_findings
-from dodo_dsl.application.compose_paths import is_path
 
 TYPES = ("bind", "volume", "tmpfs", "image")
-PRIVATE = ("private", "rprivate", "")
+_SHARED = ("shared", "rshared", "slave", "rslave")
+_PRIVATE = ("private", "rprivate", "")
 _SOCKET_HINT = "give the service a profile, so that it starts with 'docker compose --profile' and not in a test"
 _WITHOUT = "is left out of sil and dil tests, which have no hardware"
 
 
 def mount_findings(
-    name: str, service: Mapping[str, Any], paths: HostPaths, volumes: Mapping[str, Any], ports: Sequence[str] = ()
+    name: str,
+    service: Mapping[str, Any],
+    paths: HostPaths,
+    volumes: Mapping[str, Any],
+    ports: Sequence[str] = (),
+    compiled: bool = False,
 ) -> Iterator[AccessFinding]:
-    """Mounts of the host, of its hardware, of rigs' ``ports``, and of ``volumes`` that others use, too."""
+    """Mounts of the host, of its hardware, of rigs' ``ports``, and of ``volumes`` that others use, too.
+
+    A ``compiled`` test has none of the repository that can be written to.
+    """
     written = service.get("volumes")
     for item, volume in enumerate(written if isinstance(written, list) else ()):
         found = host_access.mount(volume)
@@ -27,8 +35,11 @@ def mount_findings(
         if isinstance(volume, dict):
             yield from (f.below(*steps) for f in _long_form(name, volume))
             steps = (*steps, "source") if "source" in volume else steps
-        if _is_bind(volume, found.source):
-            yield from (f.below(*steps) for f in _bind(name, found, paths, ports))
+        else:
+            words = [word for word in host_access.mount_options(volume) if word in _SHARED]
+            yield from (f.below(*steps) for f in _propagation(words, ()))
+        if host_access.is_bind(volume, found.source):
+            yield from (f.below(*steps) for f in _bind(name, found, paths, ports, compiled))
             continue
         about = volumes.get(found.source)
         if host_access.is_external(about) and not found.read_only:
@@ -36,29 +47,34 @@ def mount_findings(
             yield AccessFinding(steps, f"volume '{found.source}' is external, so tests would share it", hint)
 
 
-def _is_bind(volume: Any, source: str) -> bool:
-    if isinstance(volume, dict):
-        return volume.get("type") not in ("tmpfs", "image") and (volume.get("type") == "bind" or is_path(source))
-    return is_path(source)
-
-
-def _bind(name: str, found: host_access.Mount, paths: HostPaths, ports: Sequence[str]) -> Iterator[AccessFinding]:
+def _bind(
+    name: str, found: host_access.Mount, paths: HostPaths, ports: Sequence[str], compiled: bool
+) -> Iterator[AccessFinding]:
     problem, hint = "", ""
-    seen = host_access.Mount(paths.whole(found.source), found.target, found.read_only)
-    if "$" in found.source:
+    if paths.is_open(found.source):
         return
-    if host_access.is_machine(seen):
-        problem, hint = f"'{found.source}' belongs to the host, so tests would share it", _SOCKET_HINT
-    elif host_access.is_of_machine(seen.source):
-        problem, hint = f"'{found.source}' gives access to the host's disks or memory", "remove it"
-    elif rig_ports.is_port(seen.source, ports):
+    written, *others = (host_access.Mount(path, found.target, found.read_only) for path in paths.names(found.source))
+    every = (written, *others)
+    if any(map(host_access.is_machine, every)):
+        problem, hint = f"{_called(found.source, paths)} belongs to the host, so tests would share it", _SOCKET_HINT
+    elif any(host_access.is_of_machine(seen.source) for seen in every):
+        problem, hint = f"{_called(found.source, paths)} gives access to the host's disks or memory", "remove it"
+    elif any(rig_ports.is_port(seen.source, ports) for seen in every):
         yield AccessFinding((), f"'{found.source}' of '{name}' {rig_ports.WHY}", rig_ports.HINT, "port")
-    elif host_access.is_hardware(seen) and found.source.startswith("/"):
+    elif host_access.is_hardware(written) and found.source.startswith(("/", "~")):
         yield AccessFinding((), f"'{found.source}' of '{name}' {_WITHOUT}", kind="hardware")
     else:
-        problem, hint = paths.mount_problem(found.source, found.read_only)
+        is_of_test = not compiled and host_access.is_token(found)
+        problem, hint = ("", "") if is_of_test else paths.mount_problem(found.source)
+        if compiled and not (problem or found.read_only or paths.is_writable(found.source)):
+            problem = f"'{found.source}' is mounted to be written to"
     if problem:
         yield AccessFinding((), problem, hint)
+
+
+def _called(source: str, paths: HostPaths) -> str:
+    link = paths.link(source)
+    return f"'{source}', a symbolic link to '{link}'," if link else f"'{source}'"
 
 
 def _long_form(name: str, volume: dict[str, Any]) -> Iterator[AccessFinding]:
@@ -67,7 +83,11 @@ def _long_form(name: str, volume: dict[str, Any]) -> Iterator[AccessFinding]:
     if kind and "$" not in kind and kind not in TYPES:
         yield AccessFinding(("type",), f"mounts of type '{kind}' cannot be isolated", f"use one of {', '.join(TYPES)}")
     bind = volume.get("bind")
-    propagation = str(bind.get("propagation") or "") if isinstance(bind, dict) else ""
-    if propagation not in PRIVATE and "$" not in propagation:
-        message = f"propagation '{propagation}' lets mounts in and out of the container"
-        yield AccessFinding(("bind", "propagation"), message, "remove it")
+    if isinstance(bind, dict):
+        yield from _propagation([str(bind.get("propagation") or "")], ("bind", "propagation"))
+
+
+def _propagation(words: Sequence[str], steps: Steps) -> Iterator[AccessFinding]:
+    for word in words:
+        if word not in _PRIVATE and "$" not in word:
+            yield AccessFinding(steps, f"propagation '{word}' lets mounts in and out of the container", "remove it")

@@ -2,29 +2,60 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import interpolation
 from dodo_dsl.application.access import secret_variables
+from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 
 _NAMED = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LISTS = ("environment", "args")
+_OF_FOLDER = ("PWD",)
+"""What compose sets itself."""
 
 
-def withheld(nodes: Collection[Node], own: Collection[str], passed: Collection[str]) -> Iterator[Diagnostic]:
-    """Variables of DoDo's own environment that the files name; ``own`` are the application's."""
+def withheld(
+    nodes: Collection[Node], own: Collection[str], passed: Collection[str], outside: Mapping[str, str]
+) -> Iterator[Diagnostic]:
+    """Variables of DoDo's own environment, ``outside``, that the files name; ``own`` are the application's."""
     seen: set[str] = set()
+    shared = secret_variables.allowed(outside, passed)
     for node in nodes:
         for name, span in _named(node, ""):
-            if not secret_variables.is_secret(name) or name in {*seen, *own, *passed}:
+            is_secret = secret_variables.holds_secret(name, outside.get(name, ""))
+            if not (is_secret or name in outside) or name in {*seen, *own, *passed, *shared, *_OF_FOLDER}:
                 continue
             seen.add(name)
-            message = f"variable '{name}' looks like a secret, so it is unset in a test"
+            why = "looks like a secret" if is_secret else "is of DoDo's own environment"
+            message = f"variable '{name}' {why}, so it is unset in a test"
             hint = f"to pass it, write environment: [{name}] in dodo.yml"
             yield Diagnostic(span, "application-secret", message, hint, "warning")
+
+
+def written(nodes: Collection[Node]) -> Iterator[Diagnostic]:
+    """Values in the files themselves that look like secrets, and so are in compiled tests."""
+    for node in nodes:
+        for part in source.walk(node):
+            if isinstance(part, Scalar) and (kind := secret_variables.secret_kind(part.text)):
+                yield _open(replace(part.span, length=0), kind)
+
+
+def in_files(files: Collection[Path]) -> Iterator[Diagnostic]:
+    """The same of files of ``env_file``."""
+    for file in files:
+        for name, value in variables_of(file).items():
+            if kind := secret_variables.secret_kind(value):
+                yield _open(_place(file, name), kind)
+
+
+def _open(span: Span, kind: str) -> Diagnostic:
+    message = f"this looks like {kind}, which everybody can read who reads the repository"
+    hint = "keep it out of the repository, name its variable here, and write that in 'environment' of dodo.yml"
+    return Diagnostic(span, "application-secret", message, hint, "warning")
 
 
 def _named(node: Node, key: str) -> Iterator[tuple[str, Span]]:

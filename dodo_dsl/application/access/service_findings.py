@@ -19,6 +19,9 @@ PROFILE_HINT = "give the service a profile, so that it starts with 'docker compo
 RUNTIMES = ("nvidia", "runc", "runsc")
 HOOKS = ("pre_start", "post_start", "pre_stop")
 _WITHOUT = "is left out of sil and dil tests, which have no hardware"
+_CDI = "is a description of the host, which can mount anything"
+_GRAPHICS = ("", "nvidia", "amd")
+_RESERVED: Steps = ("deploy", "resources", "reservations", "devices")
 _RULE_OF_CHARACTERS = re.compile(r"c [0-9*]+:[0-9*]+ [rwm]+")
 
 
@@ -42,10 +45,10 @@ def service_findings(name: str, service: dict[str, Any], around: Surroundings) -
     """Everything that ``service`` may not have; ``name`` is how messages call it."""
     yield from key_findings(f"'{name}'", _WITHOUT_SPECIAL, service, around.compiled)
     yield from _namespaces(service, around)
-    yield from mount_findings(name, service, around.paths, around.volumes, around.ports)
+    yield from mount_findings(name, service, around.paths, around.volumes, around.ports, around.compiled)
     yield from _strangers(service, around)
     yield from _files(service, around.paths)
-    yield from _hardware(name, service, around.ports)
+    yield from _hardware(name, service, around)
     yield from limit_findings(name, service, around.limits, around.compiled)
     yield from _confinement(name, service)
     yield from _hooks(name, service)
@@ -94,26 +97,34 @@ def _files(service: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]
             yield AccessFinding(steps, problem, ASK)
 
 
-def _hardware(name: str, service: dict[str, Any], ports: tuple[str, ...]) -> Iterator[AccessFinding]:
+def _hardware(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
     if host_access.is_true(service.get("privileged", False)):
         yield AccessFinding(("privileged",), f"'privileged' of '{name}' {_WITHOUT}", kind="privilege")
-    yield from _devices(name, service, ports)
+    yield from _devices(name, service, around)
     for item, word in enumerate(_items(service.get("cap_add"))):
         if not host_access.is_harmless_capability(word):
             yield AccessFinding(("cap_add", item), f"capability '{word}' of '{name}' {_WITHOUT}", kind="privilege")
 
 
-def _devices(name: str, service: dict[str, Any], ports: tuple[str, ...]) -> Iterator[AccessFinding]:
+def _devices(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
+    ports = around.ports
     for item, word in enumerate(_items(service.get("devices"))):
         shown = word.get("source") if isinstance(word, dict) else word
         steps = ("devices", item, "source") if isinstance(word, dict) else ("devices", item)
-        if host_access.is_of_machine(shown):
+        source = rig_ports.source(word)
+        if link := around.paths.link(source):
+            message = f"device '{shown}' is a symbolic link to '{link}', outside the repository"
+            yield AccessFinding(steps, message, "name the device itself")
+        elif "=" in source and not source.startswith("/"):
+            yield AccessFinding(steps, f"device '{shown}' {_CDI}", "name a file below /dev")
+        elif host_access.is_of_machine(shown) or any(map(host_access.is_of_machine, around.paths.names(source))):
             message = f"device '{shown}' gives access to the host's disks or memory"
             yield AccessFinding(steps, message, "remove it")
         elif rig_ports.holds_port(rig_ports.source(word), ports):
             yield _port(steps, f"device '{shown}' of '{name}'")
         else:
             yield AccessFinding(steps, f"device '{shown}' of '{name}' {_WITHOUT}", kind="hardware")
+    yield from _processors(name, service)
     for item, word in enumerate(_items(service.get("device_cgroup_rules"))):
         steps = ("device_cgroup_rules", item)
         if rig_ports.is_rule_for_port(word, ports):
@@ -123,6 +134,19 @@ def _devices(name: str, service: dict[str, Any], ports: tuple[str, ...]) -> Iter
         else:
             message = f"the rule '{word}' gives access to the host's disks"
             yield AccessFinding(steps, message, "name character devices, for example c 81:* rw")
+
+
+def _processors(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
+    """Requests of graphics processors that ask for other devices."""
+    reserved: Any = service.get("deploy")
+    for key in ("resources", "reservations", "devices"):
+        reserved = reserved.get(key) if isinstance(reserved, dict) else None
+    for way, written in ((("gpus",), service.get("gpus")), (_RESERVED, reserved)):
+        for item, request in enumerate(written if isinstance(written, list) else ()):
+            driver = str(request.get("driver") or "") if isinstance(request, dict) else ""
+            if driver.lower() not in _GRAPHICS and "$" not in driver:
+                message = f"the driver '{driver}' of a device of '{name}' {_CDI}"
+                yield AccessFinding((*way, item, "driver"), message, "use nvidia, or no driver")
 
 
 def _port(steps: Steps, what: str) -> AccessFinding:

@@ -8,8 +8,9 @@ from typing import Any
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compose_keys import CONFIG, NETWORK, SECRET, TOP, VOLUME, Rows
-from dodo_dsl.application.access.host_paths import ASK, HostPaths
+from dodo_dsl.application.access.host_paths import ASK, INSIDE, HostPaths
 from dodo_dsl.application.access.model import AccessFinding, key_findings
+from dodo_dsl.diagnostics import did_you_mean
 
 OWN_VOLUMES = ("tmp", "report")
 """The names of DoDo's own volumes in a test; an application's volumes of these names get others."""
@@ -23,6 +24,7 @@ _TMPFS_OPTIONS = re.compile(r"(size|mode|uid|gid|nr_inodes|nr_blocks)=[\w%]+|nos
 _BIND_OPTIONS = re.compile(r"r?bind|rw|ro|nosuid|nodev|noexec")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _OURS = "dodo-"
+_OPTIONS = "use a tmpfs (type: tmpfs), or a folder of the repository (o: bind)"
 _OF_SERVICES = ("image", "build", "command", "x-dodo", "x-dodo-process")
 
 
@@ -72,6 +74,8 @@ def _volume(name: str, about: dict[str, Any], paths: HostPaths) -> Iterator[Acce
     if "$" not in called and (is_ours or not _NAME.fullmatch(called)):
         yield AccessFinding(("name",), f"'{called}' is not a name that a volume of the application may have")
     options = about.get("driver_opts")
+    if options and not isinstance(options, dict):
+        yield AccessFinding(("driver_opts",), f"'driver_opts' of the volume '{name}' is not a mapping", _OPTIONS)
     if isinstance(options, dict) and options and driver == "local":
         yield from (f.below("driver_opts") for f in _options(name, options, paths))
 
@@ -80,25 +84,31 @@ def _options(name: str, options: dict[str, Any], paths: HostPaths) -> Iterator[A
     """A tmpfs, or a folder that may be mounted; with other options the engine mounts disks and shares of networks."""
     kind, flags = str(options.get("type") or ""), str(options.get("o") or "")
     device = str(options.get("device") or "")
-    if "$" in f"{kind}{flags}":
+    unknown = [key for key in options if key not in ("type", "o", "device")]
+    for key in unknown:
+        message = f"unknown option '{key}' of the volume '{name}'"
+        yield AccessFinding((key,), message, did_you_mean(str(key), ("type", "o", "device")))
+    if unknown or "$" in f"{kind}{flags}":
         return
     words = [word.strip() for word in flags.split(",") if word.strip()]
     if {"bind", "rbind"} & set(words):
         if not all(_BIND_OPTIONS.fullmatch(word) for word in words):
             yield AccessFinding(("o",), f"'{flags}' of the volume '{name}' has other options than bind, ro and rw")
-        problem, hint = _bind_problem(device, "ro" in words, paths)
+        problem, hint = _bind_problem(device, paths)
         if problem:
             yield AccessFinding(("device",), problem, hint)
     elif kind != "tmpfs" or not all(_TMPFS_OPTIONS.fullmatch(word) for word in words):
         message = f"the volume '{name}' mounts '{kind or flags or device}', which reaches beyond the test"
-        hint = "use a tmpfs (type: tmpfs), or a folder of the repository (o: bind)"
-        yield AccessFinding(("type",) if kind else ("o",) if flags else (), message, hint)
+        yield AccessFinding(("type",) if kind else ("o",) if flags else (), message, _OPTIONS)
 
 
-def _bind_problem(device: str, read_only: bool, paths: HostPaths) -> tuple[str, str]:
-    if "$" in device and not paths.literal:
+def _bind_problem(device: str, paths: HostPaths) -> tuple[str, str]:
+    if paths.is_open(device):
         return "", ""
-    seen = host_access.Mount(paths.whole(device), "", read_only)
-    if host_access.is_machine(seen) or host_access.is_hardware(seen) or host_access.is_of_machine(seen.source):
-        return f"'{device}' belongs to the host, so tests would share it", "mount a folder of the repository"
-    return paths.mount_problem(device, read_only)
+    if link := paths.link(device):
+        return f"'{device}' is a symbolic link to '{link}', outside the repository", INSIDE
+    for name in paths.names(device):
+        seen = host_access.Mount(name, "", read_only=False)
+        if host_access.is_machine(seen) or host_access.is_hardware(seen) or host_access.is_of_machine(name):
+            return f"'{device}' belongs to the host, so tests would share it", "mount a folder of the repository"
+    return paths.mount_problem(device)

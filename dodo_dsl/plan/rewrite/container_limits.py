@@ -15,11 +15,10 @@ LOGS = {"max-size": "50m", "max-file": "2"}
 _DRIVERS = ("json-file", "local")
 _NUMBERS = ("pids_limit", "mem_limit", "cpus", "pids", "memory")
 _UNLIMITED = ("", "0", "-1")
-_RESERVED_LABELS = ("com.docker.", "dodo.")
 
 
 def confine(copy: ServiceCopy) -> None:
-    """Limits of processes, memory and files, no way to more privileges, logs that DoDo reads, labels of its own."""
+    """Limits of processes, memory and files, no way to more privileges, logs that DoDo reads."""
     limits = copy.setting.limits
     _cut(copy)
     _limit(copy, "pids_limit", "pids", limits.processes)
@@ -34,7 +33,6 @@ def confine(copy: ServiceCopy) -> None:
     if isinstance(logging, dict) and logging.get("driver", "json-file") not in _DRIVERS:
         copy.remove("logging", "DoDo reads the logs")
     _limit_logs(copy)
-    _own_labels(copy)
 
 
 def _cut(copy: ServiceCopy) -> None:
@@ -112,16 +110,3 @@ def _drop_capabilities(copy: ServiceCopy) -> None:
     dropped = [str(word) for word in copy.service.get("cap_drop") or ()]
     taken = {word.upper().removeprefix("CAP_") for word in dropped}
     copy.service["cap_drop"] = [*dropped, *(name for name in DROPPED if not taken & {name, "ALL"})]
-
-
-def _own_labels(copy: ServiceCopy) -> None:
-    labels = copy.service.get("labels")
-    if isinstance(labels, dict):
-        kept: Any = {key: value for key, value in labels.items() if not str(key).startswith(_RESERVED_LABELS)}
-    elif isinstance(labels, list):
-        kept = [label for label in labels if not str(label).startswith(_RESERVED_LABELS)]
-    else:
-        return
-    if len(kept) < len(labels):
-        copy.note("labels of compose and DoDo removed")
-        copy.keep_items("labels", kept)

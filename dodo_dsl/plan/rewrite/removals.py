@@ -9,7 +9,7 @@ from dodo_dsl.application.access.compose_keys import BUILD, SERVICE, removed
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 _REMOVED = {key: why for key, why in removed(SERVICE).items() if key != "scale"}
-_DEPLOY = ("replicas", "mode", "restart_policy", "placement", "update_config", "rollback_config")
+_DEPLOY = ("labels", "replicas", "mode", "restart_policy", "placement", "update_config", "rollback_config")
 
 
 def remove_machine_settings(copy: ServiceCopy) -> None:
@@ -24,7 +24,7 @@ def remove_machine_settings(copy: ServiceCopy) -> None:
         scale = deploy.get("replicas", scale)
         kept = {key: value for key, value in deploy.items() if key not in _DEPLOY}
         if len(kept) < len(deploy):
-            copy.note("deploy keeps only resources and labels")
+            copy.note("deploy keeps only resources")
         copy.service["deploy"] = kept
         _remove_reserved_memory(copy, kept)
         if not kept:

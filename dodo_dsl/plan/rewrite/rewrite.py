@@ -20,6 +20,7 @@ from dodo_dsl.plan.rewrite import (
     variables,
     volumes,
 )
+from dodo_dsl.plan.rewrite.file_copies import FileCopies
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 from dodo_dsl.source import Node
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -57,7 +58,6 @@ def plan_application(
     written = compose_paths.escaped(base)
     names = frozenset(application.services)
     containers, known, ports = application.containers, application.known, application.access.ports
-    setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits, ports)
     changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
     changes += [f"all services: {name} as the test sets it" for name in given]
     path_variables: set[str] = set()
@@ -66,17 +66,18 @@ def plan_application(
         path_variables.update(interpolation.names(path) if path.startswith("$") else ())
         return compose_paths.rebased(path, written)
 
-    services = {
-        name: _copied(service, compose_paths.mapped_service(service.node, change), setting, changes)
-        for name, service in application.services.items()
-    }
+    nodes = {n: compose_paths.mapped_service(service.node, change) for n, service in application.services.items()}
     rest = {key: plain(node) for key, node in compose_paths.mapped_rest(application.rest, change).items()}
+    paths = replace(application.paths, folder=folder)
+    copies = FileCopies(paths, known, map(plain, nodes.values()), rest.get("volumes"))
+    setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits, ports, copies)
+    services = {name: _copied(application.services[name], node, setting, changes) for name, node in nodes.items()}
     for key in ("secrets", "configs"):
         if isinstance(rest.get(key), dict):
             rest[key] = {name: volumes.without_name(about) for name, about in rest[key].items()}
     changes = other_changes.of_all(changes, list(services))
-    if "volumes" in rest:
-        rest["volumes"] = volumes.own_volumes(rest["volumes"], changes, limits, known)
+    if "volumes" in rest or copies.sources:
+        rest["volumes"] = volumes.own_volumes(rest.get("volumes"), changes, copies.sources, limits, known)
     changes += other_changes.of_top_level(application, rest)
     planned = tuple(_planned(service, cid) for service in application.services.values())
     carried = variables.carried(application, cid, base, path_variables)
@@ -88,7 +89,9 @@ def plan_application(
         privileged=hil and privileged_allowed,
     )
     compose = {"services": services, **rest}
-    return Application(base, planned, compose, tuple(changes), carried, limits, secrets=secrets, access=access)
+    return Application(
+        base, planned, compose, tuple(changes), carried, limits, secrets=secrets, access=access, copies=copies.sources
+    )
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.application.access import filled
+from dodo_dsl.plan.rewrite.file_copies import FileCopies
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 
@@ -13,7 +14,8 @@ class Setting:
     """Properties of a test; ``waits`` are the services of DoDo after which the application starts.
 
     ``names`` are the application's services that start, ``containers`` their names by ``container_name``, ``known`` the
-    variables whose values are known, ``limits`` what a service gets that sets none, and ``ports`` those of rigs.
+    variables whose values are known, ``limits`` what a service gets that sets none, ``ports`` those of rigs, and
+    ``copies`` the folders of the repository that the test copies.
     """
 
     cid: int
@@ -26,6 +28,7 @@ class Setting:
     known: Mapping[str, str] = field(default_factory=dict)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     ports: tuple[str, ...] = ()
+    copies: FileCopies | None = None
 
     @property
     def own_network(self) -> bool:

@@ -1,9 +1,10 @@
 """Network, IPC and other namespaces of a service: the test's own, or the rig's."""
 
+from collections.abc import Collection
 from typing import Any
 
 from dodo_dsl.application import host_access
-from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 
@@ -87,6 +88,8 @@ def own_dependencies(copy: ServiceCopy) -> None:
     waits = {name: {"condition": "service_healthy"} for name in setting.waits}
     if setting.own_network:
         waits = {SANDBOX: started, **waits}
+    if setting.copies is not None and _has_copies(service, setting.copies.sources):
+        waits = {FILES: {"condition": "service_healthy"}, **waits}
     service.pop("depends_on", None)
     if waits or own:
         service["depends_on"] = {**own, **waits}
@@ -94,6 +97,10 @@ def own_dependencies(copy: ServiceCopy) -> None:
     copy.keep_items("links", [link for link in links if str(link).partition(":")[0] in setting.names])
     borrowed = [_borrowed(copy, entry) for entry in service.get("volumes_from") or ()]
     copy.keep_items("volumes_from", borrowed)
+
+
+def _has_copies(service: dict[str, Any], copies: Collection[str]) -> bool:
+    return any(host_access.mount(volume).source in copies for volume in service.get("volumes") or ())
 
 
 def _borrowed(copy: ServiceCopy, entry: Any) -> Any:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import ipaddress
 import os
 import signal
 import threading
@@ -9,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.bus import announce_begin
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
@@ -32,6 +33,9 @@ _NOT_STARTED, _INIT = (126, 127), "[FATAL tini"
 """How the engine's own first process of a container (``init: true``) ends when it cannot start the program."""
 _MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
 """How often, and how long each time, the engine's word is awaited that it was for memory: it may come late."""
+
+_COPY_S = 600.0
+"""The longest that copies of the repository's files may take."""
 
 
 class DockerBackend:
@@ -71,6 +75,7 @@ class DockerBackend:
         self._outputs: dict[str, ServiceOutput] = {}
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
+        self._copied, self._copy_problem = asyncio.Event(), ""
         self.left_behind = False
 
     @property
@@ -92,8 +97,9 @@ class DockerBackend:
             names = {service.name for service in self.plan.application.services}
             self._use = ContainerUse({name: c for name, c in self._containers.items() if name in names})
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
-            if SANDBOX in self._containers:
-                await asyncio.to_thread(self._containers[SANDBOX].start)
+            for name in (SANDBOX, FILES):
+                if name in self._containers:
+                    await asyncio.to_thread(self._containers[name].start)
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
@@ -104,6 +110,8 @@ class DockerBackend:
     def _take(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
         if action == "oom":
             self._out_of_memory.add(name)
+        elif name == FILES:
+            self._take_of_copies(action)
         elif action == "health_status: healthy":
             self._events.put_nowait(Ready(name))
         elif action == "die" and name in self._outputs:
@@ -111,6 +119,39 @@ class DockerBackend:
             task.add_done_callback(lambda t: t.exception())
         elif action == "die":
             self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+
+    def _take_of_copies(self, action: str) -> None:
+        if action == "health_status: healthy":
+            self._copied.set()
+        elif action == "die" and not self._copied.is_set():
+            task = asyncio.ensure_future(self._not_copied())
+            task.add_done_callback(lambda t: t.exception())
+
+    async def _not_copied(self) -> None:
+        from docker.errors import DockerException
+
+        said = b""
+        with contextlib.suppress(DockerException, OSError):
+            said = await asyncio.to_thread(self._containers[FILES].logs, tail=1)
+        why = said.decode("utf-8", "replace").strip() or "the program that copies them ended"
+        self._copy_problem = f"the application's files cannot be copied: {why}"
+        self._copied.set()
+
+    async def _wait_for_copies(self) -> None:
+        """Until the application has its own copies of the repository's files; raises BackendError."""
+        from docker.errors import DockerException
+
+        if FILES not in self._containers:
+            return
+        try:
+            await asyncio.wait_for(self._copied.wait(), _COPY_S)
+        except TimeoutError:
+            hint = "mount large folders read-only (:ro)"
+            raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}") from None
+        if self._copy_problem:
+            raise BackendError(self._copy_problem)
+        with contextlib.suppress(DockerException, OSError):
+            await asyncio.to_thread(self._containers[FILES].kill)
 
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
@@ -147,6 +188,7 @@ class DockerBackend:
         names = [s.name for s in self.plan.layer(layer)]
         if layer == "application":
             names = [s.name for s in self.plan.application.services if s.name in self._containers]
+            await self._wait_for_copies()
         evaluators = {s.name for s in self.plan.services if s.judge}
         for name in names:
             self._outputs[name] = ServiceOutput(
@@ -241,6 +283,13 @@ class DockerBackend:
 
 
 def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
-    """The planned subnet, then the rest of the deployment's."""
+    """The planned subnet, then the rest of the deployment's of the same size."""
     yield first
-    yield from (subnet for subnet in all_subnets if subnet != first)
+    length = int(first.partition("/")[2]) if first else 32
+    seen = {first}
+    for text in all_subnets:
+        network = ipaddress.IPv4Network(text)
+        same = str(network.supernet(new_prefix=length)) if length < network.prefixlen else text
+        if same not in seen:
+            seen.add(same)
+            yield same

@@ -82,8 +82,27 @@ def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
     """Containers come first: networks and volumes can only be removed when no container uses them."""
     for container in client.containers.list(all=True, filters=_filters(project)):
         yield functools.partial(container.remove, force=True, v=True)
-    yield from (network.remove for network in client.networks.list(filters=_filters(project)))
+    for network in client.networks.list(filters=_filters(project)):
+        yield functools.partial(_remove_network, network)
     yield from (volume.remove for volume in client.volumes.list(filters=_filters(project)))
+
+
+def _remove_network(network: Any) -> None:
+    """Removes a network, also where an endpoint is left of a container that could not start."""
+    from docker.errors import APIError, NotFound
+
+    try:
+        network.remove()
+    except NotFound:
+        raise
+    except APIError:
+        network.reload()
+        left = network.attrs.get("Containers") or {}
+        for about in left.values():
+            network.disconnect(about["Name"], force=True)
+        if not left:
+            raise
+        network.remove()
 
 
 def reap_projects(client: Any) -> Reaped:

@@ -16,7 +16,7 @@ from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
 from dodo_dsl.application.access.model import AccessFinding
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
@@ -49,8 +49,8 @@ class Compose:
         self._volumes: dict[str, Any] = {}
         self._images: dict[str, str] = {}
         self._say = say
-        self._paths = application_paths(plan.application, folder)
-        outside = secret_variables.visible(os.environ, plan.application.access.passed)
+        self._paths = replace(application_paths(plan.application, folder), tmp=plan.isolation == "host")
+        outside = secret_variables.allowed(os.environ, plan.application.access.passed)
         self._outside = {**secrets_of(plan.application, folder, outside), **outside}
 
     async def read(self) -> None:
@@ -179,7 +179,8 @@ class Compose:
     def _masks(self) -> dict[str, Any]:
         """What hides the tests from the application's services."""
         hidden = hidden_folders(self.plan.application, self.folder, self.report)
-        names = [service.name for service in self.plan.application.services if service.name in self.services]
+        every = (*(service.name for service in self.plan.application.services), FILES)
+        names = [name for name in every if name in self.services]
         found = {name: masks(self.services[name], self._volumes, hidden) for name in names}
         return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}
 
@@ -187,11 +188,10 @@ class Compose:
         self, *words: str, subnet: str = "", log: Path | None = None, project: str = "", files: str = ""
     ) -> tuple[int, str, str]:
         """Exit code, standard output and the last line of standard error of a compose command."""
-        environment = {**self._outside, **self._images, "COMPOSE_PROGRESS": "plain"}
-        environment["COMPOSE_PROJECT_NAME"] = project or self.project
+        own = {"COMPOSE_PROGRESS": "plain", "COMPOSE_PROJECT_NAME": project or self.project, RUNNER_VARIABLE: "dodo"}
+        environment = {**secret_variables.of_client(os.environ), **self._outside, **self._images, **own}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_PATH_SEPARATOR", "COMPOSE_ENV_FILES"):
             environment.pop(name, None)  # the test's own .env sets them
-        environment[RUNNER_VARIABLE] = "dodo"
         if files:
             environment["COMPOSE_FILE"] = files
         if subnet:

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.snapshot import PROC, Snapshot
 from dodo_dsl.run.load.thread_times import ThreadTimes
@@ -15,7 +15,7 @@ class ContainerProcesses:
     """``containers`` are those of the engine's client, by service. May be used by one thread at a time."""
 
     def __init__(self, containers: Mapping[str, Any], proc: Path = PROC) -> None:
-        self._containers = {name: c for name, c in containers.items() if name != SANDBOX}
+        self._containers = {name: c for name, c in containers.items() if name not in (SANDBOX, FILES)}
         self._proc = proc
         self._times = ThreadTimes(proc)
         self._services: dict[int, str] | None = None

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application import compose_paths
-from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.mixed.holder import holder
+from dodo_dsl.run.mixed.holder import copier, holder
 
 _APPLICATION_FILE = "application.compose.yml"
 _TMP = "tmp"
@@ -33,6 +33,9 @@ class ApplicationCompose(Compose):
             options = compose_paths.escaped_values(self._volumes[_TMP].get("driver_opts") or {})
             own["volumes"] = {_TMP: {"driver_opts": options}}
             self.services[SANDBOX] = own["services"][SANDBOX]
+        if FILES in config["services"]:
+            own.setdefault("services", {})[FILES] = copier(config["services"][FILES])
+            self.services[FILES] = own["services"][FILES]
         self._replacing = replacing(self.services, names, own)
 
     def _files(self, folder: Path) -> list[str]:
@@ -46,7 +49,7 @@ def replacing(services: dict[str, Any], application: set[str], own: dict[str, An
     lines = ["services:"]
     for name in sorted(application & services.keys()):
         after = services[name].get("depends_on") or {}
-        left = {other: how for other, how in after.items() if other in application or other == SANDBOX}
+        left = {other: how for other, how in after.items() if other in application or other in (SANDBOX, FILES)}
         lines.append(f"  {json.dumps(name)}: {{depends_on: !override {json.dumps(left)}}}")
     lines += [f"  {json.dumps(name)}: {json.dumps(service)}" for name, service in own.get("services", {}).items()]
     lines += [f"{key}: {json.dumps(value)}" for key, value in own.items() if key != "services"]

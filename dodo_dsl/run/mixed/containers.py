@@ -24,7 +24,7 @@ class ApplicationContainers(DockerBackend):
         return self._events
 
     async def open(self) -> None:
-        if self.plan.isolation == "network":
+        if self.plan.isolation == "network" or self.plan.application.copies:
             await asyncio.to_thread(provide_image, self._client)
         await super().open()
         if SANDBOX in self._containers:

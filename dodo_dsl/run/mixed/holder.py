@@ -34,7 +34,6 @@ def provide_image(client: Any) -> None:
 
 def holder(slug: str) -> dict[str, Any]:
     """The container in compose's words; it can do nothing but sleep."""
-    folders = [folder for folder in _SEEN if Path(folder).is_dir()]
     return {
         "image": IMAGE,
         "entrypoint": [shutil.which(_PROGRAM) or f"/bin/{_PROGRAM}", "infinity"],
@@ -46,5 +45,19 @@ def holder(slug: str) -> dict[str, Any]:
         "cap_drop": ["ALL"],
         "security_opt": ["no-new-privileges:true"],
         "labels": {"dodo.test": slug, "dodo.layer": "sandbox"},
-        "volumes": ["tmp:/tmp", *(f"{folder}:{folder}:ro" for folder in folders)],
+        "volumes": ["tmp:/tmp", *_folders()],
     }
+
+
+def copier(compiled: dict[str, Any]) -> dict[str, Any]:
+    """The container that copies the repository's files, as it is ``compiled``, with this machine's programs."""
+    kept = {key: value for key, value in compiled.items() if key not in ("image", "entrypoint", "depends_on")}
+    shell, *words = compiled["entrypoint"]
+    folders = [*compiled["volumes"], *_folders()]
+    return {**kept, "image": IMAGE, "entrypoint": [shutil.which(shell) or shell, *words], "volumes": folders}
+
+
+def _folders() -> list[dict[str, Any]]:
+    """The mounts of this machine's programs."""
+    seen = [folder for folder in _SEEN if Path(folder).is_dir()]
+    return [{"type": "bind", "source": folder, "target": folder, "read_only": True} for folder in seen]

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate
+from dodo_dsl.application.access import secret_variables
+from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate, own_dotenv
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
@@ -16,7 +17,6 @@ from dodo_dsl.run.process.environment import (
     application_environment,
     base_environment,
     expanded,
-    own_environment,
 )
 from dodo_dsl.run.process.python_path import package_path
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
@@ -85,9 +85,9 @@ class Commands:
         folder = (self.folder / self.plan.application.folder).resolve()
         passed = self.plan.application.access.passed
         inherited = application_environment(passed)
-        outside = {**own_environment(passed), **inherited}
+        outside = {**secret_variables.allowed(os.environ, passed), **inherited}
         cids = {name: str(self.slot.cid) for name in CID_VARIABLES}
-        variables = {**dotenv_file(folder / ".env", outside), **outside}
+        variables = {**own_dotenv(folder, outside), **outside}
         variables.update({name: cid for name, cid in cids.items() if name in self.plan.application.variables})
         own: dict[str, str] = {}
         paths = application_paths(self.plan.application, self.folder)

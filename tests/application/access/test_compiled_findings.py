@@ -34,7 +34,7 @@ SHOWN = {
     "cap_drop": ["NET_RAW"],
     "volumes": [
         {"type": "volume", "source": "tmp", "target": "/tmp", "volume": {}},
-        {"type": "bind", "source": "/builds/team/maps", "target": "/maps", "bind": {"create_host_path": True}},
+        {"type": "bind", "source": "/builds/team/maps", "target": "/maps", "read_only": True},
     ],
     "build": {"context": "/builds/team", "dockerfile": "Dockerfile"},
     "configs": [{"source": "limits", "target": "/limits"}],

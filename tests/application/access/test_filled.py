@@ -41,12 +41,13 @@ def test_values_and_nodes_are_filled_alike() -> None:
 
 def test_the_variables_that_are_known() -> None:
     own = {"A": "a", "B": "${A}-${HOST}", "CI_TOKEN": "own"}
-    outside = {"A": "outside", "HOST": "h", "CI_TOKEN": "pipeline", "X_KEY": "k", "Y_KEY": "k"}
-    assert filled.known_variables(own, outside, "/team", ["Y_KEY"]) == {
-        "A": "outside",
-        "B": "outside-h",
+    outside = {"A": "outside", "HOST": "h", "CI_TOKEN": "pipeline", "X_KEY": "k", "Y_KEY": "k", "USER": "u"}
+    assert filled.known_variables(own, outside, "/team", ["Y_KEY", "HOST"]) == {
+        "A": "a",
+        "B": "a-h",
         "CI_TOKEN": "own",
         "HOST": "h",
+        "USER": "u",
         "Y_KEY": "k",
         "PWD": "/team",
     }

@@ -4,14 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.access.secret_problems import left_out, withheld
+from dodo_dsl.application.access.secret_problems import in_files, left_out, withheld, written
 from dodo_dsl.diagnostics import format_text
 from tests.source.nodes import mapping
+
+OUTSIDE = {"DATABASE": "x://a:s3cr3t@b", "DISPLAY": ":0", "HOME": "/root", "DODO_SEARCH_STORAGE": "x", "PWD": "/"}
 
 
 def names(text: str, own: tuple[str, ...] = (), passed: tuple[str, ...] = ()) -> list[str]:
     """The variables that a compose file is warned of."""
-    return [problem.message.split("'")[1] for problem in withheld([mapping(text)], own, passed)]
+    return [problem.message.split("'")[1] for problem in withheld([mapping(text)], own, passed, OUTSIDE)]
 
 
 @pytest.mark.parametrize(
@@ -27,6 +29,8 @@ def names(text: str, own: tuple[str, ...] = (), passed: tuple[str, ...] = ()) ->
         ("s: {environment: API_KEY}", ["API_KEY"]),
         ("x-own: ${API_KEY}", []),
         ("labels: [API_KEY]", []),
+        ("environment: [DATABASE, DISPLAY, HOME, SPEED]", ["DATABASE", "DISPLAY"]),
+        ("command: ${PWD}/x --a=${DISPLAY} --b=${DODO_SEARCH_STORAGE:-}", ["DISPLAY", "DODO_SEARCH_STORAGE"]),
     ],
 )
 def test_variables_that_are_named(text: str, expected: list[str]) -> None:
@@ -35,6 +39,22 @@ def test_variables_that_are_named(text: str, expected: list[str]) -> None:
 
 def test_own_and_passed_variables_are_no_problem() -> None:
     assert names("command: $A_KEY $B_KEY $C_KEY", ("A_KEY",), ("B_KEY",)) == ["C_KEY"]
+
+
+def test_values_that_look_like_secrets(tmp_path: Path) -> None:
+    token = "glpat-" + "0123456789" * 2
+    node = mapping(f"command: --db=x://a:s3cr3t@b\nenvironment: {{T: {token}, U: https://a.b/c, V: 'x://a:${{P}}@b'}}")
+    found = list(written([node]))
+    assert [problem.message.split(",")[0] for problem in found] == [
+        "this looks like an address with a password",
+        "this looks like a token",
+    ]
+    assert {problem.span.length for problem in found} == {0}
+    file = tmp_path / "own.env"
+    file.write_text(f"SPEED=1\nT={token}\n")
+    (problem,) = in_files([file])
+    assert (problem.span.file, problem.span.line, problem.span.column) == (str(file), 2, 1)
+    assert token not in format_text([problem])
 
 
 def test_lines_with_secrets_are_not_shown(tmp_path: Path) -> None:

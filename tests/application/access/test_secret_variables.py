@@ -30,7 +30,11 @@ def test_the_pipeline_s_own() -> None:
 def test_values_that_hold_secrets() -> None:
     assert secret_variables.holds_secret("BACKEND", "postgres://team:pw@db/x")
     assert secret_variables.holds_secret("PEM", "-----BEGIN RSA PRIVATE KEY-----")
+    assert secret_variables.holds_secret("CACHE", "redis://:pw@cache/0")
+    assert secret_variables.holds_secret("A", "ghp_" + "a" * 36)
+    assert secret_variables.holds_secret("A", "Bearer eyJhbGciOiJI.eyJzdWIiOiIx.SflKxwRJSM")
     assert not secret_variables.holds_secret("SITE", "https://example.org:8080/a@b")
+    assert not secret_variables.holds_secret("A", "the-task-force-of-sk-learn-and-others")
 
 
 @pytest.mark.parametrize(
@@ -45,7 +49,22 @@ def test_variables_that_steer_nothing(name: str) -> None:
     assert not secret_variables.is_steering(name)
 
 
-def test_what_is_visible() -> None:
-    variables = {"A": "1", "A_KEY": "2", "CI_JOB_TOKEN": "3"}
+def test_what_services_see() -> None:
+    variables = {"A": "1", "A_KEY": "2", "CI_JOB_TOKEN": "3", "DB": "x://a:b@c", "DODO_SEARCH_STORAGE": "x"}
     assert secret_variables.visible(variables) == {"A": "1"}
-    assert secret_variables.visible(variables, ("A_KEY", "NOT_SET")) == {"A": "1", "A_KEY": "2"}
+    passed = ("A_KEY", "NOT_SET", "DB", "DODO_SEARCH_STORAGE")
+    assert secret_variables.visible(variables, passed) == {"A": "1", "A_KEY": "2", "DB": "x://a:b@c"}
+
+
+def test_what_applications_see() -> None:
+    variables = {"A": "1", "B": "2", "HOME": "/root", "LC_TIME": "C", "DODO_IMAGE_A": "x", "DODO_SEARCH_STORAGE": "x"}
+    common = {"HOME": "/root", "LC_TIME": "C", "DODO_IMAGE_A": "x"}
+    assert secret_variables.allowed(variables) == common
+    assert secret_variables.allowed(variables, ("B", "DODO_SEARCH_STORAGE")) == {"B": "2", **common}
+
+
+def test_what_the_engine_s_client_sees() -> None:
+    variables = {"DOCKER_HOST": "unix:///x", "SSH_AUTH_SOCK": "/s", "CI_JOB_TOKEN": "3", "HTTP_PROXY": "x://a:b@c"}
+    assert secret_variables.of_client(variables) == {"DOCKER_HOST": "unix:///x"}
+    remote = {**variables, "DOCKER_HOST": "ssh://host"}
+    assert secret_variables.of_client(remote) == {"DOCKER_HOST": "ssh://host", "SSH_AUTH_SOCK": "/s"}

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from dodo_dsl.plan.rewrite.file_copies import FileCopies
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
@@ -24,8 +25,9 @@ def copy(
     privileged: bool = False,
     ports: tuple[str, ...] = (),
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
+    copies: FileCopies | None = None,
 ) -> ServiceCopy:
     """A service beside ``eyes``, whose container is ``camera``."""
     names, containers = frozenset(["a", "eyes"]), {"camera": "eyes"}
-    setting = Setting(140, isolation, ("judge",), names, containers, hil, privileged, {}, limits, ports)
+    setting = Setting(140, isolation, ("judge",), names, containers, hil, privileged, {}, limits, ports, copies)
     return ServiceCopy("a", service, setting, [])

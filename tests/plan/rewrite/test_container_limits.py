@@ -80,8 +80,6 @@ from tests.plan.rewrite.copies import CONFINED, copy
         ({"logging": None}, {}),
         ({"logging": {"options": {"max-size": "1m"}}}, {"logging": {"options": {"max-size": "1m"}}}),
         ({"logging": {"driver": "${D:-syslog}"}}, {}),
-        ({"labels": {"dodo.test": "x", "team": "a"}}, {"labels": {"team": "a"}}),
-        ({"labels": ["com.docker.compose.project=x"]}, {}),
     ],
 )
 def test_what_a_service_gets(service: dict[str, Any], changed: dict[str, Any]) -> None:

@@ -28,15 +28,15 @@ def test_names_ports_and_policies() -> None:
         (
             {"scale": 3, "deploy": {"replicas": 2, "resources": {}}},
             {"deploy": {"resources": {}}},
-            ["a: deploy keeps only resources and labels", "a: starts once, not 2 times"],
+            ["a: deploy keeps only resources", "a: starts once, not 2 times"],
         ),
-        ({"deploy": {"mode": "global"}}, {}, ["a: deploy keeps only resources and labels"]),
+        ({"deploy": {"mode": "global"}}, {}, ["a: deploy keeps only resources"]),
         (
             {"deploy": {"resources": {"reservations": {"memory": "8g", "cpus": "1"}}}},
             {"deploy": {"resources": {"reservations": {"cpus": "1"}}}},
             ["a: reserved memory removed, a test has limits only"],
         ),
-        ({"deploy": {"labels": ["x"]}}, {"deploy": {"labels": ["x"]}}, []),
+        ({"deploy": {"labels": ["x"]}}, {}, ["a: deploy keeps only resources"]),
     ],
 )
 def test_each_service_runs_once(service: dict[str, Any], changed: dict[str, Any], notes: list[str]) -> None:

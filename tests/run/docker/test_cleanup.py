@@ -13,6 +13,14 @@ class Thing:
 
     def __init__(self, engine: "Engine", *errors: Exception) -> None:
         self._engine, self._errors = engine, list(errors)
+        self.endpoints: dict[str, dict[str, str]] = {}
+
+    def reload(self) -> None:
+        self.attrs = {"Containers": self.endpoints}
+
+    def disconnect(self, name: str, force: bool) -> None:
+        assert force
+        self.endpoints = {key: about for key, about in self.endpoints.items() if about["Name"] != name}
 
     def remove(self, **_: object) -> None:
         if self._errors:
@@ -76,3 +84,10 @@ def test_an_engine_that_does_not_answer_is_not_waited_for(rests: list[float]) ->
 def test_what_is_gone_already_is_no_problem(rests: list[float]) -> None:
     assert cleanup.remove_project(Engine(NotFound("gone")), "dodo-x") == 0
     assert rests == []
+
+
+def test_endpoints_of_containers_that_could_not_start_are_removed(rests: list[float]) -> None:
+    engine = Engine(APIError("network has active endpoints"))
+    engine.things[0].endpoints = {"ep-1": {"Name": "dodo-x-driver-1"}}
+    assert cleanup.remove_project(engine, "dodo-x") == 1
+    assert (engine.things, rests) == ([], [])

@@ -57,7 +57,6 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     )
     expected = {
         "LEVEL": "debug",
-        "FROM_OUTSIDE": "here",
         "FLAGS": "--cid=150 --rate=20",
         "WHEELBASE": "0.257",
         "OD4SESSION_CID": "150",
@@ -66,6 +65,8 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         "LICENSE": "none",
     }
     assert {name: made.environment.get(name) for name in expected} == expected
+    assert "FROM_OUTSIDE" not in made.environment
+    assert command(tmp_path, monkeypatch, "FROM_OUTSIDE").environment["FROM_OUTSIDE"] == "here"
     assert not {"NOWHERE", "CI_JOB_TOKEN", "UNNAMED"} & set(made.environment)
     assert made.folder == tmp_path
 
