@@ -73,7 +73,7 @@ def test_goldens(style: str, way: str, monkeypatch: pytest.MonkeyPatch, update_g
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("style", STYLES)
 def test_the_first_lines_name_each_key_that_differs(style: str, way: str, tmp_path: Path) -> None:
-    source, _ = read_application(files(FOLDER / "good" / style))
+    source, _ = read_application(files(FOLDER / "good" / style), Access(paths=PATHS))
     made, _ = plan(FOLDER / "good" / style, way, tmp_path)
     assert source is not None and made.application is not None
     copied = made.application.compose
