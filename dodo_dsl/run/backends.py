@@ -96,8 +96,8 @@ class Processes:
         self._start_fork_server(plans if "network" in wanted else ())
         is_needed = self._isolation is None and "network" in wanted
         if is_needed and (refusal := await asyncio.to_thread(host_isolation.isolation_refusal, self._fork_server)):
-            remedy = f"{refusal.remedy}, or trust" if refusal.remedy else "trust"
-            way_out = f"{remedy} the application and run with --isolation host"
+            remedy = f"{refusal.remedy}; " if refusal.remedy else ""
+            way_out = f"{remedy}an application that you trust runs with --isolation host"
             self._problem = f"the application cannot be isolated on this machine: {refusal}; {way_out}"
             return
         if "host" in wanted or any(is_real(plan) for plan in plans):

@@ -2,7 +2,15 @@
 
 import pytest
 
-from dodo_dsl.application.compose_paths import is_path, mapped_rest, mapped_service, rebased
+from dodo_dsl.application.compose_paths import (
+    escaped,
+    escaped_values,
+    is_path,
+    mapped_rest,
+    mapped_service,
+    rebased,
+    unescaped,
+)
 from dodo_dsl.source import plain
 from tests.source.nodes import mapping
 
@@ -53,6 +61,22 @@ def test_paths_from_another_folder(path: str, expected: str) -> None:
 )
 def test_paths_of_a_service(written: str, expected: object) -> None:
     assert plain(mapped_service(mapping(written), lambda path: f"<{path}>")) == expected
+
+
+def test_a_mount_whose_path_has_a_colon_takes_the_long_form() -> None:
+    """The short form would be split there; what else it says stays."""
+    moved = mapped_service(mapping("volumes: ['./a:/b:ro,z', '.:/c']"), lambda path: rebased(path, escaped("../x:$y")))
+    bind = {"create_host_path": False}
+    assert plain(moved)["volumes"] == [
+        {"type": "bind", "source": "../x:$$y/a", "target": "/b", "read_only": True, "bind": {**bind, "selinux": "z"}},
+        {"type": "bind", "source": "../x:$$y/.", "target": "/c", "read_only": False, "bind": bind},
+    ]
+
+
+def test_what_compose_shows_has_two_dollar_signs_for_each() -> None:
+    shown = {"volumes": [{"source": "/a$$b", "read_only": True}]}
+    assert unescaped(shown) == {"volumes": [{"source": "/a$b", "read_only": True}]}
+    assert escaped_values(unescaped(shown)) == shown
 
 
 def test_paths_at_the_top_level() -> None:

@@ -17,6 +17,7 @@ from dodo_dsl.images.wheels import WheelsError
 from dodo_dsl.opendlv.bus.session import SessionError
 from dodo_dsl.opendlv.odvd.parser import OdvdError
 from dodo_dsl.opendlv.recordings.recording import RecordingError
+from dodo_dsl.plan.plan_json import json_text
 from dodo_dsl.plan.test_files import FilesError
 from dodo_dsl.rec.excerpt import NothingSelected
 from dodo_dsl.rec.outputs import OutputExists
@@ -53,6 +54,17 @@ def test_errors_of_the_user(kind: type[Exception], monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("kind", [DockerError, WheelsError, LeaseTimeout, RigProblem, SessionError])
 def test_errors_of_the_machine(kind: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
     assert ended(kind("it is so"), monkeypatch, "doctor") == (3, "dodo doctor: it is so\n")
+
+
+@pytest.mark.parametrize("text", ["caf\udce9/x", 'of: "caf\udce9/x"\nmore: "y"'])
+def test_a_name_that_is_not_utf8_is_named(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(UnicodeEncodeError) as raised:
+        json_text({"path": text})
+    said = "dodo list: 'caf\\xe9/x' is not UTF-8, as names of files and folders must be here: rename it\n"
+    assert ended(raised.value, monkeypatch)[0] == 2
+    with pytest.raises(UnicodeEncodeError) as raised:
+        text.encode()
+    assert ended(raised.value, monkeypatch) == (2, said)
 
 
 def test_a_rig_says_whose_error_it_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 """The output folder: whether it is stale, how it differs, and which folders in it are DoDo's own."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -65,3 +66,20 @@ def test_stale_tests_leave_the_output(output: Path) -> None:
     assert (output / "mine" / "notes.txt").exists()
     assert run("compile")[0] == 0
     assert (output / CURVE).is_dir()
+
+
+def test_files_of_a_test_are_readable_for_users_of_containers(
+    generated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the umask, which closes the folder around them."""
+    monkeypatch.chdir(generated.parent)
+    before = os.umask(0o077)
+    try:
+        assert run("compile", STRAIGHT, "-o", str(tmp_path / "out"))[0] == 0
+    finally:
+        os.umask(before)
+    test = tmp_path / "out" / STRAIGHT
+    assert oct(test.stat().st_mode & 0o777) == "0o700"
+    files = [test / "files", *(test / "files").rglob("*")]
+    assert len(files) > 3
+    assert {oct(path.stat().st_mode & 0o077) for path in files} == {"0o55", "0o44"}

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import shutil
 import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
@@ -59,8 +60,10 @@ class Compose:
             self._refuse(env_file_findings(self.plan.application, self._paths, self._outside))
         except EnvironmentProblem as error:
             raise BackendError(str(error)) from error
+        if shutil.which("docker") is None:
+            raise BackendError(f"there is no program 'docker': {advice.docker()}")
         code, out, problem = await self._run("config", "--format", "json")
-        if code and _NO_COMPOSE in problem:
+        if code and _NO_COMPOSE in problem and (await self._run("version"))[0]:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
         if code:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")

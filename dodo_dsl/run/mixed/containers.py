@@ -38,7 +38,11 @@ class ApplicationContainers(DockerBackend):
             container.reload()
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
-        process = int(container.attrs["State"].get("Pid") or 0)
+        state = container.attrs["State"]
+        process = int(state.get("Pid") or 0)
+        if not process:
+            why = state.get("Error") or f"exit code {state.get('ExitCode')}"
+            raise BackendError(f"the container that holds the test's network ended at once: {why}")
         if not is_of(process, container.id):
             raise BackendError(
                 "the Docker engine runs its containers on another machine or in a virtual one, whose network DoDo's "

@@ -1,6 +1,7 @@
 """The container that holds a test's network, IPC namespace and ``/tmp``: a program of this machine, and no image."""
 
 import io
+import os
 import shutil
 import tarfile
 from pathlib import Path
@@ -36,7 +37,7 @@ def holder(slug: str) -> dict[str, Any]:
     """The container in compose's words; it can do nothing but sleep."""
     return {
         "image": IMAGE,
-        "entrypoint": [shutil.which(_PROGRAM) or f"/bin/{_PROGRAM}", "infinity"],
+        "entrypoint": [shutil.which(_PROGRAM, path=os.defpath) or f"/bin/{_PROGRAM}", "infinity"],
         "user": "65534:65534",
         "init": True,
         "ipc": "shareable",

@@ -47,7 +47,7 @@ class Refusal:
             return f"there is no program '{PROGRAM}'"
         if self.missing == NAMESPACES:
             return f"the kernel refuses namespaces: {self.why}"
-        return f"to start 'true' in a sandbox ended with: {self.why}"
+        return f"a trial, to run 'true' in a sandbox as applications have it, ended with: {self.why}"
 
 
 def isolation_refusal(fork_server: ForkServer | None = None) -> Refusal | None:

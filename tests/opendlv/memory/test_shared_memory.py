@@ -152,6 +152,26 @@ def test_colliding_keys_are_avoided(memory_name: str) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs another user")
+def test_another_user_reads_it_whatever_the_umask(mode: str, memory_name: str) -> None:
+    before = os.umask(0o077)
+    try:
+        memory = SharedMemory.create(memory_name, SIZE)
+    finally:
+        os.umask(before)
+    with memory:
+        reader = multiprocessing.get_context("fork").Process(target=attach_as_nobody, args=(memory_name,))
+        reader.start()
+        reader.join()
+        assert reader.exitcode == 0
+
+
+def attach_as_nobody(name: str) -> None:
+    os.setuid(NOBODY)
+    with SharedMemory.attach(name) as memory, memory.lock():
+        pass
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs another user")
 def test_what_another_user_left_under_these_keys_is_avoided(memory_name: str) -> None:
     token = Path("/tmp", memory_name)
     token.touch()

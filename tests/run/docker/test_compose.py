@@ -33,6 +33,18 @@ def test_a_command_without_compose_is_not_the_tests_fault(
         asyncio.run(Compose(plan(), tmp_path, tmp_path, "project", print).read())
 
 
+def test_compose_is_not_blamed_where_it_answers_by_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "docker"
+    program.write_text('#!/bin/sh\ntest "$2" = version || { echo "odd. See \'docker --help\'." >&2; exit 1; }\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    with pytest.raises(BackendError, match="rejects the compiled test: odd"):
+        asyncio.run(Compose(plan(), tmp_path, tmp_path, "project", print).read())
+    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+    with pytest.raises(BackendError, match="there is no program 'docker'"):
+        asyncio.run(Compose(plan(), tmp_path, tmp_path, "project", print).read())
+
+
 @pytest.mark.parametrize(
     ("process", "image", "said"),
     [

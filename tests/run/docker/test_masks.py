@@ -32,6 +32,12 @@ def test_what_is_hidden(volume: dict[str, Any], targets: list[str]) -> None:
     assert found == [{"type": "tmpfs", "target": target, "read_only": True} for target in targets]
 
 
+def test_masks_do_not_lie_in_one_another() -> None:
+    hidden = [Path("/team/tests/dodo-report"), Path("/team/tests")]
+    found = masks({"volumes": [{"type": "bind", "source": "/team", "target": "/app"}]}, {}, hidden)
+    assert [mask["target"] for mask in found] == ["/app/tests"]
+
+
 def test_folders_of_the_tests(tmp_path: Path) -> None:
     for name in ("tests", "generated/t", "dodo-report/t", ".git", "maps"):
         (tmp_path / name).mkdir(parents=True)

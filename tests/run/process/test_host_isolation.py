@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import leases
+from dodo_dsl.run.capabilities import kernel
 from dodo_dsl.run.process import leftovers
 from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal, runs_alone
@@ -157,3 +159,42 @@ def test_a_fork_server_answers_as_a_sandbox_of_its_own_does(lives: bool) -> None
     finally:
         if lives:
             server.close()
+
+
+BLAMES = re.compile("install bubblewrap|allow user namespaces|make namespaces")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("bwrap", "told", "remedy"),
+    [
+        ("", "there is no program 'bwrap'", "install bubblewrap"),
+        ("echo bwrap: something odd >&2; exit 1", "ended with: bwrap: something odd", ""),
+        ("exit 7", "ended with: exit code 7", ""),
+    ],
+)
+def test_only_what_is_missing_is_blamed(
+    bwrap: str, told: str, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if bwrap:
+        (tmp_path / "bwrap").write_text(f"#!/bin/sh\n{bwrap}\n")
+        (tmp_path / "bwrap").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    refusal = isolation_refusal()
+    assert refusal is not None
+    assert (str(refusal)[-len(told) :], refusal.remedy) == (told, remedy)
+    (finding,) = kernel.namespaces()
+    assert bool(BLAMES.search(finding.advice)) == bool(remedy)
+
+
+@pytest.mark.slow
+def test_where_the_kernel_refuses_namespaces_they_are_to_be_allowed() -> None:
+    """In a user namespace that may have no further ones with mounts."""
+    script = "from dodo_dsl.run.process.host_isolation import isolation_refusal as r; print(r(), '|', r().remedy)"
+    limits = 'echo 0 > /proc/sys/user/max_mnt_namespaces && exec "$@"'
+    unshare = ["unshare", "--user", "--map-root-user", "sh", "-c", limits, "sh", sys.executable, "-c", script]
+    done = subprocess.run(unshare, capture_output=True, text=True, check=False, cwd=ROOT)
+    if done.stderr.startswith("unshare:"):
+        pytest.skip(done.stderr)
+    assert done.stdout.startswith("the kernel refuses namespaces: unshare: "), done
+    assert "to make namespaces" in done.stdout

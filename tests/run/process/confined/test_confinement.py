@@ -1,5 +1,6 @@
 """What an application may read, and what of its own folder it does not see."""
 
+import itertools
 import sys
 from pathlib import Path
 
@@ -46,3 +47,19 @@ def test_on_the_host_it_sees_what_dodo_sees_in_a_process_namespace() -> None:
     argv = words(Confinement("/app", "host", 130), None, "/usr/bin/true", None, 5)
     assert "--unshare-pid" in argv
     assert argv[argv.index("--dev-bind") :][:3] == ["--dev-bind", "/", "/"]
+
+
+def test_nothing_is_mounted_in_what_is_hidden_but_what_may_be_read(tmp_path: Path) -> None:
+    """The report is in the folder of the tests, and so is the interpreter."""
+    tests, report, python = tmp_path / "tests", tmp_path / "tests" / "dodo-report", tmp_path / "tests" / "deep" / "venv"
+    for folder in (report, python):
+        folder.mkdir(parents=True)
+    hidden = (str(report), str(tests), str(tests))
+    argv = words(Confinement(str(tmp_path), "network", 1, (str(python),), hidden), MOUNTS, "/usr/bin/x", None, 5, 6)
+    assert [path for word, path in itertools.pairwise(argv) if word == "--tmpfs"] == ["/run", "/var/tmp", str(tests)]
+    inside = argv[argv.index("--bind", argv.index(str(MOUNTS.folder))) :]
+    inside = inside[inside.index(str(tests)) + 1 :]
+    assert inside[: inside.index("--remount-ro")] == [
+        *("--perms", "0755", "--dir", str(python.parent)),
+        *("--ro-bind-try", str(python), str(python)),
+    ]

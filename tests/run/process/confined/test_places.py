@@ -2,6 +2,7 @@
 
 import json
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,6 +27,9 @@ def within(scene: Callable[[], object]) -> object:
     if child == 0:
         try:
             namespaces.unshare()
+            if (first := os.fork()) != 0:  # without a process 1, which lives, there are no others
+                os.waitpid(first, 0)
+                os._exit(0)
             namespaces.furnish()
             told = scene()
         except OSError as error:
@@ -81,3 +85,37 @@ def test_a_folder_that_its_user_could_not_read_is_an_error_and_not_the_applicati
     assert within(lambda: bool(Places(USER).folder(str(own)))) == [str(own), said]
     own.chmod(0o755)
     assert within(lambda: bool(Places(USER).folder(str(own)))) is True
+
+
+def test_neither_umask_nor_tmpdir_decide_about_its_folders(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    elsewhere = own.parent / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(elsewhere))
+
+    def scene() -> object:
+        os.umask(0o077)
+        places = Places(USER)
+        shown, _ = places.folder(str(own))
+        return [oct(path.stat().st_mode & 0o777) for path in (shown.parent, shown, places.home)]
+
+    assert within(scene) == ["0o755"] * 3
+    assert list(elsewhere.iterdir()) == []
+
+
+def test_what_it_may_read_is_shown_as_its_own_where_the_kernel_can(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def owners() -> object:
+        places = Places(USER)
+        return [places.read(str(path)).stat().st_uid for path in (own, own, own / "data", "/usr")]
+
+    assert within(owners) == [USER, USER, USER, 0]
+    monkeypatch.setattr(namespaces, "bind_as", refused)
+    assert within(owners) == [0] * 4
+    assert within(lambda: str(Places(USER).read("/no/such/path"))) == "/no/such/path"
+
+
+@pytest.mark.parametrize("place", namespaces.SHARED, ids=str)
+def test_folders_of_shared_places_stay_and_files_do_not(place: Path) -> None:
+    with tempfile.TemporaryDirectory(dir=place) as name, tempfile.NamedTemporaryFile(dir=place) as file:
+        Path(name, "test").touch()
+        assert within(lambda: [Path(name, "test").exists(), Path(file.name).exists()]) == [True, False]
+        assert within(lambda: list(map(str, Places(USER).shared[str(place)].glob("*/test")))) == []
