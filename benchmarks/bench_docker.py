@@ -45,7 +45,7 @@ def theirs(tests: Sequence[str], folder: Path) -> float:
         return sum(seconds(up, down, folder=folder / "generated" / test) for test in tests)
     except BaseException:
         for test in tests:
-            finished(down, folder / "generated" / test)
+            finished([*down, "--timeout", "0"], folder / "generated" / test)
         raise
 
 

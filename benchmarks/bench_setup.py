@@ -37,9 +37,11 @@ def ours(backend: str, folder: Path) -> float:
 
 def theirs(folder: Path) -> float:
     start = time.perf_counter()
-    code = finished([*COMPOSE.split()], folder)
-    seconds = time.perf_counter() - start
-    finished(["docker", "compose", "down", "-v", "--timeout", "0"], folder)
+    try:
+        code = finished([*COMPOSE.split()], folder)
+        seconds = time.perf_counter() - start
+    finally:  # also where this benchmark's time is over
+        finished(["docker", "compose", "down", "-v", "--timeout", "0"], folder)
     if code:
         raise RuntimeError(f"{COMPOSE} ended with {code}")
     return seconds

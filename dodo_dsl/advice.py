@@ -132,11 +132,12 @@ def firmware(variable: str) -> str:
     """How to build the emulated rig; ``variable`` names its folder."""
     if named := os.environ.get(variable):
         return f"{variable} is {named}: build it there, or unset {variable}"
-    if checkout := package_data.checkout() or _installed_from()[0]:
-        command = f"make -C {shlex.quote(str(checkout))} firmware"
-        is_found = checkout == package_data.checkout()
-        return command if is_found else f"{command}, and {variable}={shlex.quote(str(checkout / 'build' / 'firmware'))}"
-    return f"'make firmware' in a checkout of DoDo, and {variable}=CHECKOUT/build/firmware"
+    if checkout := package_data.checkout():
+        return f"make -C {shlex.quote(str(checkout))} firmware"
+    if folder := _installed_from()[0]:
+        built = shlex.quote(str(folder / "build" / "firmware"))
+        return f"make -C {shlex.quote(str(folder))} firmware && export {variable}={built}"
+    return f"'make firmware' in a checkout of DoDo, then export {variable}=CHECKOUT/build/firmware"
 
 
 def _source(extra: str) -> list[str]:

@@ -76,7 +76,8 @@ def run(script: Path, seconds: float) -> Bench:
             is_interrupted = True
         took = time.monotonic() - begin
         said = errors.read_text(errors="replace")
-        sys.stderr.write(said)
+        if code is not None:  # one that was ended says only where it stood
+            sys.stderr.write(said)
         trouble = INTERRUPTED if is_interrupted else _trouble(code, seconds, said)
         found = tuple(
             replace(one, note=trouble) if trouble and one.note == row.NOT_REACHED else one

@@ -19,6 +19,7 @@ from dodo_dsl.emit.output_folder import write
 from dodo_dsl.images import docker_command, remote
 from dodo_dsl.images.remote import UNPACKED, RemoteImage
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.docker import own_images
 from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.terminal import printable
 
@@ -43,13 +44,13 @@ def pull(options: argparse.Namespace, stdout: TextIO) -> int:
     platform = f"linux/{rig.arch}" if rig.arch else engine
     if platform != engine:
         stdout.write(f"note: rig '{rig.name}' is {platform}, and this engine's machine {engine}\n")
-    wanted, built = _images(checked, options.backend == "docker")
+    wanted, built, hints = _images(checked, options.backend == "docker")
     for name in built:
         stdout.write(f"{printable(name)} has a 'build': the first test builds it\n")
     if not wanted:
         stdout.write(f"the tests of rig '{rig.name}' need no images of a registry\n")
         return Exit.OK
-    images = [remote.remote_image(name, platform) for name in wanted]
+    images = [_remote(name, platform, hints.get(name, "")) for name in wanted]
     stdout.write(_room(rig, images))
     for number, image in enumerate(images, 1):
         stdout.write(f"[{number}/{len(images)}] {printable(image.reference)}\n")
@@ -78,8 +79,20 @@ def _tests(options: argparse.Namespace) -> tuple[Checked, Rig]:
     return replace(checked, tests=tests), rigs[options.rig]
 
 
-def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str]]:
-    """The images of a registry that the tests' containers need, and the names of services that are built."""
+def _remote(name: str, platform: str, hint: str) -> RemoteImage:
+    """An image of a registry; raises DockerError with the ``hint`` where it has none."""
+    try:
+        return remote.remote_image(name, platform)
+    except docker_command.DockerError as error:
+        raise docker_command.DockerError(f"{error}; {hint}" if hint else str(error)) from None
+
+
+def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str], dict[str, str]]:
+    """The images of a registry that the tests' containers need, the names of services that are built, and hints.
+
+    The hints say how to get images of DoDo's.
+    """
+    hints: dict[str, str] = {}
     wanted: set[str] = set()
     built: set[str] = set()
     with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
@@ -95,7 +108,8 @@ def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str]]:
             found, own = _of_application(plan, folder / plan.slug)
             wanted |= found | ({service.image for service in plan.services} if with_own else set())
             built |= own
-    return sorted(wanted), sorted(built)
+            hints |= own_images.hints(plan)
+    return sorted(wanted), sorted(built), hints
 
 
 def _of_application(plan: Plan, folder: Path) -> tuple[set[str], set[str]]:

@@ -150,4 +150,5 @@ def _way(named: str | None) -> str:
     checkout = PLACES[0].parents[1]
     if (checkout / "firmware" / "Makefile").is_file():
         return f"make -C {shlex.quote(str(checkout))} firmware"
-    return f"'make firmware' in a checkout of DoDo, and {FOLDER}=CHECKOUT/build/firmware or 'dodo images build gantry'"
+    then = f"export {FOLDER}=CHECKOUT/build/firmware, or for containers 'dodo images build gantry'"
+    return f"'make firmware' in a checkout of DoDo, then {then}"

@@ -6,8 +6,10 @@ import fcntl
 import grp
 import logging
 import os
+import pwd
 import re
 import select
+import shlex
 import termios
 from collections.abc import Iterator
 from pathlib import Path
@@ -102,17 +104,17 @@ def _as_os_errors() -> Iterator[None]:
 
 
 def _refusal(device: os.stat_result) -> str:
-    """Why a device is not opened, and the group that may, where there is one beside root's."""
-    may = device.st_mode & 0o060 == 0o060 and device.st_gid != 0
-    way = f"; add it to the group '{_group_name(device.st_gid)}'" if may else ""
-    return f"this user may not open it{way}"
-
-
-def _group_name(number: int) -> str:
+    """Why a device is not opened, and how this user gets into the group that may, where there is one beside root's."""
+    said = "this user may not open it"
+    if device.st_mode & 0o060 != 0o060 or device.st_gid == 0:
+        return said
     try:
-        return grp.getgrgid(number).gr_name
+        group, user = grp.getgrgid(device.st_gid), pwd.getpwuid(os.getuid()).pw_name
     except KeyError:
-        return str(number)
+        return said
+    if user in group.gr_mem:
+        return f"{said}, as its session is older than its place in the group '{group.gr_name}': log in anew"
+    return f"{said}: sudo {shlex.join(['usermod', '--append', '--groups', group.gr_name, user])}, and log in anew"
 
 
 def _keep(target: str, port: serial.SerialBase) -> None:

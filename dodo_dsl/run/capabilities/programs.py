@@ -9,8 +9,7 @@ from pathlib import Path
 
 from dodo_dsl import advice, package_data
 from dodo_dsl.run.capabilities.finding import Capability
-from dodo_dsl.run.docker.client import connect
-from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.docker.client import NoEngine, connect
 
 FIRMWARE = "DODO_FIRMWARE"
 EMULATOR_PLACES = (package_data.root() / "build" / "firmware", Path("/opt/dodo/firmware"))
@@ -21,9 +20,9 @@ def docker_engine() -> Iterator[Capability]:
     """Whether a Docker engine answers."""
     try:
         client = connect()
-    except BackendError as error:
-        text, _, way = str(error).partition(": ")
-        yield Capability("docker engine", "warning", f"{text}; --backend docker and mixed need one", way)
+    except NoEngine as error:
+        text = f"none answers ({error.reason}); --backend docker and mixed need one"
+        yield Capability("docker engine", "warning", text, error.way)
         return
     with contextlib.closing(client):
         version = client.version()

@@ -8,8 +8,17 @@ from dodo_dsl.run.protocol import BackendError
 _CONNECTIONS = 200
 
 
+class NoEngine(BackendError):
+    """No engine answers, for a ``reason``; the text also says what to do."""
+
+    def __init__(self, reason: str) -> None:
+        self.way = advice.engine()
+        super().__init__(f"no Docker engine answers ({reason}): {self.way}")
+        self.reason = reason
+
+
 def connect() -> Any:
-    """A client of the engine; raises BackendError with what to do when none answers."""
+    """A client of the engine; raises NoEngine when none answers."""
     import docker
     from docker.errors import DockerException
 
@@ -17,7 +26,7 @@ def connect() -> Any:
         client = docker.from_env(max_pool_size=_CONNECTIONS)
         client.ping()
     except (DockerException, OSError) as error:
-        raise BackendError(f"no Docker engine answers ({_reason(error)}): {advice.engine()}") from error
+        raise NoEngine(_reason(error)) from error
     return client
 
 
