@@ -18,6 +18,7 @@ Piece = tuple[str, str]
 """A part of a text, and its style by name; empty for none."""
 
 _MOST_NAMED = 3
+_INDENT = 2
 _MAX_FILE = 1 << 20
 _PARTS = re.compile(r"[-._]")
 
@@ -209,8 +210,8 @@ def _deceptive(message: str) -> str:
 
 
 def format_text(diagnostics: Sequence[Diagnostic], width: int | None = None) -> str:
-    """With code frames of at most ``width`` columns, by default as wide as the terminal."""
-    return "".join(text for d in diagnostics for text, _ in pieces(d, width or columns()))
+    """With code frames of at most ``width`` columns, by default as the terminal has for an error's indented lines."""
+    return "".join(text for d in diagnostics for text, _ in pieces(d, width or columns() - _INDENT))
 
 
 def format_json(diagnostics: Sequence[Diagnostic]) -> str:

@@ -6,6 +6,7 @@ import pytest
 
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text, ordered
+from dodo_dsl.terminal import WIDE
 
 FOLDER = Path(__file__).parent / "bad"
 CASES = sorted(p.stem for p in FOLDER.glob("*.yml"))
@@ -15,7 +16,7 @@ CASES = sorted(p.stem for p in FOLDER.glob("*.yml"))
 def test_diagnostics(case: str, monkeypatch: pytest.MonkeyPatch, update_goldens: bool) -> None:
     monkeypatch.chdir(FOLDER)
     source, problems = read_application(Path(f"{case}.yml"))
-    text = format_text(ordered(problems))
+    text = format_text(ordered(problems), WIDE)
     expected = FOLDER / f"{case}.out"
     if update_goldens:
         expected.write_text(text)

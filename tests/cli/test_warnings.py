@@ -1,15 +1,19 @@
 """What is said about a test that runs: its own problems and warnings, and not those of others."""
 
 import json
+from argparse import Namespace
 from collections.abc import Iterable
+from io import StringIO
 from pathlib import Path
 from typing import Literal
 
 import pytest
 
+from dodo_dsl.cli.run.jobs import compile_tests
 from dodo_dsl.cli.selection import select
 from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import Diagnostic, Span, format_gitlab, format_json, format_text, has_errors, told_once
+from dodo_dsl.spec.settings import Settings
 from tests.check import examples
 
 GOOD = """\
@@ -144,3 +148,14 @@ def test_the_same_warning_in_the_files_of_several_tests_is_shown_once() -> None:
     assert (first.span, first.sentence) == (same[0].span, "no message (in 4 tests, such as a)")
     assert rest == other
     assert told_once([warning("a.dodo.yml", 1), warning("a.dodo.yml", 2)], ".dodo.yml")[0].tests == ()
+
+
+def test_a_run_shows_a_warning_of_two_tests_once(repository: Path) -> None:
+    for name in ("good", "better"):
+        (repository / f"tests/{name}/{name}.dodo.yml").write_text(_test(name).replace("20 Hz]", "20 Hz], x: [1, 2]"))
+    said, words = StringIO(), Namespace(test=["good", "better"], level=[], application=[], backend="docker")
+    compile_tests(words, Settings(), repository / "out", said)
+    assert [line for line in said.getvalue().splitlines() if "matrix-unused" in line] == [
+        "tests/better/better.dodo.yml:7:32: warning[matrix-unused]: nothing uses ${matrix.x}, so its instances are all"
+        " the same (in better and good)"
+    ]

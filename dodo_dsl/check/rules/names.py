@@ -3,35 +3,12 @@
 ``name-reserved``: a test is a job of its name, and GitLab reads some names as keywords.
 """
 
-import re
 from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, shown_path
-
-KEYWORDS = frozenset(
-    {
-        "after-script",
-        "before-script",
-        "cache",
-        "default",
-        "false",
-        "gate",
-        "image",
-        "include",
-        "nil",
-        "pages",
-        "services",
-        "spec",
-        "stages",
-        "true",
-        "types",
-        "variables",
-        "workflow",
-    }
-)
-
-_NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+from dodo_dsl.spec.names import KEYWORDS, as_file, is_free, is_name
+from dodo_dsl.spec.registry import SUFFIX
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
@@ -40,11 +17,12 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
         return
     if spec.name in KEYWORDS:
         message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
-        yield Diagnostic(spec.span("name"), "name-reserved", message, f"for example 'sil-{spec.name}'")
-    stem = spec.location.stem
-    if spec.name != stem and _NAME.fullmatch(spec.name):  # the schema says what is wrong with any other
-        message = f"the name '{spec.name}' differs from the file's name"
-        yield Diagnostic(spec.span("name"), "name-differs", message, f"write 'name: {stem}' or rename the file")
+        yield Diagnostic(spec.span("name"), "name-reserved", message, as_file(spec.location.stem, SUFFIX))
+    elif spec.name != spec.location.stem and is_name(spec.name):  # the schema says what is wrong with any other
+        message, stem = f"the name '{spec.name}' differs from the file's name", spec.location.stem
+        written = f"write 'name: {stem}', or " if is_free(stem) else ""
+        hint = f"{written}rename the file to {spec.name}{SUFFIX}"
+        yield Diagnostic(spec.span("name"), "name-differs", message, hint)
     others = [other for other in context.by_name[spec.name] if other.path != spec.path]
     if others:
         message = f"the name '{spec.name}' is taken by {shown_path(str(others[0].path))}"

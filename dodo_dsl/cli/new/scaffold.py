@@ -5,12 +5,12 @@ import re
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.check.rules.names import KEYWORDS
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.new.new_file import New, filled
 from dodo_dsl.cli.new.repository_files import schema_of_specs
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.names import KEYWORDS
 from dodo_dsl.spec.registry import SUFFIX
 
 MAPS = ("maps/straight", "maps/rig-straight")

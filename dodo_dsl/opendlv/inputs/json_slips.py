@@ -14,7 +14,7 @@ _BLANK = re.compile(r"[ \t\r\n]*")
 _OTHER = re.compile(r"[-+\w.]+|.", re.DOTALL)
 _COMMENTS = ("//", "/*", "#")
 _CLOSING = {"{": "}", "[": "]"}
-_PYTHON = {"None": "null", "True": "true", "False": "false", "nan": "NaN"}
+_PYTHON = {"None": "null", "True": "true", "False": "false", "nan": "a number"}
 _NUMBER = re.compile(r"(?P<sign>[-+]?)(?=\.?[0-9])(?P<whole>[0-9]*)(?P<fraction>\.[0-9]*)?")
 _SHOWN = 30
 
@@ -208,7 +208,8 @@ class _Reading:
         first = line[:1]
         if first in ("'", "`", "\u201c", "\u201e"):
             closing = re.match(r"['`\u201c\u201e]([^'`\u201c\u201d]*)['`\u201c\u201d]", line)
-            hint = f'write "{closing[1][:_SHOWN]}"' if closing and '"' not in closing[1] else 'write "..."'
+            is_plain = closing and len(closing[1]) <= _SHOWN and not re.search(r'["\\\x00-\x1f]', closing[1])
+            hint = f'write "{closing[1]}"' if closing and is_plain else 'write "..."'
             self._fail("other quotation marks than JSON has", hint)
         if first != '"':
             return

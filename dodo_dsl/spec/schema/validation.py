@@ -16,6 +16,7 @@ from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, o
 from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
+from dodo_dsl.spec.names import as_file
 from dodo_dsl.spec.quantity_slips import boolean_meant
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.schema.consequences import unindented, without_consequences
@@ -219,11 +220,10 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _of_file(place: _Place) -> str:
-    """A hint for the name of a test, which is that of its file; empty elsewhere, and where that is no name."""
+    """A hint for the name of a test, which is that of its file; empty elsewhere."""
     file = PurePath(place.span.file).name
-    stem = file.removesuffix(SUFFIX)
-    is_name = place.is_of_file and place.name == "'name'" and stem != file
-    return f"write 'name: {stem}', as the file is called" if is_name and place.fits(stem) else ""
+    is_name = place.is_of_file and place.name == "'name'" and file.endswith(SUFFIX)
+    return as_file(file.removesuffix(SUFFIX), SUFFIX) if is_name else ""
 
 
 def _in_quotes(error: Any, place: _Place) -> str:

@@ -3,7 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from dodo_dsl.check.rules.names import KEYWORDS, check
+from dodo_dsl.check.rules.names import check
+from dodo_dsl.spec.names import KEYWORDS
 from dodo_dsl.spec.registry import Location
 from tests.check.contexts import context, found
 

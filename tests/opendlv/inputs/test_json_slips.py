@@ -46,6 +46,14 @@ def test_a_slip_has_its_place_and_a_fix(text: str, column: int, what: str, hint:
     assert (error.line, error.column, error.what, error.hint) == (1, column, what, hint)
 
 
+@given(st.sampled_from(["'{}'", "`{}`", "{}", "+{}", "-{}"]), st.text("a\\0.5eE-'\"\tnN", max_size=40))
+def test_what_a_hint_says_to_write_is_json(form: str, inner: str) -> None:
+    slip = slip_in(f"[{form.format(inner)}]")
+    value = slip.hint.removeprefix("write ") if slip and slip.hint.startswith("write ") else "0"
+    if value[:1] in '"-0123456789' and value != '"..."' and " " not in value:
+        json.loads(value)
+
+
 def test_lines_are_counted() -> None:
     with pytest.raises(JsonError) as raised:
         loads('{"a": [\n  1,\n  .5]}')
