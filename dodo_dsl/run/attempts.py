@@ -85,7 +85,11 @@ class Attempts:
                 self.kept.extend(kept)
                 if engine.state.is_unanswered and not self._keep and (why := await asyncio.to_thread(_silent, job)):
                     outcome = replace(outcome, reason=f"{outcome.reason}; {why}")
-                if not self._keep and (paused := await asyncio.to_thread(_paused, job, outcome)):
+                if (
+                    not self._keep
+                    and _may_have_paused(job, outcome)
+                    and (paused := await asyncio.to_thread(_paused, job))
+                ):
                     outcome = replace(outcome, notes=(*outcome.notes, paused))
                 if job.plan.pool:
                     outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
@@ -110,13 +114,17 @@ def _silent(job: Job) -> str:
     return ""
 
 
-def _paused(job: Job, outcome: Outcome) -> str:
+def _may_have_paused(job: Job, outcome: Outcome) -> bool:
+    """Whether a test ran in real time, on a machine that did not hinder it, and was recorded."""
+    load = outcome.machine
+    return load is not None and not too_busy(load) and (job.report / RECORDING).is_file()
+
+
+def _paused(job: Job) -> str:
     """The longest pause of the application between two answers where that is a note, else empty."""
     from dodo_dsl.opendlv.odvd.tokens import OdvdError
     from dodo_dsl.run.recorded.longest_pause import long_pause
 
-    if outcome.machine is None or too_busy(outcome.machine):
-        return ""
     with contextlib.suppress(OSError, OdvdError):
         return long_pause(job.plan, job.folder, job.report / RECORDING)
     return ""

@@ -26,8 +26,10 @@ from services.clock.processor_time import ApplicationProcesses
 from services.clock.response import ResponseTimes
 
 _FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
-"""Seconds between reports at first and later, and their share of the time that passed: a short test needs them closer,
-as what was measured by the wall clock is put to its time by them."""
+"""Seconds between reports at first and later, and their share of the time that passed.
+
+A short test needs them closer, as what was measured by the wall clock is put to its time by them.
+"""
 _SLICE = 0.05
 _MOST_EARLY = 1000
 CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone")
@@ -65,6 +67,8 @@ class ClockService(Service):
         self._application = SteppedApplication(answers, patience, exchange, self._over, self._response, session.cid)
         self._stepper = Stepper(roles, period, timeout, self._application, exchange, self._over)
         self._reported = self._begun = 0.0
+        self._reached = 0
+        """The time that was reported at last."""
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
 
@@ -102,7 +106,9 @@ class ClockService(Service):
 
     def _over(self) -> bool:
         now = time.monotonic()
-        if now - self._reported > min(max(_FIRST_REPORT_S, _REPORT_SHARE * (now - self._begun)), _REPORT_S):
+        is_further = self._stepper.reached != self._reached
+        period = max(_FIRST_REPORT_S, _REPORT_SHARE * (now - self._begun)) if is_further else _REPORT_S
+        if now - self._reported > min(period, _REPORT_S):
             self._report_time()
         return self._stopped()
 
@@ -123,8 +129,8 @@ class ClockService(Service):
         return None
 
     def _report_time(self, last: bool = False) -> None:
-        self._reported = time.monotonic()
-        seconds = (self._stepper.reached - EPOCH) / 1e6
+        self._reported, self._reached = time.monotonic(), self._stepper.reached
+        seconds = (self._reached - EPOCH) / 1e6
         self._report(
             "time", s=seconds, frames=self._application.frames, surplus=self._application.answers.surplus, last=last
         )

@@ -94,7 +94,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     verbosity.add(
         parser,
         "print only what did not pass, and a last line with the counts",
-        "print each test's phases, checks, and the errors and warnings in the logs of its services",
+        "print each test's phases, checks, what the application used, and errors and warnings in logs",
     )
     parser.add_argument("--profile", action="store_true", help="show where the time went, and write DIR/profile.json")
     selection.add_application(parser)

@@ -65,8 +65,9 @@ def _notes(response: Response, lockstep: Lockstep) -> Iterator[str]:
         yield f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
     if response.worst_s > MOST_PERIODS * response.period_s:
         which = f" to frame {response.worst_frame}" if response.worst_frame else ""
-        took = f"the answer{which} took {response.worst_s:.3g} s, as long as {response.worst_s / response.period_s:.0f}"
-        yield f"{took} frames, which outside lockstep would not have waited"
+        waits = " with what it waited for a processor" if response.processor_median_s is None else ""
+        frames = f"{response.worst_s / response.period_s:.0f} frames, which outside lockstep would not have waited"
+        yield f"the answer{which} took {response.worst_s:.3g} s{waits}, as long as {frames}"
     is_unseen = response.processor_median_s is None and response.over is not None
     if is_unseen and (response.over or 0) > lockstep.response_over * response.answers:
         yield UNSEEN

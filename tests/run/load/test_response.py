@@ -42,6 +42,11 @@ def test_one_answer_of_many_frames_is_a_note() -> None:
     )
 
 
+def test_a_long_answer_of_containers_may_have_waited() -> None:
+    (note,) = judged(replace(FAST, worst_s=1.5, processor_median_s=None), PLAIN, ["steering"]).notes
+    assert note.startswith("the answer took 1.5 s with what it waited for a processor, as long as 15 frames")
+
+
 @pytest.mark.parametrize(("over", "passes"), [(0, True), (6, True), (7, False)])
 def test_a_limit_is_a_check(over: int, passes: bool) -> None:
     found = judged(replace(FAST, over=over), LIMITED, ["perception", "steering"])
