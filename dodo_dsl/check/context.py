@@ -1,16 +1,15 @@
 """The input of a rule, and its signature."""
 
-import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.replayed import known_ids
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import Wiring
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.opendlv.odvd import STANDARD, parser
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.deployment.rig import Rig
@@ -55,18 +54,6 @@ class RuleContext:
 def known_messages(own: tuple[Path, ...]) -> frozenset[str]:
     """The names of the standard messages and of those in a deployment's files, as far as these can be read."""
     return frozenset(known_ids(own))
-
-
-@functools.cache
-def known_ids(own: tuple[Path, ...]) -> Mapping[str, int]:
-    """The numbers of these messages, by name."""
-    ids = {d.name: d.id for d in parser.load(STANDARD)}
-    for path in own:
-        try:
-            ids.update((d.name, d.id) for d in parser.load(path))
-        except parser.OdvdError:
-            continue  # reported with the deployment
-    return ids
 
 
 class Rule(Protocol):

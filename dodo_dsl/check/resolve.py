@@ -1,9 +1,10 @@
 """An instance resolved: arguments converted and wiring computed once, for rules, planner and ``dodo explain`` alike."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.replayed import replayed
 from dodo_dsl.check.wiring import Wiring, wire
 from dodo_dsl.spec.arguments import Argument, ResolvedService, resolved
 from dodo_dsl.spec.deployment.deployment import Deployment
@@ -14,12 +15,16 @@ from dodo_dsl.spec.model import Spec
 
 @dataclass(frozen=True)
 class ResolvedTest:
-    """One instance with its rig, the services whose manifests are known, and its wiring with the application."""
+    """One instance with its rig, the services whose manifests are known, and its wiring with the application.
+
+    ``left_out`` are messages that services which play recordings leave out, as they are the application's.
+    """
 
     spec: Spec
     rig: Rig | None
     services: tuple[ResolvedService, ...]
     wiring: Wiring
+    left_out: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def is_complete(self) -> bool:
@@ -44,7 +49,8 @@ def resolve(
             for use in spec.uses
             if (manifest := manifests.get(use.uses.text)) is not None
         )
-        found.append(ResolvedTest(spec, rig, services, wire(services, declared)))
+        played = replayed(wire(services, declared), services, deployment.messages)
+        found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
     return found
 
 

@@ -65,7 +65,8 @@ class Wiring:
     """Everything produced and consumed in a test.
 
     ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are the messages that
-    they declare to complete a frame in lockstep.
+    they declare to complete a frame in lockstep. ``unsent`` are services that may send anything by their manifests, and
+    messages that they cannot send.
     """
 
     produced: tuple[End, ...]
@@ -76,10 +77,12 @@ class Wiring:
     has_application: bool = False
     answers: tuple[End, ...] = ()
     done: str = ""
+    unsent: frozenset[tuple[str, str]] = frozenset()
 
     def producers(self, port: Port) -> list[End]:
         """The test's services that produce what a port consumes."""
-        return [end for end in self.produced if port.consumes(end.port)]
+        found = [end for end in self.produced if port.consumes(end.port)]
+        return [end for end in found if end.port.name != ANYTHING or (end.service, str(port)) not in self.unsent]
 
     def is_truth(self, port: Port) -> bool:
         """Whether the application is judged by it, and services of the test produce it."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.check import context
+from dodo_dsl.check import replayed
 from dodo_dsl.check.rules.inputs import files, references
 from dodo_dsl.compiler import Checked, load, plan, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
@@ -68,7 +68,7 @@ class Projects:
         if self._is_outdated:
             self._is_outdated = False
             self._loader, self._former = LoadedSpecs(), {}
-            for cache in (load_manifests, references.entries, files.problems, context.known_ids):
+            for cache in (load_manifests, references.entries, files.problems, replayed.known_ids, replayed.holds):
                 cache.cache_clear()
         self._texts.show(shown)
         groups: dict[Path, list[Path]] = {}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check.goals import resolved_goals
+from dodo_dsl.check.replayed import WITHOUT
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.senders import senders, truth_delay_s, withheld_truth
 from dodo_dsl.diagnostics import Diagnostic, Span
@@ -296,6 +297,7 @@ class _Builder:
             for argument in service.arguments.values()
             if (flag := self._flag(argument, f"{key}.{argument.parameter.name}")) is not None
         ]
+        flags = [_leaving_out(flag, self.test.left_out.get(use.name, ())) for flag in flags]
         flags.append(Flag("cid", str(self.cid)))
         planned = PlannedService(
             use.layer,
@@ -329,6 +331,13 @@ class _Builder:
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         return Flag(parameter.name, path.relative_to(root).as_posix(), "path")
+
+
+def _leaving_out(flag: Flag, messages: Sequence[str]) -> Flag:
+    """The flag of a recording's messages that are not played, with others of them."""
+    if flag.name != WITHOUT or not messages:
+        return flag
+    return replace(flag, value=",".join([*(word for word in flag.value.split(",") if word), *messages]))
 
 
 def _devices(service: ResolvedService) -> tuple[str, ...]:

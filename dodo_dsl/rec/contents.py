@@ -8,10 +8,9 @@ import numpy as np
 
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.recordings import timing
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.rec.frames import IMAGE, decoded
-
-_DAY = 86_400_000_000
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def look(
     streams = _streams(recording, messages)  # before the times are copied, for the sake of memory
     times = recording.index["time"]
     stamped = times[times != 0]
-    known = _together(stamped)
+    known = stamped[timing.together(stamped)]
     return Contents(
         size=recording.size,
         envelopes=len(recording),
@@ -92,25 +91,10 @@ def look(
     )
 
 
-def _together(times: Numbers) -> Numbers:
-    """The times in us, in their order, of the largest group without a gap of a day; the earliest of such groups."""
-    if not len(times) or times.max() - times.min() <= _DAY:
-        return times
-    ordered = np.sort(times)
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _DAY) + 1)
-    largest = max(groups, key=len)
-    together: Numbers = times[(times >= largest[0]) & (times <= largest[-1])]
-    return together
-
-
 def _streams(recording: Recording, messages: MessageSet) -> list[MessageStream]:
     index, known = recording.index, messages.ids()
-    keys = index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]
-    order = np.argsort(keys, kind="stable")
-    keys = keys[order]
-    cuts = np.flatnonzero(keys[1:] != keys[:-1]) + 1
     found = []
-    for rows in np.split(order, cuts) if len(order) else ():
+    for rows in timing.streams(index, np.arange(len(index))):
         id_, stamp = int(index["data_type"][rows[0]]), int(index["sender_stamp"][rows[0]])
         size = int(index["size"][rows].sum(dtype=np.int64))
         name = messages.name(id_) if id_ in known else None

@@ -1,15 +1,14 @@
 """A target from a recording: the field of a recorded message over its sample times."""
 
-from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet
+from dodo_dsl.opendlv.recordings import timing
+from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
 from services.continuous_signal.signals import Signal
 from services.continuous_signal.target import Target, TargetError, Values, in_order
 
@@ -20,33 +19,23 @@ def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
     Messages are put in the order of their times; of those with one and the same time the last counts.
     """
     id_ = messages.id(signal.message)
-    first: int | None = None
-    others: Counter[int] = Counter()
-    chosen: list[Envelope] = []
-    for envelope in _envelopes(path):
-        time = time_of(envelope)
-        first = time if first is None else min(first, time)
-        if (envelope.data_type, envelope.sender_stamp) == (id_, signal.sender):
-            chosen.append(envelope)
-        elif envelope.data_type == id_:
-            others[envelope.sender_stamp] += 1
-    if not chosen or first is None:
-        found = f", but of {', '.join(map(str, sorted(others)))}" if others else ""
-        raise TargetError(f"{path}: has no {signal.message} of sender {signal.sender}{found}")
-    times = np.array([time_of(envelope) for envelope in chosen], np.int64)
-    return in_order(times - first, _values(path, chosen, signal, messages), first)
-
-
-def time_of(envelope: Envelope) -> int:
-    """The sample time, or where that is zero when the message was received, or else sent."""
-    return envelope.sample_time or envelope.received or envelope.sent
-
-
-def _envelopes(path: Path) -> Iterator[Envelope]:
     try:
-        yield from read_envelopes(path)
+        with Recording(path) as recording:
+            index = recording.index
+            others = np.flatnonzero(~np.isin(index["data_type"], list(OWN_IDS)))
+            rows = recording.rows([id_], sender_stamps=[signal.sender])
+            if not len(rows):
+                senders = np.unique(index["sender_stamp"][index["data_type"] == id_]).tolist()
+                found = f", but of {', '.join(map(str, senders))}" if senders else ""
+                raise TargetError(f"{path}: has no {signal.message} of sender {signal.sender}{found}")
+            if fault := timing.fault(recording, others) or timing.fault(recording, rows):
+                raise TargetError(f"{path} cannot be a target: {fault}")
+            times, first = index["time"][rows], int(index["time"].min())
+            return in_order(times - first, _values(path, list(recording.envelopes(rows)), signal, messages), first)
     except OSError as error:
         raise TargetError(f"{path}: cannot be read as a recording: {error.strerror}") from None
+    except RecordingError as error:
+        raise TargetError(str(error)) from None
 
 
 def _values(path: Path, envelopes: list[Envelope], signal: Signal, messages: MessageSet) -> Values:

@@ -28,6 +28,9 @@ class ContinuousSignal(SignalEvaluator):
         if target is None and str(other) == str(signal):
             raise ValueError("there is no target: give --target, or --target-sender of one that comes live")
         name, from_begin = f"{signal.field} of {signal}", flags["align"] == "begin"
+        if target is not None and from_begin and target.span[0] >= flags["max-time"]:
+            first = f"{flags['target']}: the target begins {target.span[0]:,.1f} s after the begin"
+            raise ValueError(f"{first}, when --max-time={flags['max-time']:g} is over: nothing could be judged")
         super().__init__(name, target, _limits(flags), flags["max-time"], from_begin)
         self._source, self._target_source = signal, other
         self.inputs = {(signal.message, signal.sender): self._take}

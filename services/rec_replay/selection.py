@@ -8,6 +8,7 @@ import numpy as np
 from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet, UnknownMessage
 from dodo_dsl.opendlv.messages.varints import Marks, Numbers
 from dodo_dsl.opendlv.numbers import is_whole, whole
+from dodo_dsl.opendlv.recordings import timing
 from dodo_dsl.opendlv.recordings.recording import Recording
 
 IMAGE = 1055
@@ -51,14 +52,19 @@ class Part:
 
 
 def select(recording: Recording, selection: Selection, known: MessageSet, max_gap: int, timemod: float = 1.0) -> Part:
-    """The part that is played, ordered by sample times; raises SelectionError.
+    """The part that is played, in the order of its times; raises SelectionError.
 
-    Gaps are those between neighbours of the whole stretch, whatever of it is chosen, none larger than `max_gap`
-    (microseconds); then all of it goes `timemod` times faster.
+    A message without a sample time has its place by when it was received, or else sent. Gaps are those between
+    neighbours of the whole stretch, whatever of it is chosen, none larger than `max_gap` (microseconds); then all of it
+    goes `timemod` times faster.
     """
-    stretch = recording.by_time(_stretch(recording, selection))
+    stretch = _stretch(recording, selection)
+    played = stretch[~np.isin(recording.index["data_type"][stretch], list(OWN_IDS))]
+    if fault := timing.fault(recording, played):
+        raise SelectionError(f"{recording.path} cannot be played: {fault}")
+    stretch = stretch[np.argsort(recording.index["time"][stretch], kind="stable")]
     index = recording.index[stretch]
-    gaps = np.diff(index["sampled"], prepend=index["sampled"][:1])
+    gaps = np.diff(index["time"], prepend=index["time"][:1])
     due = np.rint(np.cumsum(np.minimum(gaps, max_gap)) / timemod).astype(np.int64)
     images = index["data_type"] == IMAGE
     own = np.isin(index["data_type"], list(OWN_IDS))

@@ -2,8 +2,13 @@
 
 from pathlib import Path
 
+import pytest
+
 from dodo_dsl.check.senders import senders, truth_delay_s, withheld_truth
 from tests.check.contexts import resolved
+from tests.run.recorded.made import message, write
+
+STEERING = "opendlv.proxy.GroundSteeringRequest"
 
 APPLICATION = """\
 # docker-compose.yml
@@ -44,3 +49,44 @@ def test_truth_is_of_its_producer_and_withheld(tmp_path: Path) -> None:
     assert {f"{box}=camera" for box in boxes} <= set(senders(test))
     assert (withheld_truth(test), truth_delay_s(test)) == (tuple(boxes), 1.5)
     assert withheld_truth(resolved("", tmp_path)) == ()
+
+
+REPLAY = f"""\
+level: dil
+kind: open-loop
+environment:
+  camera: null
+  drive: {{uses: rec-replay, with: {{rec: drive.rec}}}}
+action: null
+evaluation:
+  track:
+    uses: continuous-signal
+    with: {{message: {STEERING}, field: groundSteering, target: drive.rec, max-mean: 0.1, TARGET}}
+"""
+
+
+@pytest.mark.parametrize("application", ["", APPLICATION])
+@pytest.mark.parametrize(
+    ("target", "guarded", "left_out"),
+    [
+        ("target-sender: 0", "", [f"{STEERING}/0"]),
+        ("target-message: opendlv.proxy.GroundSteeringRequest", "", [f"{STEERING}/0"]),
+        ("target-sender: 9", f"{STEERING}/9=drive", [f"{STEERING}/0"]),
+        ("target-sender: 8", "", [f"{STEERING}/0"]),
+    ],
+)
+def test_a_recorded_target_is_never_the_producer_of_what_the_application_sends(
+    tmp_path: Path, application: str, target: str, guarded: str, left_out: list[str]
+) -> None:
+    """The recording has the signal under the application's sender stamp, 0, and under 9."""
+    folder = tmp_path / "tests" / "example"
+    folder.mkdir(parents=True)
+    made = [
+        message(STEERING, 1_700_000_000_000_000 + n)._replace(sender_stamp=stamp) for n in (1, 2) for stamp in (0, 9)
+    ]
+    write(folder / "drive.rec", *made)
+    test = resolved(REPLAY.replace("TARGET", target) + application, tmp_path)
+    said = [word for word in senders(test) if word.startswith(STEERING)]
+    assert said == [guarded] * bool(guarded)
+    assert withheld_truth(test) == tuple(word.partition("=")[0] for word in said)
+    assert list(test.left_out["drive"]) == left_out

@@ -178,7 +178,7 @@ def test_a_signal_is_that_of_numpy(runs: Runs) -> None:
 def test_a_signal_is_that_of_numpy_by_the_sample_times_of_a_recording(runs: Runs) -> None:
     recorded = list(read_envelopes(REGISTRY / "recordings" / "kiwi-track.rec"))
     start = min(envelope.sample_time for envelope in recorded)
-    chosen = [e for e in recorded if (e.data_type, e.sender_stamp) == (MESSAGES.id(STEERING), 9)]
+    chosen = [e for e in recorded if (e.data_type, e.sender_stamp) == (MESSAGES.id(STEERING), 0)]
     values = [MESSAGES.decode(e.data_type, e.payload).groundSteering for e in chosen]  # type: ignore[attr-defined]
     target = np.column_stack([[e.sample_time - start for e in chosen], values])
     assert_is_signal(runs, DRIVER, *steering(runs, DRIVER, start), target)

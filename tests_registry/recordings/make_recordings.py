@@ -7,7 +7,7 @@ may choose other bits for the same pictures).
 
 ``kiwi-track.rec`` is a drive on the map ``kiwi-track``: from the start through the first corners, by a driver who
 knows the track. Beside the camera's pictures it holds Frame, KinematicState, and the driver's requests for steering
-and pedal under the sender stamp DRIVER. ``static-rig.rec`` is the board of the static rig, from where its camera
+and pedal, under the sender stamp 0 as applications send theirs. ``static-rig.rec`` is the board of the static rig, from where its camera
 stands, in ordinary light, in bright light, and in the dusk.
 """
 
@@ -46,7 +46,6 @@ LENS = Distortion(-0.04, 0.01)
 SHUTTER = 0.01  # s
 CLUTTER, SEED = 12, 7
 QUALITY, KEY_INTERVAL = 28, 20
-DRIVER = 9
 PEDAL = 0.08  # 0.52 m/s
 DRIVE_S = 15.0
 
@@ -151,8 +150,8 @@ def drive(recorded: Recorded) -> None:
             recorded.say(now, "opendlv.sim.KinematicState", **state)
             recorded.say(now, "opendlv.sim.Frame", **frame(pose))
             eye.update(now)
-            recorded.say(now, "opendlv.proxy.GroundSteeringRequest", DRIVER, groundSteering=steering)
-            recorded.say(now, "opendlv.proxy.PedalPositionRequest", DRIVER, position=PEDAL)
+            recorded.say(now, "opendlv.proxy.GroundSteeringRequest", groundSteering=steering)
+            recorded.say(now, "opendlv.proxy.PedalPositionRequest", position=PEDAL)
 
 
 def ticks(length: float) -> Iterator[tuple[int, bool]]:

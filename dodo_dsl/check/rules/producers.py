@@ -6,8 +6,7 @@ message and sender stamp or of one memory, ``application-input`` (the applicatio
 
 from collections.abc import Collection, Iterator
 
-from dodo_dsl.check.context import RuleContext, known_ids
-from dodo_dsl.check.replayed import may_send
+from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.manifest import Manifest
@@ -26,20 +25,10 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
             continue  # the misspelt one may be meant
         if _is_unknown(end, known):
             continue  # its name is reported itself
-        if not (end.port.optional or wiring.application_may_produce(end.port) or _is_produced(context, end)):
+        if not (end.port.optional or wiring.application_may_produce(end.port) or wiring.producers(end.port)):
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
     yield from _unsatisfied_application(wiring)
-
-
-def _is_produced(context: RuleContext, end: End) -> bool:
-    """Whether a service of the test produces it; one that plays a recording does as far as that holds it."""
-    producers = context.wiring.producers(end.port)
-    if any(producer.port.name != ANYTHING for producer in producers):
-        return True
-    names = {producer.service for producer in producers}
-    ids = frozenset(known_ids(context.deployment.messages).items())
-    return any(may_send(service, end.port, ids) for service in context.services if service.use.name in names)
 
 
 def _is_unknown(end: End, known: Collection[str]) -> bool:

@@ -14,8 +14,9 @@ from dodo_dsl.cli.judge.output import as_json, as_pieces
 from dodo_dsl.cli.run.jobs import compile_tests, load_compiled
 from dodo_dsl.outcome import Result
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.recorded.judge import judge
-from dodo_dsl.run.recorded.test_recording import inspect
+from dodo_dsl.run.outcomes import Finding
+from dodo_dsl.run.recorded.judge import Judgement, judge
+from dodo_dsl.run.recorded.test_recording import TestRecording, inspect
 from dodo_dsl.spec.settings import Settings
 
 EXAMPLES = """examples:
@@ -51,9 +52,23 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     with tempfile.TemporaryDirectory(prefix="dodo-judge-") as name:
         work = Path(name).resolve()
         plan, folder = _plan(options, run, work / "compiled", stderr if options.json else stdout)
+        if recording.fault:
+            judgement = Judgement(Finding("error", f"the recording cannot be judged: {recording.fault}"), ())
+            return _told(options, plan, recording, judgement, run, stdout)
         (work / "files").mkdir()
         cid = run.cid if run and run.slug == plan.slug else plan.cid
         judgement = judge(plan, folder, recording, cid, work / "files")
+    return _told(options, plan, recording, judgement, run, stdout)
+
+
+def _told(
+    options: argparse.Namespace,
+    plan: Plan,
+    recording: TestRecording,
+    judgement: Judgement,
+    run: KnownRun | None,
+    stdout: TextIO,
+) -> int:
     if options.json:
         stdout.write(as_json(plan, recording, judgement, run))
     else:

@@ -1,13 +1,21 @@
 """What a recording says of the test that it was made in."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import Self
+
+import numpy as np
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet
+from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.recordings import timing
 from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
 
 MICROSECONDS = 1_000_000
+_AROUND = 60 * MICROSECONDS
+"""How far a mark may lie from the steps, and a message behind the end of a recording."""
 BEGIN, STEP, END = "dodo.TestBegin", "dodo.RecordedStep", "dodo.RecordingEnd"
 
 
@@ -17,13 +25,17 @@ class NoTestRecording(RecordingError):
 
 @dataclass(frozen=True)
 class TestRecording:
-    """A recording of a test: its clock, and the test time in s that it lasts."""
+    """A recording of a test: its clock, and the test time in s that it lasts.
+
+    ``fault`` says why nothing can be judged by it, empty where it is as recorders write it.
+    """
 
     __test__ = False
 
     path: Path
     clock: str
     duration_s: float
+    fault: str = ""
 
 
 def inspect(path: Path) -> TestRecording:
@@ -39,15 +51,106 @@ def inspect(path: Path) -> TestRecording:
         begin = recording.envelope(int(begins[0]))
         step, end = (_last_mark(recording, messages.id(name)) for name in (STEP, END))
         if step is not None:
-            time: int = messages.decode(step.data_type, step.payload).time
-            return TestRecording(path, "lockstep", _seconds(time - begin.sample_time))
+            marks = Marks.read(recording, messages)
+            times = [time for _, _, time in marks.steps]
+            fault = _damage(recording) or marks.fault(begins) or _own_fault(recording, marks)
+            start = min(times) if fault else begin.sample_time
+            return TestRecording(path, "lockstep", _seconds(max(times) - start), fault)
         if not begin.received:
             raise NoTestRecording(
                 f"{path}: has no {STEP} ({messages.id(STEP)}), which tells the steps of a test in lockstep apart; it "
                 "was made by an earlier version of DoDo, so run the test again"
             )
         last = end.sample_time if end else recording.envelope(len(recording) - 1).received
-        return TestRecording(path, "realtime", _seconds(last - begin.received))
+        fault = _damage(recording) or _arrivals_fault(recording, end)
+        return TestRecording(path, "realtime", _seconds(last - begin.received), fault)
+
+
+@dataclass(frozen=True)
+class Marks:
+    """The marks of a recording in lockstep: row, number and time of each step's, and their ids."""
+
+    recording: Recording
+    steps: tuple[tuple[int, int, int], ...]
+    ids: tuple[int, ...]
+
+    @classmethod
+    def read(cls, recording: Recording, messages: MessageSet) -> Self:
+        id_ = messages.id(STEP)
+        rows = [row for row in recording.rows([id_]).tolist() if not recording.envelope(row).received]
+        said = (messages.decode(id_, recording.envelope(row).payload) for row in rows)
+        steps = tuple((row, mark.number, mark.time) for row, mark in zip(rows, said, strict=True))
+        return cls(recording, steps, (id_, messages.id(END), messages.id(BEGIN)))
+
+    def fault(self, begins: Numbers) -> str:
+        """Steps that do not follow each other, and marks or a begin that lie elsewhere."""
+        for (_, number, time), (row, next_number, next_time) in pairwise(self.steps):
+            where = timing.place(self.recording, row)
+            if next_number < number or (next_number == number) != (next_time == time) or next_time < time:
+                return f"{where} goes back, from step {number} to {next_number}"
+        times = [time for _, _, time in self.steps]
+        rows = self.recording.rows(self.ids)
+        sampled = self.recording.index["sampled"][rows]
+        apart = rows[(sampled < min(times) - _AROUND) | (sampled > max(times) + _AROUND)]
+        wrong = [row for row in apart.tolist() if row in begins or not self.recording.envelope(row).received]
+        if wrong:
+            some, have = (
+                ("1 mark", "has a time stamp") if len(wrong) == 1 else (f"{len(wrong):,} marks", "have time stamps")
+            )
+            where = timing.place(self.recording, wrong[0])
+            return f"{some} of the test {have} outside its steps, the first is {where}"
+        return ""
+
+
+def _damage(recording: Recording) -> str:
+    """What is no message, but at the end of a file: the run was killed there."""
+    places = [place for place in recording.damage.places if place.offset + place.size < recording.size]
+    return f"{recording.damage}" if places else ""
+
+
+def _own_fault(recording: Recording, marks: Marks) -> str:
+    """What is wrong with messages of the test's services, which have no time of receipt; others may send anything."""
+    received = _received(recording)
+    own = np.flatnonzero((received == 0) & ~np.isin(recording.index["data_type"], list(marks.ids)))
+    for rows in timing.streams(recording.index, own):
+        if fault := _apart(recording, rows) or timing.fault(recording, rows):
+            return fault
+    return timing.repeated(recording, np.flatnonzero(received == 0))
+
+
+def _apart(recording: Recording, rows: Numbers) -> str:
+    """Sample times, which alone count in lockstep, far from the others of the same message and sender."""
+    sampled = recording.index["sampled"][rows]
+    wrong = rows[~timing.together(sampled)]
+    if not len(wrong):
+        return ""
+    stamps = "a time stamp" if len(wrong) == 1 else "time stamps"
+    count = f"{len(wrong):,} of {len(rows):,} messages"
+    return f"{count}, the first is {timing.place(recording, int(wrong[0]))}, with {stamps} far from the others'"
+
+
+def _arrivals_fault(recording: Recording, end: Envelope | None) -> str:
+    """What is wrong with the times of receipt, by which messages in real time are taken."""
+    received = _received(recording)
+    others = np.flatnonzero(~np.isin(recording.index["data_type"], list(OWN_IDS)))
+    if len(missing := others[received[others] == 0]):
+        where = timing.place(recording, int(missing[0]))
+        return f"{len(missing):,} of {len(others):,} messages, the first is {where}, lack the time of their receipt"
+    rows = np.flatnonzero(received)
+    times = received[rows]
+    for at in np.flatnonzero(np.diff(times) < -timing.MOST_BACK).tolist():
+        back = timing.span(float(times[at] - times[at + 1]) / 1e6)
+        return f"{timing.place(recording, int(rows[at + 1]))} goes back in time, by {back}"
+    over = rows[times > end.sample_time + _AROUND] if end else rows[1:][np.diff(times) > timing.DAY]
+    if len(over):
+        return f"{timing.place(recording, int(over[0]))} was received after the end of the recording"
+    return timing.repeated(recording, rows)
+
+
+def _received(recording: Recording) -> Numbers:
+    """When each message was received, in us; 0 for those of a recorder itself, and of services in lockstep."""
+    parts = [batch.times[1] for batch in recording.batches()]
+    return np.concatenate(parts) if parts else np.zeros(0, np.int64)
 
 
 def _last_mark(recording: Recording, id_: int) -> Envelope | None:

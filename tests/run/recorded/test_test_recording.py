@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.recordings.recording import RecordingError
 from dodo_dsl.run.recorded.test_recording import NoTestRecording, inspect
 from tests.run.recorded.made import EPOCH, begin, message, step, write
@@ -42,3 +43,68 @@ def test_recordings_of_no_test_are_refused(tmp_path: Path) -> None:
     (tmp_path / "text.rec").write_text("not a recording at all")
     with pytest.raises(RecordingError, match="is not a recording"):
         inspect(tmp_path / "text.rec")
+
+
+LOCKSTEP = [
+    step(1, 0),
+    begin(),
+    *(
+        each
+        for number in range(2, 40)
+        for each in (message(PEDAL, EPOCH + number * 10_000), step(number, number * 10_000))
+    ),
+]
+REALTIME = [
+    begin(EPOCH),
+    *(message(PEDAL, EPOCH + number * 10_000, EPOCH + number * 10_000) for number in range(1, 40)),
+]
+ZERO = {"sent": 0, "received": 0, "sample_time": 0}
+LATER = 400 * 86_400_000_000
+
+
+@pytest.mark.parametrize(
+    ("envelopes", "row", "changed", "said"),
+    [
+        (
+            LOCKSTEP,
+            1,
+            ZERO,
+            "1 mark of the test has a time stamp outside its steps, the first is message 2 (dodo.TestB",
+        ),
+        (LOCKSTEP, 2, ZERO, f"1 of 38 messages, the first is message 3 ({PEDAL}/0, at byte "),
+        (
+            LOCKSTEP,
+            30,
+            {"sample_time": EPOCH + LATER},
+            f"1 of 38 messages, the first is message 31 ({PEDAL}/0, at byte ",
+        ),
+        (LOCKSTEP, 30, {"sample_time": EPOCH + 9_000_000}, f"message 33 ({PEDAL}/0, at byte "),
+        (REALTIME, 7, ZERO, f"1 of 39 messages, the first is message 8 ({PEDAL}/0, at byte "),
+        (REALTIME, 7, {"received": EPOCH + LATER}, f"message 9 ({PEDAL}/0, at byte "),
+    ],
+)
+def test_times_that_cannot_be_right_are_told(
+    tmp_path: Path, envelopes: list[Envelope], row: int, changed: dict[str, int], said: str
+) -> None:
+    changes = [each._replace(**changed) if number == row else each for number, each in enumerate(envelopes)]
+    found = inspect(write(tmp_path / "a.rec", *changes))
+    assert found.fault.startswith(said)
+    assert found.duration_s < 10
+    assert not inspect(write(tmp_path / "whole.rec", *envelopes)).fault
+
+
+@pytest.mark.parametrize("envelopes", [LOCKSTEP, REALTIME])
+def test_an_order_that_cannot_be_right_is_told(tmp_path: Path, envelopes: list[Envelope]) -> None:
+    twice = inspect(write(tmp_path / "twice.rec", *envelopes[:21], *envelopes[20:])).fault
+    assert " is there twice, as message 21 already" in twice
+    late = [each._replace(received=each.received and each.received + 9_000_000) for each in envelopes[20:]]
+    assert "goes back" in inspect(write(tmp_path / "swapped.rec", *late, *envelopes[:20])).fault
+
+
+def test_bytes_that_are_no_message_are_told_but_at_the_end(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.rec", *LOCKSTEP)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-5])
+    assert not inspect(path).fault
+    path.write_bytes(whole[:100] + b"\x0d\xa4" + whole[100:])
+    assert inspect(path).fault.startswith("skipped ")

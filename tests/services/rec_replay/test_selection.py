@@ -1,3 +1,4 @@
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,16 +46,16 @@ def chosen(recording: Recording, selection: Selection, timemod: float = 1.0) -> 
 
 def test_all_in_the_order_of_sample_times_with_gaps_cut(recording: Recording) -> None:
     assert chosen(recording, Selection()) == [
-        (6, 0.0, "sent"),
-        (1, 1.0, "sent"),
-        (0, 1.5, "sent"),
-        (2, 2.0, "shown"),
-        (5, 3.2, "sent"),
+        (1, 0.0, "sent"),
+        (0, 0.5, "sent"),
+        (2, 1.0, "shown"),
+        (6, 2.0, "sent"),  # a message without a sample time counts from when it was sent
+        (5, 3.0, "sent"),
     ]
 
 
 def test_faster(recording: Recording) -> None:
-    assert [due for _, due, _ in chosen(recording, Selection(), 10.0)] == [0.0, 0.1, 0.15, 0.2, 0.32]
+    assert [due for _, due, _ in chosen(recording, Selection(), 10.0)] == [0.0, 0.05, 0.1, 0.2, 0.3]
 
 
 @pytest.mark.parametrize(
@@ -62,11 +63,11 @@ def test_faster(recording: Recording) -> None:
     [
         (Selection(messages=["opendlv.proxy.GroundSteeringRequest"]), [0, 2, 5]),
         (Selection(messages=["opendlv.proxy.GroundSteeringRequest/2", "4711"], video_sender=None), [6, 5]),
-        (Selection(without=["opendlv.proxy.GroundSteeringRequest/0", "1086"]), [6, 2, 5]),
-        (Selection(video_sender=1), [6, 1, 0, 3, 5]),
-        (Selection(video_sender=None, send_video=True), [6, 1, 0, 2, 3, 5]),
+        (Selection(without=["opendlv.proxy.GroundSteeringRequest/0", "1086"]), [2, 6, 5]),
+        (Selection(video_sender=1), [1, 0, 3, 6, 5]),
+        (Selection(video_sender=None, send_video=True), [1, 0, 2, 3, 6, 5]),
         (Selection(start=0.4, end=1.05), [0, 2]),
-        (Selection(start=1.5), [6, 5]),  # a message without a sample time counts from when it was sent
+        (Selection(start=1.5), [6, 5]),
     ],
 )
 def test_parts(recording: Recording, selection: Selection, rows: list[int]) -> None:
@@ -75,7 +76,7 @@ def test_parts(recording: Recording, selection: Selection, rows: list[int]) -> N
 
 def test_filters_do_not_change_the_times(recording: Recording) -> None:
     some = chosen(recording, Selection(messages=["4711", "opendlv.proxy.GroundSteeringRequest/2"], video_sender=None))
-    assert [due for _, due, _ in some] == [0.0, 3.2]
+    assert [due for _, due, _ in some] == [2.0, 3.0]
 
 
 @pytest.mark.parametrize(
@@ -89,3 +90,22 @@ def test_filters_do_not_change_the_times(recording: Recording) -> None:
 def test_wrong_parts(recording: Recording, selection: Selection, problem: str) -> None:
     with pytest.raises(SelectionError, match=problem):
         chosen(recording, selection)
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (
+            {0: T0 + 400 * 86_400 * S},
+            "1 of 6 messages, the first is message 1 (opendlv.proxy.GroundSteeringRequest/0, at byte 0), has times",
+        ),
+        ({2: 1, 3: 2}, "2 of 6 messages, the first is message 3 (opendlv.proxy.ImageReading/0, at byte"),
+    ],
+)
+def test_a_recording_whose_times_cannot_be_right_is_not_played(
+    recording: Recording, damage: dict[int, int], said: str
+) -> None:
+    for row, time in damage.items():
+        recording.index["time"][row] = time
+    with pytest.raises(SelectionError, match=re.escape(f"cannot be played: {said}")):
+        chosen(recording, Selection())

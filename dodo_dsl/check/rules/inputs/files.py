@@ -4,7 +4,8 @@ import functools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from dodo_dsl.check.context import RuleContext, known_ids
+from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.replayed import known_ids
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.opendlv.inputs import formats
 from dodo_dsl.opendlv.inputs.problem import InputError

@@ -114,7 +114,7 @@ def test_other_work_of_the_same_id_does_not_count(tmp_path: Path, hides: tuple[s
 def test_the_tests_own_limit_holds(tmp_path: Path, processes: int) -> None:
     """What was never begun is no failure of the application; what began and asks for more has failed."""
     bench = Bench(tmp_path)
-    plan = bench.plan(judge=READY + "time.sleep(60)", application=THREADS)
+    plan = bench.plan(judge=READY + WAIT, application=THREADS)
     plan = replace(plan, application=replace(plan.application, limits=SandboxLimits(processes=processes)))
     (outcome,) = bench.run(plan)
     if processes:
@@ -131,7 +131,7 @@ def test_a_program_that_cannot_be_executed_is_an_error(tmp_path: Path) -> None:
     program = tmp_path / "drive"
     program.write_text("#!/nowhere/python\n")
     program.chmod(0o755)
-    plan = bench.plan()
+    plan = bench.plan(judge=READY + WAIT)
     (app,) = plan.application.services
     apps = (replace(app, process=(str(program),)),)
     (outcome,) = bench.run(replace(plan, application=replace(plan.application, services=apps)))
