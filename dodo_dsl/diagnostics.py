@@ -173,7 +173,8 @@ def _code_frame(span: Span, width: int) -> Iterator[Piece]:
     if line is None or not 0 < span.column <= len(line) + 1:
         return
     gutter = str(span.line)
-    before, place, behind = excerpt(line, span.column - 1, span.length, width - len(f"  {gutter} | "))
+    room = width - len(f"  {gutter} | ") - (not cells(printable(line[span.column - 1 : span.column])))
+    before, place, behind = excerpt(line, span.column - 1, span.length, room)
     yield f"  {gutter} | ", "gutter"
     yield f"{before}{place}{behind}\n", ""
     yield f"  {' ' * len(gutter)} | ", "gutter"
