@@ -53,9 +53,7 @@ def _bind(
     problem, hint = "", ""
     if "$" in found.source:
         return
-    written, *others = (
-        host_access.Mount(path, found.target, found.read_only) for path in paths.names(found.source)
-    )
+    written, *others = (host_access.Mount(path, found.target, found.read_only) for path in paths.names(found.source))
     every = (written, *others)
     if any(map(host_access.is_machine, every)):
         problem, hint = f"{_called(found.source, paths)} belongs to the host, so tests would share it", _SOCKET_HINT
