@@ -132,6 +132,27 @@ def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
     assert problems == []
 
 
+@pytest.mark.parametrize(
+    ("outer", "inner", "refused"),
+    [
+        ("{}/data:/d", "{}/data/x:/x:ro", True),
+        ("{}/data:/d", "{}/link:/x", True),
+        ("{}/data:/d:ro", "{}/data/x:/x", False),
+        ("{}/data:/d", "{}/data:/x", False),
+    ],
+)
+def test_folders_in_a_folder_that_is_allowed(outer: str, inner: str, refused: bool, tmp_path: Path) -> None:
+    """No service leads another one's mount elsewhere in a folder to which dodo.yml lets it write."""
+    (tmp_path / "host" / "data" / "x").mkdir(parents=True)
+    (tmp_path / "host" / "link").symlink_to("data/x")
+    volumes = [text.format(tmp_path / "host") for text in (outer, inner)]
+    services = {f"s{n}": {"image": "x", "command": "--cid=111", "volumes": [v]} for n, v in enumerate(volumes)}
+    file = written({"file": {"services": services}}, tmp_path)
+    source, problems = read_application(file, Access(paths=(str(tmp_path / "host"),)))
+    assert (source is None) == refused
+    assert ["could put a link in its place" in problem.message for problem in problems] == [True] * refused
+
+
 SECRETS = {
     **dict.fromkeys(("DATABASE_URL", "DODO_SEARCH_STORAGE"), "postgresql://dodo:s3cr3t@server/dodo"),
     **dict.fromkeys(("PGPASS", "GITLAB_PAT", "CI_JOB_TOKEN", "INNOCENT"), SECRET),

@@ -71,10 +71,7 @@ SERVICE: Rows = {
     "label_file": ("removed", "labels do nothing in a test"),
     "labels": ("removed", "programs of the host act on them"),
     "links": ("kept", "names of services"),
-    "logging": (
-        "rewritten",
-        "keeps json-file and local; 100 MB without a max-size, the file-size of `sandbox` at most",
-    ),
+    "logging": ("rewritten", "keeps json-file and local; 100 MB without a max-size, `file-size` of `sandbox` at most"),
     "mac_address": ("removed", "the engine gives one"),
     "mem_limit": ("rewritten", "that of `sandbox` in dodo.yml at most"),
     "mem_reservation": ("removed", "a test has limits only"),
