@@ -31,7 +31,7 @@ def locked(name: str) -> dict[str, tuple[str, int]]:
     return found
 
 
-PACKAGES = locked("base") | locked("dev")
+PACKAGES = locked("base") | locked("extras") | locked("dev")
 
 
 def test_versions_are_those_of_the_constraints() -> None:

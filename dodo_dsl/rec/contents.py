@@ -73,7 +73,7 @@ def look(
 
     ``problem`` gets a sentence about what cannot be decoded at all.
     """
-    streams = _streams(recording, messages)  # before the times are copied, for the sake of memory
+    found = streams(recording, messages)  # before the times are copied, for the sake of memory
     times = recording.index["time"]
     stamped = times[times != 0]
     known = stamped[timing.together(stamped)]
@@ -86,12 +86,13 @@ def look(
         apart=len(stamped) - len(known),
         untimed=int((recording.index["sampled"] == 0).sum()),
         message_set=message_set,
-        streams=streams,
+        streams=found,
         frames=_frames(recording, progress, problem),
     )
 
 
-def _streams(recording: Recording, messages: MessageSet) -> list[MessageStream]:
+def streams(recording: Recording, messages: MessageSet) -> list[MessageStream]:
+    """The messages of each id and sender."""
     index, known = recording.index, messages.ids()
     found = []
     for rows in timing.streams(index, np.arange(len(index))):

@@ -30,7 +30,7 @@ def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
                 raise TargetError(f"{path}: has no {signal.message} of sender {signal.sender}{found}")
             if fault := timing.fault(recording, others) or timing.fault(recording, rows):
                 raise TargetError(f"{path} cannot be a target: {fault}")
-            times, first = index["time"][rows], int(index["time"].min())
+            times, first = index["time"][rows], int(timing.within(recording, others).min())
             return in_order(times - first, _values(path, list(recording.envelopes(rows)), signal, messages), first)
     except OSError as error:
         raise TargetError(f"{path}: cannot be read as a recording: {error.strerror}") from None

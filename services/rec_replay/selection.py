@@ -59,16 +59,17 @@ def select(recording: Recording, selection: Selection, known: MessageSet, max_ga
     goes `timemod` times faster.
     """
     stretch = _stretch(recording, selection)
-    played = stretch[~np.isin(recording.index["data_type"][stretch], list(OWN_IDS))]
-    if fault := timing.fault(recording, played):
+    stretch = stretch[~np.isin(recording.index["data_type"][stretch], list(OWN_IDS))]
+    if fault := timing.fault(recording, stretch):
         raise SelectionError(f"{recording.path} cannot be played: {fault}")
-    stretch = stretch[np.argsort(recording.index["time"][stretch], kind="stable")]
+    times = timing.within(recording, stretch)
+    order = np.argsort(times, kind="stable")
+    stretch, times = stretch[order], times[order]
     index = recording.index[stretch]
-    gaps = np.diff(index["time"], prepend=index["time"][:1])
+    gaps = np.diff(times, prepend=times[:1])
     due = np.rint(np.cumsum(np.minimum(gaps, max_gap)) / timemod).astype(np.int64)
     images = index["data_type"] == IMAGE
-    own = np.isin(index["data_type"], list(OWN_IDS))
-    sent = ~own & ~(images & (not selection.send_video)) & ~_named(index, selection.without, known)
+    sent = ~(images & (not selection.send_video)) & ~_named(index, selection.without, known)
     if selection.messages:
         sent &= _named(index, selection.messages, known)
     shown = images & (index["sender_stamp"] == selection.video_sender)

@@ -7,8 +7,8 @@ may choose other bits for the same pictures).
 
 ``kiwi-track.rec`` is a drive on the map ``kiwi-track``: from the start through the first corners, by a driver who
 knows the track. Beside the camera's pictures it holds Frame, KinematicState, and the driver's requests for steering
-and pedal, under the sender stamp 0 as applications send theirs. ``static-rig.rec`` is the board of the static rig, from where its camera
-stands, in ordinary light, in bright light, and in the dusk.
+and pedal, under the sender stamp 0 as applications send theirs. ``static-rig.rec`` is the board of the static rig, from
+where its camera stands, in ordinary light, in bright light, and in the dusk.
 """
 
 import importlib.util

@@ -7,16 +7,19 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
 from dodo_dsl.cli.new.new_file import New, filled
 from dodo_dsl.cli.new.scaffold import spec_files
 from dodo_dsl.cli.rec.message_sets import messages_for
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
+from dodo_dsl.opendlv.recordings import timing
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.rec import contents
+from dodo_dsl.rec import contents, retiming
 from dodo_dsl.rec.contents import MessageStream
 from dodo_dsl.rec.frames import IMAGE
 
@@ -25,12 +28,15 @@ SIGNALS = {
     "opendlv.proxy.PedalPositionRequest": "position",
     "opendlv.proxy.GroundSpeedRequest": "groundSpeed",
     "opendlv.proxy.GroundAccelerationRequest": "groundAcceleration",
+    "opendlv.proxy.AxleAngularVelocityRequest": "axleAngularVelocity",
     "opendlv.proxy.AngleRequest": "angle",
 }
 """Messages with a signal that can be judged and its field, the preferred ones first."""
 SHARE_OF_MEAN, SHARE_OF_DISTANCE = 10, 50
 """Limits of the distance to the recorded signal, in percent of its range."""
 FEWEST = 10
+DEFAULT_GAP_S = 1
+"""Longer gaps are shortened by the player unless it is told otherwise, but not in a target."""
 LARGEST_BYTES = 200 << 20
 _START_UP_S = 10
 _PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
@@ -38,9 +44,15 @@ _PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
 
 @dataclass(frozen=True)
 class Drive:
-    """What a recording holds: ``cameras`` are sender stamps, that with most pictures first; ``duration`` is in s."""
+    """What a recording holds: ``cameras`` are sender stamps, that with most pictures first; ``duration`` is in s.
+
+    ``gap`` is the longest time without a message in s. ``retimed`` are messages with their times of receipt, where
+    sample times come from different drives; None elsewhere.
+    """
 
     duration: float
+    gap: float
+    retimed: bytes | None
     cameras: tuple[int, ...]
     target: MessageStream
     values: tuple[float, ...]
@@ -58,15 +70,24 @@ def look(path: Path, sent: Collection[str]) -> Drive:
     with files_of_the_user(), Recording(path) as recording:
         if recording.size > LARGEST_BYTES:
             raise UsageError(f"'{path}' is larger than {LARGEST_BYTES >> 20} MB; cut out a part: dodo rec cut --help")
-        version, messages = messages_for(recording, (), lambda _: None)
-        found = contents.look(recording, messages, version, None, lambda _: None)
-        streams = sorted(found.streams, key=lambda stream: -stream.count)
+        _, messages = messages_for(recording, (), lambda _: None)
+        index = recording.index
+        played = np.flatnonzero(~np.isin(index["data_type"], list(OWN_IDS)))
+        if fault := timing.fault(recording, played):
+            raise UsageError(f"'{path}' cannot be played: {fault}; 'dodo rec cut' writes a part without them")
+        received = retiming.receipts(recording, played)
+        streams = sorted(contents.streams(recording, messages), key=lambda stream: -stream.count)
         target = _target(path, streams)
         rows = recording.rows(messages=[target.id], sender_stamps=[target.sender_stamp])
         values = _values(path, recording, messages, target, recording.by_time(rows))
+        times = np.sort(index["time"][played] if received is None else received[played])
+        gap = float(np.diff(times).max(initial=0)) / 1e6
+        retimed = None if received is None else retiming.retimed(recording, received)
     names = {stream.name for stream in streams if stream.name}
     return Drive(
-        found.duration,
+        float(times[-1] - times[0]) / 1e6,
+        gap,
+        retimed,
         tuple(stream.sender_stamp for stream in streams if stream.id == IMAGE),
         target,
         values,
@@ -77,9 +98,9 @@ def look(path: Path, sent: Collection[str]) -> Drive:
 
 def _target(path: Path, streams: list[MessageStream]) -> MessageStream:
     for name in SIGNALS:
-        for stream in streams:
-            if stream.name == name and stream.count >= FEWEST:
-                return stream
+        found = [stream for stream in streams if stream.name == name and stream.count >= FEWEST]
+        if found:
+            return min(found, key=lambda stream: stream.sender_stamp != 0)  # as applications send it
     expected = ", ".join(SIGNALS)
     raise UsageError(f"'{path}' has no signal to judge, expected {FEWEST} or more messages of one of {expected}")
 
@@ -99,9 +120,11 @@ def files(name: str, path: Path, drive: Drive, registry: Path, root: Path) -> tu
     """The test's files, its spec first, with the recording where the registry has it not yet; and what was found."""
     place = path.resolve()
     copies = []
-    if not place.is_relative_to(registry.resolve()):
-        copies = [New(registry / "recordings" / path.name, place.read_bytes())]
-        place = registry.resolve() / "recordings" / path.name
+    if drive.retimed is not None or not place.is_relative_to(registry.resolve()):
+        name_of_copy = path.name if drive.retimed is None else f"{path.stem}-as-received{path.suffix}"
+        content = place.read_bytes() if drive.retimed is None else drive.retimed
+        copies = [New(registry / "recordings" / name_of_copy, content)]
+        place = registry.resolve() / "recordings" / name_of_copy
         if place.is_file() and place.read_bytes() == copies[0].content:
             copies = []
     message, field = drive.target.name or "", SIGNALS[drive.target.name or ""]
@@ -113,6 +136,7 @@ def files(name: str, path: Path, drive: Drive, registry: Path, root: Path) -> tu
         timeout=math.ceil(drive.duration) + 2 * _START_UP_S,
         max_time=math.ceil(drive.duration) + _START_UP_S,
         cameras=drive.cameras,
+        max_gap=math.ceil(drive.gap) if drive.gap > DEFAULT_GAP_S else 0,
         without=drive.requests,
         message=message,
         field=field,
@@ -145,6 +169,10 @@ def _found(path: Path, drive: Drive, field: str) -> str:
     if drive.others:
         lines.append(
             f"other sender stamps of it are {', '.join(map(str, drive.others))}: change 'target-sender' for them"
+        )
+    if drive.retimed is not None:
+        lines.append(
+            "its sample times are of several drives: the test has a copy with the times of receipt in their place"
         )
     if not drive.cameras:
         lines.append("the test is in real time, as only pictures can be waited for in lockstep")

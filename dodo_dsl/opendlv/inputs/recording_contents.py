@@ -1,5 +1,6 @@
 """What a recording holds, as far as a test needs it: looked for without an index, and only until it is found."""
 
+import functools
 import io
 import os
 from collections.abc import Iterator
@@ -18,6 +19,11 @@ SMALL_BYTES = 16 << 20
 """Of a recording that is looked through even when what is needed has been found: it may be cut."""
 _BUFFER = 1 << 16
 _TYPE_FIELD, _STAMP_FIELD = 1, 6
+_TIMES = (5, 4, 3)
+"""Fields of when a message was sampled, received and sent."""
+_FIRST, _OWN = 13, 2900
+"""Ids below are of tools, and a hundred from here on are DoDo's: their times are not those of a drive."""
+_DAY = 86_400_000_000
 _HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder write it"
 
 
@@ -77,12 +83,67 @@ def problems(path: Path, message: int, sender: int, name: str, is_needed: bool) 
     except OSError as error:
         yield InputError(path, f"cannot be read as a recording: {error.strerror}")
         return
+    if found.count and found.size <= SMALL_BYTES and (fault := _fault(path, path.stat().st_mtime_ns)):
+        yield InputError(
+            path, f"the recording cannot be played: {fault}", hint="'dodo rec cut' writes a part without it"
+        )
     others = ", ".join(map(str, sorted(found.senders)))
     if found.count and sender not in found.senders and (others or is_needed):
         but = f", but of {others}" if others else ""
         yield InputError(
             path, f"the recording has no {name} of sender {sender}{but}", hint="'dodo rec info' shows them"
         )
+
+
+@functools.lru_cache(maxsize=64)
+def _fault(path: Path, _changed_ns: int) -> str:
+    """What is wrong with the times of messages; the libraries for that are loaded only where something may be."""
+    try:
+        with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
+            if not _is_doubtful(_bodies(stream, Contents(0))):
+                return ""
+        from dodo_dsl.opendlv.recordings import timing
+        from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
+
+        with Recording(path) as recording:
+            types = recording.index["data_type"]
+            return timing.fault(recording, ((types < _OWN) | (types >= _OWN + 100)).nonzero()[0])
+    except (OSError, RecordingError):
+        return ""  # told where it is read
+
+
+def _is_doubtful(bodies: Iterator[bytes]) -> bool:
+    """Whether a message has no time, a body that was there, or a time before another of the same message and sender."""
+    last: dict[tuple[int, int], tuple[int, bytes]] = {}
+    low, high = 1 << 63, 0
+    for body in bodies:
+        id_ = _type(body)
+        if id_ < _FIRST or _OWN <= id_ < _OWN + 100:
+            continue
+        time = next((time for number in _TIMES if (time := _time(body, number))), 0)
+        key = id_, _number(body, _STAMP_FIELD)
+        before, other = last.get(key, (0, b""))
+        if not time or time < before or body == other:
+            return True
+        last[key] = time, body
+        low, high = min(low, time), max(high, time)
+    return high - low > _DAY
+
+
+def _time(body: bytes, wanted: int) -> int:
+    """A time of an envelope in us."""
+    at = 0
+    try:
+        while at < len(body):
+            key, at = read_varint(body, at)
+            value, at = read_varint(body, at)
+            if key == wanted << 3 | DELIMITED:
+                inner = body[at : at + value]
+                return _number(inner, 1) * 1_000_000 + _number(inner, 2)
+            at += value if key & 7 == DELIMITED else 0
+    except WireError:
+        pass
+    return 0
 
 
 def _read_by_index(path: Path, message: int, found: Contents) -> Iterator[InputError]:

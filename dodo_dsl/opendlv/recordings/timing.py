@@ -29,6 +29,13 @@ def together(times: Numbers) -> Marks:
     return within
 
 
+def within(recording: Recording, rows: Numbers) -> Numbers:
+    """The times of rows in us; those of tools lie at the begin or end of the others where they are outside."""
+    times: Numbers = recording.index["time"][rows]
+    others = times[~np.isin(recording.index["data_type"][rows], list(TOOLS))]
+    return np.clip(times, others.min(), others.max()) if len(others) else times
+
+
 def fault(recording: Recording, rows: Numbers) -> str:
     """What is wrong with the times of rows, in a sentence with the first of them; empty where they may be right.
 

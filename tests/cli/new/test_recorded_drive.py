@@ -10,6 +10,7 @@ from dodo_dsl import package_data
 from dodo_dsl.cli.new.recorded_drive import SIGNALS
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from tests.cli.new.test_command import contents, dodo
 
 SHIPPED = package_data.registry() / "recordings/kiwi-track.rec"
@@ -119,3 +120,42 @@ def test_limits_have_two_digits_and_are_never_zero(empty: Path, values: list[flo
     write(empty / "drive.rec", (STEERING, 0, values))
     assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
     assert f"max-mean: {limit} " in (empty / "tests/mine/mine.dodo.yml").read_text()
+
+
+def test_sample_times_of_several_drives_become_those_of_receipt(empty: Path) -> None:
+    """As in a public recording, in which recorded cones were processed again; the original stays as it is."""
+    write(empty / "drive.rec", (STEERING, 0, [0.1, 0.3] * 20), ("opendlv.proxy.PedalPositionRequest", 0, [0.1] * 40))
+    envelopes = list(read_envelopes(empty / "drive.rec"))
+    other = [each._replace(sample_time=each.sample_time - 1500 * 10**6) for each in envelopes[40:]]
+    (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, [*envelopes[:40], *other])))
+    code, out, _ = dodo("new", "mine", "--rec", "drive.rec")
+    assert code == 0
+    assert "drive.rec: 3.9 s, no camera\n" in out
+    assert "its sample times are of several drives: the test has a copy" in out
+    found = spec(empty, "mine")
+    assert found["target"] == "../recordings/drive-as-received.rec"
+    assert list(read_envelopes(empty / "tests/recordings/drive-as-received.rec")) == envelopes
+    assert dodo("compile", "--check")[0] == 0
+
+
+def test_a_pause_is_not_shortened_and_another_stamp_than_the_applications_is_second(empty: Path) -> None:
+    write(empty / "drive.rec", (STEERING, 7, [0.1, 0.2] * 20), (STEERING, 0, [0.1, 0.3] * 10))
+    envelopes = list(read_envelopes(empty / "drive.rec"))
+    late = [e._replace(**dict.fromkeys(("sent", "received", "sample_time"), e.sent + 3_000_000)) for e in envelopes]
+    (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, [*envelopes, *late[20:40]])))
+    assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
+    found = spec(empty, "mine")
+    assert (found["target-sender"], found["max-gap"]) == (0, "2 s")
+
+
+@pytest.mark.parametrize("time", [0, 1])
+def test_a_recording_with_times_that_cannot_be_right_makes_no_test(empty: Path, time: int) -> None:
+    write(empty / "drive.rec", (STEERING, 0, [0.1] * 20))
+    first, *others = read_envelopes(empty / "drive.rec")
+    wrong = first._replace(sent=time, received=time, sample_time=time)
+    (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, [wrong, *others])))
+    code, _, err = dodo("new", "mine", "--rec", "drive.rec")
+    assert code == 2
+    assert err.startswith(
+        f"dodo new: 'drive.rec' cannot be played: 1 of 20 messages, the first is message 1 ({STEERING}/0"
+    )

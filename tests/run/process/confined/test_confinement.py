@@ -55,7 +55,7 @@ def test_nothing_is_mounted_in_what_is_hidden_but_what_may_be_read(tmp_path: Pat
     for folder in (report, python):
         folder.mkdir(parents=True)
     hidden = (str(report), str(tests), str(tests))
-    argv = words(Confinement(str(tmp_path), "network", 1, (str(python),), hidden), MOUNTS, "/usr/bin/x", None, 5, 6)
+    argv = words(Confinement(str(tmp_path), "network", 1, (str(python),), hidden), MOUNTS, "/usr/bin/x", None, 5)
     assert [path for word, path in itertools.pairwise(argv) if word == "--tmpfs"] == ["/run", "/var/tmp", str(tests)]
     inside = argv[argv.index("--bind", argv.index(str(MOUNTS.folder))) :]
     inside = inside[inside.index(str(tests)) + 1 :]
