@@ -26,6 +26,7 @@ from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
 from dodo_dsl import __version__
 
 PORT = 5917
+BRIDGE = "dodo-bench"
 HOST = f"127.0.0.1:{PORT}"
 NAMES = [name for name in IMAGES if name != "clock"]
 LARGEST, PULL, SECONDS = "largest image, unpacked", "cold pull of the suite", "cold pull, seconds"
@@ -68,9 +69,20 @@ def empty_engine(folder: Path) -> Iterator[str]:
     root = Path(tempfile.mkdtemp(dir=folder))
     host = f"unix://{root}/docker.sock"
     flags = [f"--data-root={root}/data", f"--exec-root={root}/exec", f"--pidfile={root}/pid", f"--host={host}"]
-    rest = ["--bridge=none", "--iptables=false", "--max-concurrent-downloads=3"]
-    with process("dockerd", *flags, *rest, answers=["docker", "-H", host, "info"]):
+    rest = [f"--bridge={BRIDGE}", "--iptables=false", "--max-concurrent-downloads=3"]
+    with bridge(), process("dockerd", *flags, *rest, answers=["docker", "-H", host, "info"]):
         yield host
+
+
+@contextlib.contextmanager
+def bridge() -> Iterator[None]:
+    """A network bridge for the empty engine: with none, it would remove docker0, which is the other engine's."""
+    subprocess.run(["ip", "link", "add", BRIDGE, "type", "bridge"], check=True)
+    try:
+        subprocess.run(["ip", "address", "add", "192.0.2.1/24", "dev", BRIDGE], check=True)  # RFC 5737
+        yield
+    finally:
+        subprocess.run(["ip", "link", "delete", BRIDGE], check=False)
 
 
 def push(kind: str, name: str) -> None:
@@ -156,7 +168,7 @@ def main() -> int:
         return 0
     with attempt(planned[0]):
         largest_here()
-    needed = [name for name in ("docker-registry", "dockerd") if not shutil.which(name)]
+    needed = [name for name in ("docker-registry", "dockerd", "ip") if not shutil.which(name)]
     if os.getuid() or needed:
         plan(*planned[1:], note=f"needs {'root' if os.getuid() else needed[0]}")
         return 0
