@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
@@ -85,12 +85,9 @@ class Attempts:
                 self.kept.extend(kept)
                 if engine.state.is_unanswered and not self._keep and (why := await asyncio.to_thread(_silent, job)):
                     outcome = replace(outcome, reason=f"{outcome.reason}; {why}")
-                if (
-                    not self._keep
-                    and _may_have_paused(job, outcome)
-                    and (paused := await asyncio.to_thread(_paused, job))
-                ):
-                    outcome = replace(outcome, notes=(*outcome.notes, paused))
+                if outcome.machine and not self._keep and (job.report / RECORDING).is_file():
+                    paused = await asyncio.to_thread(_paused, job, outcome.machine)
+                    outcome = replace(outcome, notes=(*outcome.notes, *paused))
                 if job.plan.pool:
                     outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
@@ -114,20 +111,16 @@ def _silent(job: Job) -> str:
     return ""
 
 
-def _may_have_paused(job: Job, outcome: Outcome) -> bool:
-    """Whether a test ran in real time, on a machine that did not hinder it, and was recorded."""
-    load = outcome.machine
-    return load is not None and not too_busy(load) and (job.report / RECORDING).is_file()
-
-
-def _paused(job: Job) -> str:
-    """The longest pause of the application between two answers where that is a note, else empty."""
+def _paused(job: Job, load: MachineLoad) -> tuple[str, ...]:
+    """A note on the longest pause of the application between two answers in real time, where that is long."""
     from dodo_dsl.opendlv.odvd.tokens import OdvdError
     from dodo_dsl.run.recorded.longest_pause import long_pause
 
+    paused = ""
     with contextlib.suppress(OSError, OdvdError):
-        return long_pause(job.plan, job.folder, job.report / RECORDING)
-    return ""
+        paused = long_pause(job.plan, job.folder, job.report / RECORDING)
+    busy = too_busy(load)
+    return (f"{paused}; the machine was busy: {busy}" if busy else paused,) if paused else ()
 
 
 def is_undecided(outcome: Outcome) -> bool:
