@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from tests.hostile import attacks
+from tests.ordinary_user import words_as_user
 from tests.run.desk import ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("attacks")]
-USER = 12_345
 OF_PLACES = (
     "repository",
     "history-of-its-folder",
@@ -29,20 +29,6 @@ OF_PLACES = (
     "secret",
 )
 NAMES = sorted({*attacks.ATTACKS, *(f"{verb}-{place}" for place in OF_PLACES for verb in ("read", "write"))})
-
-
-def words_as_user(folder: Path) -> list[str]:
-    """What runs a program as an ordinary user, who sees the interpreter and the sources even below ``/root``."""
-    shown = [str(path) for path in dict.fromkeys((ROOT, Path(sys.prefix), Path(sys.base_prefix)))]
-    below = [path for path in shown if path.startswith("/root/")]
-    parents = sorted({str(p) for path in below for p in Path(path).parents if str(p).startswith("/root/")})
-    mounts = ["--perms", "0755", "--tmpfs", "/root"] if below else []
-    mounts += [word for path in parents for word in ("--perms", "0755", "--dir", path)]
-    mounts += [word for path in below for word in ("--ro-bind", path, path)]
-    os.chown(folder, USER, USER)
-    user = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups", "--bounding-set=-all", "--inh-caps=-all"]
-    kept = ["--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", "--cap-add", "CAP_SETPCAP"]
-    return ["bwrap", "--dev-bind", "/", "/", *mounts, *kept, "--", *user, "--"]
 
 
 @pytest.fixture(scope="module", params=["root", "user"])
