@@ -34,14 +34,14 @@ def compiled_templates() -> jinja2.BytecodeCache | None:
     None for users without a folder for it that only they can write: what is in it is run.
     """
     try:
-        folder = secured(secured(_cache_home() / "dodo") / f"templates-{__version__}")
+        folder = secured(secured(cache_home() / "dodo") / f"templates-{__version__}")
         return _Cache(str(folder))
     except (OSError, KeyError):
         return None
 
 
-def _cache_home() -> Path:
-    """Raises KeyError for a user without a home folder; a relative path counts as none, as that specification says."""
+def cache_home() -> Path:
+    """The folder of a user's caches. Raises KeyError for a user without a home folder; a relative path counts as none, as that specification says."""
     wanted = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (
         wanted if wanted.is_absolute() else Path(os.environ.get("HOME") or pwd.getpwuid(os.getuid()).pw_dir) / ".cache"

@@ -1,5 +1,6 @@
 """Files beside a compiled test: those that the application reads, its secrets, and what it never sees."""
 
+import contextlib
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -10,6 +11,8 @@ from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.interpolation import dotenv_file, interpolate, own_dotenv
 from dodo_dsl.outcome import NEXT_REPORT
 from dodo_dsl.plan.model import Application
+from dodo_dsl.state_folder import NoStateFolder, state_path
+from dodo_dsl.template_cache import cache_home
 
 
 def application_paths(application: Application, folder: Path) -> HostPaths:
@@ -36,12 +39,21 @@ def env_file_findings(application: Application, paths: HostPaths, known: Mapping
 
 
 def hidden_folders(application: Application, folder: Path, report: Path) -> list[Path]:
-    """Folders with tests, compiled tests, reports and the history of the repository, as far as they are there."""
+    """Folders with tests, compiled tests, reports, history, DoDo's state and caches, as far as they are there."""
     paths = application_paths(application, folder)
     found = [paths.folder / path for path in application.hidden]
     found += [path for own in (folder.resolve(), report.resolve()) if (path := _holder(own, paths.folder))]
     found += [root / ".git" for root in paths.roots]
+    found += [own for own in _own_folders() if any(own.is_relative_to(root) for root in paths.roots)]
     return [Path(os.path.realpath(path)) for path in found if path.is_dir()]
+
+
+def _own_folders() -> Iterator[Path]:
+    """Where DoDo keeps its state and its caches: jobs of a pipeline may keep them in the project's folder."""
+    with contextlib.suppress(NoStateFolder):
+        yield state_path("", "")
+    with contextlib.suppress(KeyError):
+        yield cache_home() / "dodo"
 
 
 def _holder(path: Path, own: Path) -> Path | None:

@@ -58,3 +58,12 @@ def test_the_whole_report_is_hidden_also_while_the_next_one_is_written(tmp_path:
     (team / report).mkdir(parents=True)
     made = Application(".", (ApplicationService("driver"),))
     assert hidden_folders(made, team, team / report) == [team / "dodo-report"]
+
+
+def test_own_state_and_caches_in_the_repository_are_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    team = tmp_path / "team"
+    for variable, name in (("XDG_STATE_HOME", ".state"), ("XDG_CACHE_HOME", ".cache")):
+        (team / name / "dodo").mkdir(parents=True)
+        monkeypatch.setenv(variable, str(team / name))
+    made = Application(".", (ApplicationService("driver"),))
+    assert hidden_folders(made, team, tmp_path / "report") == [team / ".state" / "dodo", team / ".cache" / "dodo"]
