@@ -35,7 +35,7 @@ if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it 
     from dodo_dsl.emit.render import File
     from dodo_dsl.plan.build import Compiled
 
-UNSATISFIED = ("no-producer", "no-sample")
+UNSATISFIED = ("no-producer", "no-sample", "true-pose")
 """The rules by which a service consumes what nobody produces."""
 RUN, SAMPLE = "run", "sample"
 """What announces the number of a test at values of its ranges; the report groups samples by the second."""
@@ -47,7 +47,7 @@ class Checked:
     """Tests with everything that was found wrong with them, sorted by place.
 
     ``by_rules`` has what the rules found, by spec. ``unasked`` are the specs of shipped tests that were not asked for
-    by name; ``left_out`` names those among them that need what the application does not send.
+    by name; ``left_out`` names those among them that do not fit the application: UNSATISFIED.
     """
 
     deployment: Deployment
@@ -156,7 +156,7 @@ def access(deployment: Deployment) -> Access:
 
 
 def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Checked:
-    """The same without shipped tests that need what the application does not send, but for the files ``named``.
+    """The same without shipped tests that do not fit the application, by UNSATISFIED, but for the files ``named``.
 
     Warnings about shipped tests go, too, also about those ``named``, as the user did not write these tests.
     """

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from dodo_dsl.check.world import told_in_words
 from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
@@ -209,7 +210,7 @@ class RunState:
         plan = self.plan
         answers = judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
         considered = consider(decide(self.facts, answers.findings), self._load())
-        finding = self._timed(considered.finding)
+        finding = self._with_told(self._timed(considered.finding))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
@@ -225,6 +226,13 @@ class RunState:
             machine=considered.load,
             response=self.response,
         )
+
+    def _with_told(self, finding: Finding) -> Finding:
+        """A verdict on an application that is told what none is on a road says so."""
+        words = told_in_words(self.plan.told)
+        if not words or finding.result == "error":
+            return finding
+        return replace(finding, reason=f"{finding.reason}; {words}")
 
     def is_application(self, service: str) -> bool:
         """Whether a service is the application's, or was started by it."""

@@ -37,7 +37,7 @@ def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch
     assert code == 0
     assert "\nsil-perception" in out
     assert err.startswith(
-        "skipped shipped tests that need what the application does not send: dil-static-rig, hil-camera,"
+        "skipped shipped tests that do not fit what the application sends and takes: dil-static-rig, hil-camera,"
     )
 
 
