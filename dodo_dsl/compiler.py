@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it 
     from dodo_dsl.emit.render import File
     from dodo_dsl.plan.build import Compiled
 
-UNSATISFIED = ("no-producer", "no-sample")
+UNSATISFIED = ("no-producer", "no-sample", "true-pose")
 """The rules by which a service consumes what nobody produces."""
 RUN, SAMPLE = "run", "sample"
 """What announces the number of a test at values of its ranges; the report groups samples by the second."""
@@ -46,7 +46,7 @@ class Checked:
     """Tests with everything that was found wrong with them, sorted by place.
 
     ``problems`` are all that were found when the tests were loaded. ``unasked`` are the specs of shipped tests that
-    were not asked for by name; ``left_out`` names those among them that need what the application does not send.
+    were not asked for by name; ``left_out`` names those among them that do not fit the application: UNSATISFIED.
     """
 
     deployment: Deployment
@@ -168,7 +168,7 @@ def access(deployment: Deployment) -> Access:
 
 
 def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Checked:
-    """The same without shipped tests that need what the application does not send, but for the files ``named``.
+    """The same without shipped tests that do not fit the application, by UNSATISFIED, but for the files ``named``.
 
     Warnings about shipped tests go, too, also about those ``named``, as the user did not write these tests.
     """

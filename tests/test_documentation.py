@@ -70,7 +70,7 @@ def test_the_blocks_of_the_readme_compile_together(newcomer: Path) -> None:
     assert main(["compile"], stdout, stderr) == 0, stdout.getvalue() + stderr.getvalue()
     unfed = ["dil-static-rig", "hil-camera", "hil-camera-scenes", "hil-perception", "sil-perception"]
     assert (
-        f"skipped shipped tests that need what the application does not send: {', '.join(unfed)} (see"
+        f"skipped shipped tests that do not fit what the application sends and takes: {', '.join(unfed)} (see"
         in stdout.getvalue()
     )
     compiled = {path.parent.name.partition("--")[0] for path in newcomer.glob("generated/*/test.json")}

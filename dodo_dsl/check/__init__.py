@@ -18,6 +18,7 @@ from dodo_dsl.check.rules import (
     names,
     parameters,
     pools,
+    poses,
     producers,
     rigs,
     services,
@@ -45,6 +46,7 @@ RULES: tuple[Rule, ...] = (
     limits.check,
     goals.check,
     producers.check,
+    poses.check,
     variables.check,
     memories.check,
 )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
+from dodo_dsl.check.world import told
 from dodo_dsl.diagnostics import Span, shown_path
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec import quantity
@@ -68,7 +69,8 @@ class Explanation:
     """The fields of ``dodo explain --json``.
 
     ``pool`` is what the test says of the rigs that will do, ``rig`` that of this instance. ``variables`` are those that
-    the test sets for the application, whose services without x-dodo ``undeclared`` names.
+    the test sets for the application, whose services without x-dodo ``undeclared`` names. ``told`` is what it gets of
+    what only a simulation has.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Explanation:
     vary: tuple[RangeExplained, ...]
     wiring: tuple[Line, ...]
     asked: tuple[Asked, ...]
+    told: tuple[str, ...]
     has_application: bool
     undeclared: tuple[str, ...]
 
@@ -103,6 +106,7 @@ def explain(test: ResolvedTest) -> Explanation:
         tuple(RangeExplained(one.name, one.nominal.text, one.text, _place(one.nominal.span)) for one in spec.ranges),
         tuple(_lines(wiring)),
         tuple(_asked(wiring)),
+        tuple(dict.fromkeys(str(end.port) for end in told(wiring))),
         wiring.has_application,
         wiring.undeclared,
     )

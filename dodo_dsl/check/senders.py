@@ -18,7 +18,7 @@ def senders(test: ResolvedTest) -> tuple[str, ...]:
     declares are left out, unless it is judged by them.
     """
     wiring = test.wiring
-    own = {service.use.name for service in test.services if not _is_shipped(service.manifest.process)}
+    own = {service.use.name for service in test.services if not is_shipped(service.manifest.process)}
     table: dict[Port, list[str]] = {}
     for end in wiring.consumed:
         for port in _guarded(end.port, wiring):
@@ -61,6 +61,6 @@ def _is_declared(consumed: Port, produced: Iterable[End]) -> bool:
     return any(consumed.consumes(end.port) for end in produced)
 
 
-def _is_shipped(process: tuple[str, ...]) -> bool:
+def is_shipped(process: tuple[str, ...]) -> bool:
     """Whether a service is one of DoDo's programs, which say from where they send."""
     return process[:2] == ("python", "-m") and process[2:3] != () and process[2].startswith("services.")

@@ -7,14 +7,13 @@ from typing import Literal
 
 from dodo_dsl.application.model import Declared
 from dodo_dsl.diagnostics import Span
+from dodo_dsl.opendlv.bus.world import is_of_the_world
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Ports
 
 Kind = Literal["message", "memory"]
 
 ANYTHING = "*"
-NOT_OF_THE_APPLICATION = ("opendlv.sim.", "dodo.", "cluon.data.")
-"""Packages of messages that only a simulation, or who controls it, sends: they are never required of an application."""
 
 _PARAMETER = re.compile(r"\{(?P<name>[^{}]+)\}")
 _STAMP = re.compile(r"[0-9]{1,10}")
@@ -47,7 +46,7 @@ class Port:
     @property
     def can_be_required(self) -> bool:
         """Whether an application could produce it."""
-        return self.kind == "memory" or not self.name.startswith(NOT_OF_THE_APPLICATION)
+        return self.kind == "memory" or not is_of_the_world(self.name)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import TextIO
 
 from dodo_dsl.check import catalogue
 from dodo_dsl.check.explanation import ArgumentExplained, Asked, Explanation, Line, explain
+from dodo_dsl.check.world import told_in_words
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
@@ -111,6 +112,8 @@ def _wiring(one: Explanation) -> str:
                 f"{title}\n"
                 + _table([[_port(a), f"to {', '.join(a.needed_by)}", _declared(a, one)] for a in asked], "  ")
             )
+    if words := told_in_words(one.told):
+        parts.append(f"{words}\n")
     return "\n".join(parts)
 
 

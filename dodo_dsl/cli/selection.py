@@ -97,7 +97,9 @@ def left_out(checked: Checked) -> str:
     if not checked.left_out:
         return ""
     names = printable(", ".join(checked.left_out))
-    return f"skipped shipped tests that need what the application does not send: {names} (see dodo explain NAME)\n"
+    return (
+        f"skipped shipped tests that do not fit what the application sends and takes: {names} (see dodo explain NAME)\n"
+    )
 
 
 def _is_name(word: str, spec: Spec) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check import world
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.replayed import WITHOUT
 from dodo_dsl.check.resolve import ResolvedTest
@@ -169,7 +170,8 @@ class _Builder:
     def plan(self) -> Plan:
         """The instance's Plan."""
         spec, rig = self.spec, self.rig
-        services = (*self._automatic(), *(self._service(service) for service in self.test.services))
+        automatic = tuple(self._automatic())
+        services = (*automatic, *(self._service(service) for service in self.test.services))
         self._distinct_names(services)
         evaluators = tuple(s.name for s in services if s.judge)
         for key in (
@@ -183,6 +185,7 @@ class _Builder:
             "vary",
             "seed",
             "isolation",
+            "pose",
             "record",
             "response",
             "resources",
@@ -220,6 +223,8 @@ class _Builder:
             senders=senders(self.test),
             truth=(truth := withheld_truth(self.test)),
             truth_delay_s=truth_delay_s(self.test) if truth else 0.0,
+            world=world.services(self.test, tuple(service.name for service in automatic)),
+            told=tuple(dict.fromkeys(str(end.port) for end in world.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
             import_paths=self.imports,
             source_map=self.places,

@@ -128,6 +128,8 @@ class Plan:
     relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
     ``goals`` score a passed test and never change its outcome.
     ``truth`` are messages by which evaluators judge; in real time they come to the bus ``truth_delay_s`` late.
+    ``world`` are the services that get what the application must not hear, and those of the deployment with what they
+    consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
     ``import_paths`` are folders that hold Python packages of the deployment's own services, relative to the compiled
     test's.
     """
@@ -157,6 +159,8 @@ class Plan:
     senders: tuple[str, ...] = ()
     truth: tuple[str, ...] = ()
     truth_delay_s: float = 0.0
+    world: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
     import_paths: tuple[str, ...] = ()
     source_map: dict[str, Place] = field(default_factory=dict)
@@ -167,7 +171,8 @@ class Plan:
         stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
         rig = {"DODO_RIG": self.rig} if self.rig else {}
         truth = {"DODO_TRUTH": " ".join([f"{self.truth_delay_s:g}", *self.truth])} if self.truth else {}
-        return {**stepped, **rig, **({"DODO_SENDERS": " ".join(self.senders)} if self.senders else {}), **truth}
+        lists = {"DODO_SENDERS": self.senders, "DODO_WORLD": self.world, "DODO_TOLD": self.told}
+        return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}, **truth}
 
     def layer(self, name: str) -> tuple[PlannedService, ...]:
         return tuple(s for s in self.services if s.layer == name)

@@ -29,6 +29,7 @@ from dodo_dsl.spec.resource_limits import ResourceLimits, is_valid
 from dodo_dsl.spec.settings import Settings
 
 FORMAT = 1
+_LISTS = ("more_tags", "messages", "senders", "truth", "world", "told", "import_paths")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -73,7 +74,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
             raw["lockstep"]["wall_timeout_s"] = settings.wall_timeout_s
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
         raw["resources"] = ResourceLimits(**raw["resources"]) if raw["resources"] else None
-        raw |= {key: tuple(raw[key]) for key in ("more_tags", "messages", "senders", "truth", "import_paths")}
+        raw |= {key: tuple(raw[key]) for key in _LISTS}
         raw["pool"] = Pooled(**raw["pool"]) if raw["pool"] else None
         raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
@@ -101,7 +102,7 @@ def _problem(plan: Plan) -> str:
         "seed": isinstance(plan.seed, int) and 0 <= plan.seed < 1 << 32,
         "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
-        "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in (*plan.senders, *plan.truth)),
+        "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in _words(plan)),
         "import path": all(isinstance(path, str) and "\0" not in path for path in plan.import_paths),
         "truth_delay_s": isinstance(plan.truth_delay_s, int | float) and 0 <= plan.truth_delay_s <= 86_400,
         "goal": all(isinstance(goal.check, str) and is_goal(goal) for goal in plan.goals),
@@ -123,6 +124,10 @@ def _problem(plan: Plan) -> str:
         "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
+
+
+def _words(plan: Plan) -> tuple[str, ...]:
+    return (*plan.senders, *plan.truth, *plan.world, *plan.told)
 
 
 def _access(raw: dict[str, Any]) -> Access:

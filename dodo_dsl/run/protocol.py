@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.outcome import Response
 from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
@@ -11,7 +12,10 @@ from dodo_dsl.run.load.snapshot import Snapshot
 
 @dataclass(frozen=True)
 class Ready:
+    """A service is ready; ``address`` is where it hears what the bus must not carry, None where it did not say."""
+
     service: str
+    address: Address | None = None
 
 
 @dataclass(frozen=True)

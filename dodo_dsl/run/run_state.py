@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from dodo_dsl.check.world import told_in_words
 from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.model import LAYERS, Plan
@@ -253,7 +254,7 @@ class RunState:
         answers = response.judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
         use = use_judgement.judged(self.resources, plan.resources)
         considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
-        finding = self._explained(self._timed(considered.finding))
+        finding = self._with_told(self._explained(self._timed(considered.finding)))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
@@ -270,6 +271,13 @@ class RunState:
             response=self.response,
             resources=self.resources,
         )
+
+    def _with_told(self, finding: Finding) -> Finding:
+        """A verdict on an application that is told what none is on a road says so."""
+        words = told_in_words(self.plan.told)
+        if not words or finding.result == "error":
+            return finding
+        return replace(finding, reason=f"{finding.reason}; {words}")
 
     def is_application(self, service: str) -> bool:
         """Whether a service is the application's, or was started by it."""

@@ -48,8 +48,8 @@ class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
     ``pool`` says which rigs will do where the spec names none, and the deployment says which ones these are.
-    ``isolation`` is None where the spec leaves it to the rig. ``frames`` is one of FRAMES, ``frames_hz`` None for the
-    cameras' own rates.
+    ``isolation`` is None where the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
+    to take what only a simulation knows. ``frames`` is one of FRAMES, ``frames_hz`` None for the cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``resources`` are the limits of what each of the application's services uses, None without any.
@@ -69,6 +69,7 @@ class Spec:
     rig: str | None = None
     pool: Pool | None = None
     isolation: str | None = None
+    pose: str = "declared"
     seed: int = 0
     frames: str = ON_FAILURE
     frames_hz: float | None = None
@@ -171,6 +172,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         rig=text("rig"),
         pool=pool_of(node.get("rig")),
         isolation=text("isolation"),
+        pose=text("pose", "declared"),
         seed=_seed(node.get("seed")),
         frames=frames,
         frames_hz=rate,

@@ -14,6 +14,7 @@ from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.clock import Clock
 from services.base.evaluator import UnjudgeableError
 from services.base.identity.members import Members
+from services.base.identity.world import World
 from services.base.lateness import Lateness
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 from services.base.stamps import HeardStamps, with_strangers
@@ -52,6 +53,7 @@ class Loop:
     _report_after: int = 0
     _lateness: Lateness = field(init=False)
     _truth: WithheldTruth = field(init=False)
+    _world: World = field(init=False)
 
     def __post_init__(self) -> None:
         ids = self.session.messages.id
@@ -61,6 +63,7 @@ class Loop:
         self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)
         self._truth = WithheldTruth.load(self.session.messages)
+        self._world = World.load(self.session.messages)
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Until the service is done, or ``stopped`` by a signal.
@@ -74,7 +77,7 @@ class Loop:
         if self.service.finished and self.service.verdict is None:
             print(json.dumps({"dodo": "end-of-input"}), flush=True)
             for envelope in self._truth.due():
-                self.session.send_envelope(envelope)
+                self._publish(envelope)
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close(stopped if self._has_begun else lambda: True)
         self._tell_strangers()
@@ -97,7 +100,7 @@ class Loop:
                 if not self.clock.relays:
                     self._lateness.add(now, self.clock.now())
             for envelope in self._truth.due(now):
-                self.session.send_envelope(envelope)
+                self._publish(envelope)
             if now >= self._report_after:
                 self._report(now)
             if service.finished and not self.clock.has_new_picture:
@@ -105,6 +108,8 @@ class Loop:
 
     def receive(self, timeout: float) -> Envelope | None:
         """For the clock: the next envelope within ``timeout`` seconds."""
+        if self.members is not None:
+            self.members.ask_for_missing()
         return self.session.receive(timeout)
 
     @property
@@ -137,6 +142,8 @@ class Loop:
             self._stamps.take(envelope)
         if envelope.data_type == self._begin:
             self._has_begun = True
+            if self.members is not None:
+                self.members.begin()
             self.service.begin(envelope.sample_time)
             self._lateness.begin()
         elif envelope.data_type == self._end:
@@ -172,12 +179,19 @@ class Loop:
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         envelope = output if isinstance(output, Envelope) else self._envelope(output, now)
-        if not self._truth.holds(envelope):
-            self.clock.sent(self.session.send_envelope(envelope))
-        elif self.clock.relays:
-            self.clock.sent(encode_frame(envelope))
-        else:
+        if not self.clock.relays and self._truth.holds(envelope):
             self._truth.keep(envelope, now)
+        else:
+            self.clock.sent(self._publish(envelope))
+
+    def _publish(self, envelope: Envelope) -> bytes:
+        """Send an envelope, and return its frame: on the bus, or where the application is not."""
+        is_kept = self._world.holds(envelope) or self._truth.holds(envelope)
+        if is_kept and self.clock.relays:
+            return encode_frame(envelope)
+        if is_kept and self.members is not None and self._world:
+            return self.members.send(envelope)
+        return self.session.send_envelope(envelope)
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:
         message, stamp, sampled = output if isinstance(output, Output) else Output(output, self.sender_stamp)

@@ -20,6 +20,7 @@ from services.base.flags import Flags, FlagsError, parse
 from services.base.identity.key import take_key
 from services.base.identity.members import Members
 from services.base.identity.senders import SenderTable
+from services.base.identity.world import World
 from services.base.log_messages import published
 from services.base.loop import Loop
 from services.base.manifest import load_manifest
@@ -28,7 +29,6 @@ from services.base.usage import help_text
 from services.base.verdict import undeclared_checks
 from services.base.withheld import WithheldTruth
 
-READY = '{"dodo": "ready"}'
 DONE, BROKEN, USAGE = 0, 1, 2
 
 
@@ -86,6 +86,7 @@ def _serve(
         ready.unlink(missing_ok=True)  # left by one that was killed
         with ExitStack() as resources:
             session = resources.enter_context(_session(flags["cid"]))
+            world = World.load(session.messages)
             resources.enter_context(published(session, flags["log-id"]))
             key = take_key()
             clock = clock or _clock(session, role, key)
@@ -93,9 +94,11 @@ def _serve(
             late = 0 if clock.relays else WithheldTruth.load(session.messages).delay
             service = build(Context(name, flags, session.messages, resources, clock, session, key, late, on_rig))
             code = BROKEN
-            members = resources.enter_context(_membership(session, role, key))
+            if world and (service.drive or not os.environ.get("DODO_CLOCK")):
+                session.hear_directly()
+            members = resources.enter_context(_membership(session, role, key, world))
             loop = Loop(role, service, session, clock, flags["id"], members)
-            resources.enter_context(_readiness(ready))
+            resources.enter_context(_readiness(ready, session))
             (service.drive or loop.run)(stop)
             if service.verdict is not None:
                 if undeclared := undeclared_checks(service.verdict, manifest.get("checks")):
@@ -142,24 +145,25 @@ def _clock(session: Session, role: str, key: bytes) -> Clock:
 
 
 @contextmanager
-def _membership(session: Session, role: str, key: bytes) -> Iterator[Members | None]:
+def _membership(session: Session, role: str, key: bytes, world: World) -> Iterator[Members | None]:
     """The test's services in real time, as long as this is one of them; in lockstep the clock knows them."""
     senders = SenderTable.load(session.messages, key)
-    if os.environ.get("DODO_CLOCK") or not senders.by_message:
+    if os.environ.get("DODO_CLOCK") or not (senders.by_message or world):
         yield None
         return
-    members = Members(session, role, senders)
+    members = Members(session, role, senders, world)
     members.join()
     yield members
     members.leave()
 
 
 @contextmanager
-def _readiness(file: Path) -> Iterator[None]:
-    """Report that the service is ready; the ready file exists as long as it is."""
+def _readiness(file: Path, session: Session) -> Iterator[None]:
+    """Report that the service is ready, and where it listens; the ready file exists as long as it is."""
+    address = {"address": f"{session.address[0]}:{session.port}"} if session.hears_directly else {}
     file.touch()
     try:
-        print(READY, flush=True)
+        print(json.dumps({"dodo": "ready", **address}), flush=True)
         yield
     finally:
         file.unlink(missing_ok=True)

@@ -12,8 +12,10 @@ from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base.identity.senders import SenderTable
+from services.base.identity.world import World
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.datagrams import STEP, STEP_DONE, EncodedEnvelope, Reassembly, decode, split
+from services.base.withheld import WithheldTruth
 
 REPEAT_S = 0.2
 _SLICE = 0.05
@@ -64,6 +66,7 @@ class Exchange:
     ) -> None:
         self._session, self._channel, self._take_other = session, channel, take
         self._senders = senders or SenderTable(session.messages)
+        self._world, self._truth = World.load(session.messages), WithheldTruth.load(session.messages)
         self._step = session.messages.type(STEP)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._number = 0
@@ -106,9 +109,10 @@ class Exchange:
                 self._repeat()
 
     def repeat_on_bus(self, messages: Iterable[EncodedEnvelope]) -> None:
-        """Send messages of services on the bus again."""
+        """Send messages of services on the bus again, but for those that are not for the application."""
         for each in messages:
-            self._session.send_envelope(each.envelope)
+            if not (self._world.holds(each.envelope) or self._truth.holds(each.envelope)):
+                self._session.send_envelope(each.envelope)
 
     def drain(self) -> None:
         """Take everything that is on the bus already."""

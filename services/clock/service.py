@@ -123,7 +123,10 @@ class ClockService(Service):
             if envelope is None:
                 continue
             if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope):
+                self._session.hear_directly(False)
                 return envelope
+            if self._session.was_direct:
+                continue
             if envelope.data_type in self._guarded and len(self._early) < _MOST_EARLY:
                 self._early.append((envelope, self._session.source))
         return None

@@ -39,7 +39,7 @@ services:
   driver:
     image: driver
     x-dodo:
-      in: [opendlv.logic.perception.DetectionType]
+      in: [opendlv.logic.perception.DetectionType, opendlv.sim.Frame]
       out: [opendlv.proxy.GroundSteeringRequest]
 """
 VARY = """\

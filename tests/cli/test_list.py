@@ -40,7 +40,7 @@ def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch
     *levels, skipped = err.splitlines()
     assert [line.split(",")[0].split(":")[0] for line in levels] == ["sil", "dil", "hil"]
     assert skipped.startswith(
-        "skipped shipped tests that need what the application does not send: dil-static-rig, hil-camera,"
+        "skipped shipped tests that do not fit what the application sends and takes: dil-static-rig, hil-camera,"
     )
 
 

@@ -21,6 +21,12 @@ LEAVES = (
     "        if not memory.wait(0.9 if 'frame' in locals() else None):\n            sys.exit(0)\n",
 )
 
+TOLD = {
+    "in": ["opendlv.sim.Frame"],
+    "out": ["opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"],
+}
+"""``x-dodo`` of an application that declares to take its true pose."""
+
 
 def dodo(*words: str, code: int | tuple[int, ...], before: Sequence[str] = ()) -> str:
     """The output of a command, after the words ``before`` it, that must end with an exit code, or one of some."""

@@ -1,6 +1,7 @@
 """Whole tests in lockstep, with applications of all manners."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -10,7 +11,8 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.drive.applications import ROOT, dodo, kiwi, results
+from tests.drive.applications import ROOT, TOLD, dodo, kiwi, results
+from tests.drive.variants import registry, variant
 
 pytestmark = pytest.mark.slow
 
@@ -119,12 +121,12 @@ def test_libcluon_in_lockstep(tmp_path: Path) -> None:
     for number in range(2):
         folder = tmp_path / str(number)
         folder.mkdir()
-        path = application(folder, "cluon_app.py", "--steering=0.12")
-        report = folder / "report"
-        dodo("run", CURVE, "--application", str(path), "--report", str(report), code=1)
-        test = results(report)[CURVE]
-        assert test["reason"].startswith("hit wall left ")
-        log = (report / CURVE / "logs" / "application.app.log").read_text()
+        path = application(folder, "cluon_app.py", "--steering=0.12", **{"x-dodo": TOLD})
+        report, spec = folder / "report", variant(registry(folder), CURVE, "told", pose="declared")
+        dodo("run", str(spec), "--application", str(path), "--report", str(report), code=1)
+        test = results(report)["told"]
+        assert re.fullmatch("hit wall left .*; the application is told its true pose .*", test["reason"])
+        log = (report / "told" / "logs" / "application.app.log").read_text()
         stamps = [json.loads(line)["stamp"] for line in log.splitlines() if line.startswith("{")]
         assert stamps[:3] == [1_700_000_000.0, 1_700_000_000.1, 1_700_000_000.2]
         seen.append((test["reason"], test["checks"]))

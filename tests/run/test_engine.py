@@ -425,6 +425,13 @@ def test_what_the_application_must_not_send_fails_the_test_whenever_it_is_read()
         assert (found.outcome, found.reason) == ("failed", reason)
 
 
+def test_a_verdict_says_what_the_application_is_told() -> None:
+    told = "the application is told its true pose (opendlv.sim.Frame)"
+    for stages, expected in ((drives(), f"it drove; {told}"), ({**READY, "begin": [(1.0, Lost("gone"))]}, "gone")):
+        found = outcome(ScriptedBackend(replace(plan(), told=("opendlv.sim.Frame",)), stages))
+        assert found.reason == expected
+
+
 def test_the_last_lines_are_those_of_the_service_that_decided() -> None:
     stages = {**READY, "begin": [(2.0, Exited("app", 7))]}
     found = outcome(ScriptedBackend(plan(), stages, tails={"app": ["cone lost"], "camera": ["picture 3"]}))

@@ -1,5 +1,6 @@
 """A session on the bus: UDP multicast as libcluon's OD4Session speaks it, without threads."""
 
+import contextlib
 import errno
 import itertools
 import select
@@ -55,6 +56,8 @@ class Session:
         """Host and port from which this session's datagrams come."""
         self.source: Address = ("", 0)
         """Host and port from which the last datagram came."""
+        self.was_direct = False
+        """Whether the last datagram came to this session's own address, and not to the group."""
         bus = group(cid)
         try:
             self._receiver = _receiver(bus)
@@ -63,6 +66,12 @@ class Session:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
         self._bus = bus
+        self.hears_directly = False
+        """Whether it receives what others send to its own address."""
+        self._pending: dict[socket.socket, Envelope] = {}
+        """In the order of arrival across both sockets: what one has while the other may have something older."""
+        self._sources: dict[socket.socket, Address] = {}
+        self._dropped: dict[socket.socket, int] = {}
         self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
         self._view = memoryview(self._buffer)
         self._poll = select.poll()
@@ -80,15 +89,22 @@ class Session:
 
     def send_envelope(self, envelope: Envelope) -> bytes:
         """Sends an envelope unchanged and returns its frame; raises FrameError, and SessionError above 65,507 bytes."""
-        frame = encode_frame(envelope)
-        if len(frame) > MAX_DATAGRAM_BYTES:
-            raise SessionError(
-                f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
-            )
+        frame = _datagram(envelope)
         try:
             self._sender.sendto(frame, self._bus)
         except OSError as error:
             raise SessionError(f"the bus does not take a message: {error.strerror}") from None
+        return frame
+
+    def send_directly(self, envelope: Envelope, to: Iterable[Address]) -> bytes:
+        """As ``send_envelope``, but to the addresses of sessions alone: other members of the group do not hear it.
+
+        One that cannot be reached misses it.
+        """
+        frame = _datagram(envelope)
+        for address in to:
+            with contextlib.suppress(OSError):
+                self._sender.sendto(frame, address)
         return frame
 
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
@@ -126,6 +142,18 @@ class Session:
         self._only = passing | of_others
         kernel_filter.attach(self._receiver, passing, of_others, than)
 
+    def hear_directly(self, hears: bool = True) -> None:
+        """Receive also what others send to this session's own ``address``, or no longer."""
+        if hears == self.hears_directly:
+            return
+        self.hears_directly = hears
+        if hears:
+            _as_receiver(self._sender)
+            self._poll.register(self._sender, select.POLLIN)
+        else:
+            self._poll.unregister(self._sender)
+            self._pending.pop(self._sender, None)
+
     def deafen(self) -> None:
         """Stops receiving, so that messages no longer wake this process; sending goes on."""
         if self.is_member:
@@ -153,9 +181,28 @@ class Session:
         self.close()
 
     def _next(self) -> Envelope | None:
-        size, ancillary, _, address = self._receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES)
+        if not self.hears_directly and not self._pending:
+            self.was_direct = False
+            return self._take(self._receiver)
+        sources = (self._receiver, self._sender) if self.hears_directly else (self._receiver,)
+        for source in sources:
+            if source not in self._pending:
+                with contextlib.suppress(BlockingIOError):
+                    envelope = self._take(source)
+                    if envelope is None:
+                        return None  # what comes behind it may be older than what the other socket has
+                    self._pending[source], self._sources[source] = envelope, self.source
+        if not self._pending:
+            raise BlockingIOError
+        first = min(self._pending, key=lambda source: self._pending[source].received)
+        self.source, self.was_direct = self._sources[first], first is self._sender
+        return self._pending.pop(first)
+
+    def _take(self, receiver: socket.socket) -> Envelope | None:
+        size, ancillary, _, address = receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES, socket.MSG_DONTWAIT)
         if len(ancillary) > 1 and self._only is None:
-            self.lost = _lost(ancillary)
+            self._dropped[receiver] = _lost(ancillary)
+            self.lost = sum(self._dropped.values())
         if address == self.address:
             return None
         if self._only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self._only:
@@ -172,6 +219,15 @@ class Session:
             return bool(self._poll.poll())
         left = deadline - time.monotonic()
         return left > 0 and bool(self._poll.poll(left * 1000))
+
+
+def _datagram(envelope: Envelope) -> bytes:
+    frame = encode_frame(envelope)
+    if len(frame) > MAX_DATAGRAM_BYTES:
+        raise SessionError(
+            f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
+        )
+    return frame
 
 
 def _id(frame: bytearray) -> int:
@@ -224,9 +280,7 @@ def _receiver(bus: Address) -> socket.socket:
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        _set_if_known(receiver, socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
-        _set_if_known(receiver, socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+        _as_receiver(receiver)
         receiver.bind(bus)
         receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
         receiver.setblocking(False)
@@ -234,6 +288,13 @@ def _receiver(bus: Address) -> socket.socket:
         receiver.close()
         raise
     return receiver
+
+
+def _as_receiver(receiver: socket.socket) -> None:
+    """Room for many datagrams, each with its time, and with a count of those that were lost."""
+    receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+    _set_if_known(receiver, socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+    _set_if_known(receiver, socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
 
 
 def _set_if_known(of: socket.socket, level: int, option: int, value: int) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
+from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.bus import announce_begin
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
@@ -25,6 +26,7 @@ from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
+from dodo_dsl.run.services.announce import hearers, that_hear
 from dodo_dsl.run.services.service_output import ServiceOutput
 
 _KILLED = 128 + signal.SIGKILL
@@ -36,6 +38,8 @@ _MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
 
 _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
+_ADDRESS_TURNS, _ADDRESS_TURN_S = 40, 0.05
+"""How often, and how long each time, the addresses of services are awaited: they come by their logs."""
 
 
 class DockerBackend:
@@ -73,6 +77,8 @@ class DockerBackend:
         self._processes = ContainerProcesses({})
         self._use = ContainerUse({})
         self._outputs: dict[str, ServiceOutput] = {}
+        self._addresses: dict[str, Address] = {}
+        """Where services of the test hear what the bus must not carry."""
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self._copied, self._copy_problem = asyncio.Event(), ""
@@ -201,6 +207,8 @@ class DockerBackend:
     def _line_reader(self, layer: str, name: str, evaluators: set[str]) -> Callable[[bytes], bool]:
         def on_line(line: bytes) -> bool:
             event = None if layer == "application" else service_protocol.read_line(name, name in evaluators, line)
+            if isinstance(event, Ready) and event.address:
+                self._addresses[name] = event.address
             if event is not None:
                 self._events.put_nowait(event)
             return event is not None
@@ -240,7 +248,12 @@ class DockerBackend:
         return await asyncio.to_thread(self._processes.listeners, names, self.cid)
 
     async def begin(self) -> None:
-        await announce_begin(self.cid, self.plan.seed, self._containers.get(SANDBOX), self._key)
+        for _ in range(_ADDRESS_TURNS):
+            if self._addresses.keys() >= {*that_hear(self.plan)}:
+                break
+            await asyncio.sleep(_ADDRESS_TURN_S)
+        to = hearers(self.plan, self.cid, self._addresses)
+        await announce_begin(self.plan.seed, to, self._containers.get(SANDBOX), self._key)
 
     async def load(self) -> Snapshot | None:
         return await asyncio.to_thread(self._processes.load)

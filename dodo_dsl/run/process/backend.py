@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
+from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.application_files import hidden_folders
 from dodo_dsl.run.load import snapshot
@@ -21,9 +22,9 @@ from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Slot
-from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Unstartable
+from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
-from dodo_dsl.run.services.announce import begin_frame
+from dodo_dsl.run.services.announce import begin_frame, hearers
 from dodo_dsl.run.services.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
@@ -61,6 +62,8 @@ class ProcessBackend:
         self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue() if events is None else events
         self._outputs: dict[str, ServiceOutput] = {}
+        self._addresses: dict[str, Address] = {}
+        """Where services of the test hear what the bus must not carry."""
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._asked: dict[str, asyncio.Future[Any]] = {}
@@ -127,6 +130,8 @@ class ProcessBackend:
             event = None
             if command.layer != "application":
                 event = service_protocol.read_line(command.name, command.is_evaluator, line)
+            if isinstance(event, Ready) and event.address:
+                self._addresses[command.name] = event.address
             if event is not None:
                 self._events.put_nowait(event)
             return event is not None
@@ -165,7 +170,8 @@ class ProcessBackend:
             await asyncio.wait(pids, timeout=PIDS_PATIENCE_S)
         application = [pid.result() for pid in pids if pid.done() and not pid.cancelled()]
         frame = begin_frame(self.plan.seed, application, self.slot.key)
-        self._sandbox.send({"do": "send", "cid": self.slot.cid, "data": frame.hex()})
+        to = hearers(self.plan, self.slot.cid, self._addresses)
+        self._sandbox.send({"do": "send", "to": to, "data": frame.hex()})
 
     async def load(self) -> Snapshot | None:
         """What the sandbox sees of its processes; None when it does not answer."""

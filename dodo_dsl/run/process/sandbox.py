@@ -8,7 +8,7 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
-                        {"do": "close"}; {"do": "probe"}; {"do": "send", "cid", "data"}; {"do": "load"};
+                        {"do": "close"}; {"do": "probe"}; {"do": "send", "to", "data"}; {"do": "load"};
                         {"do": "listeners"}; {"do": "use", "names": [service, ...]};
                         {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
@@ -35,7 +35,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.service_use import ServiceUse
 from dodo_dsl.run.load.thread_times import ThreadTimes
@@ -160,9 +159,11 @@ class Sandbox:
         why = confined_probe.problem()
         self.send(probe=why, missing=confined_probe.missing() if why else "")
 
-    def _do_send(self, _descriptors: list[int], cid: int, data: str) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, contextlib.suppress(OSError):
-            sender.sendto(bytes.fromhex(data), group(cid))
+    def _do_send(self, _descriptors: list[int], to: list[tuple[str, int]], data: str) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for host, port in to:
+                with contextlib.suppress(OSError):
+                    sender.sendto(bytes.fromhex(data), (host, port))
 
     def _do_load(self, _descriptors: list[int]) -> None:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""

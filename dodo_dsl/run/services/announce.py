@@ -5,16 +5,19 @@ import contextlib
 import logging
 import socket
 import time
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Mapping
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.bus.address import group
+from dodo_dsl.opendlv.bus.address import Address, group
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.bus.proof import with_proof
 from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.plan.model import Plan
 
 ALIVE_S = 1.0
+TEST_BEGIN = "dodo.TestBegin"
 
 _log = logging.getLogger(__name__)
 
@@ -24,7 +27,7 @@ def begin_frame(seed: int, application: Iterable[int] = (), key: bytes = b"") ->
 
     ``application`` are the process ids of the application's services, where the test's services see them.
     """
-    begin = MessageSet.standard().type("dodo.TestBegin")
+    begin = MessageSet.standard().type(TEST_BEGIN)
     now = time.time_ns() // 1000
     return _frame(begin(seed=seed, application=",".join(map(str, application))), now, key)
 
@@ -35,10 +38,27 @@ def _frame(message: Message, now: int, key: bytes) -> bytes:
     return encode_frame(Envelope(id_, with_proof(key, id_, messages.encode(message)), now, 0, now, 0))
 
 
-def send_on_host(cid: int, frame: bytes) -> None:
-    """Sends a datagram to a session on this machine's own network; raises OSError."""
+def that_hear(plan: Plan) -> list[str]:
+    """The services that say where they hear the begin; those of the deployment need not."""
+    return [CLOCK] if plan.lockstep else [word for word in plan.world if "?=" not in word]
+
+
+def hearers(plan: Plan, cid: int, addresses: Mapping[str, Address]) -> list[Address]:
+    """Where to announce the begin: to the services that take it, by the ``addresses`` that they said.
+
+    Where one has not said any, or the application declares to take it, on the bus as well.
+    """
+    names = [CLOCK] if plan.lockstep else [service.name for service in plan.services]
+    is_told = any(word.partition("/")[0] == TEST_BEGIN for word in plan.told)
+    on_the_bus = is_told or any(name not in addresses for name in names)
+    return [*(addresses[name] for name in names if name in addresses), *([group(cid)] if on_the_bus else [])]
+
+
+def send_on_host(frame: bytes, to: Iterable[Address]) -> None:
+    """Sends a datagram to addresses on this machine's own network; raises OSError."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(frame, group(cid))
+        for address in to:
+            sender.sendto(frame, address)
 
 
 @contextlib.asynccontextmanager
@@ -56,7 +76,7 @@ async def _beat(cid: int, key: bytes) -> None:
     while True:
         try:
             now = time.time_ns() // 1000
-            send_on_host(cid, _frame(kind(time=now), now, key))
+            send_on_host(_frame(kind(time=now), now, key), [group(cid)])
         except OSError as error:
             _log.warning("cannot send a sign of life to CID %d: %s", cid, error)
         await asyncio.sleep(ALIVE_S)

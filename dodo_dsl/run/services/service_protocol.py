@@ -7,6 +7,7 @@ import re
 from typing import Any
 
 from dodo_dsl.margins import with_margin
+from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.outcome import Response
 from dodo_dsl.plan.clock_service import CLOCK
 from dodo_dsl.plan.recorder_service import RECORDER
@@ -33,6 +34,7 @@ _STOPS = ("unanswered", "stuck", "timedout")
 _MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
 _OPTIONAL_CHECK_KEYS = {"exclusive"}
+_ADDRESS = re.compile(r"(?P<host>[0-9]{1,3}(\.[0-9]{1,3}){3}):(?P<port>[0-9]{1,5})", re.ASCII)
 _EVIDENCE_KEY = re.compile(r"[a-z][a-z0-9-]{0,39}")
 _MOST_EVIDENCE, _MAX_EVIDENCE_TEXT = 20, 200
 
@@ -50,7 +52,7 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return None
     kind = message.get("dodo")
     if kind == "ready":
-        return Ready(service)
+        return Ready(service, _address(message.get("address")))
     if kind == "end-of-input":
         return InputEnded(service)
     if kind in ("note", "foreign", "taken"):
@@ -69,6 +71,12 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
     if kind == "flood" and service == RECORDER:
         return _flood(service, message)
     return _clock_event(kind, message) if service == CLOCK else None
+
+
+def _address(text: object) -> Address | None:
+    """An IPv4 address with a port, None where it is none."""
+    found = _ADDRESS.fullmatch(text) if isinstance(text, str) else None
+    return (found["host"], int(found["port"])) if found and 0 < int(found["port"]) < 1 << 16 else None
 
 
 def _told(service: str, message: dict[str, Any]) -> Event | None:

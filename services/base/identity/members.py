@@ -1,5 +1,9 @@
-"""The services of a test in real time: each says from which address it sends, with a proof that it has the key."""
+"""The services of a test in real time: each says its address, with a proof that it has the key.
 
+From there it sends, and there it gets what the application must not hear.
+"""
+
+import json
 import time
 from typing import Any
 
@@ -9,9 +13,13 @@ from dodo_dsl.opendlv.bus.proof import is_proven, with_proof
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.identity.senders import Producers, SenderTable
+from services.base.identity.world import World
 
 SENDER = "dodo.Sender"
 _AGAIN_S = 0.1
+_MISSING_S = 0.5
+_UNATTENDED_S = 10.0
+"""After which services count as ready where no runner tells of it."""
 
 
 class Members:
@@ -21,13 +29,19 @@ class Members:
     ready, so that it comes too late to be taken for one of them, even where there is no key, as without a runner.
     """
 
-    def __init__(self, session: Session, name: str, table: SenderTable) -> None:
+    def __init__(self, session: Session, name: str, table: SenderTable, world: World | None = None) -> None:
         self._session, self._name, self._table = session, name, table
+        self._world = world or World()
+        self._overheard: set[int] = set()
+        """Messages of the world that had to come to the bus."""
+        self._silent_from: float | None = None if table.key else time.monotonic() + _UNATTENDED_S
+        """When services that have not said their address are known to be others than DoDo's; None before the begin."""
         self._id, self._type = session.messages.id(SENDER), session.messages.type(SENDER)
         self._ids = table.ids | {self._id}
         self._addresses: dict[str, Address | None] = {}
         """None for a service that has left: another program may have got its port."""
         self._known: frozenset[Address] = frozenset()
+        self._others: list[Address] = []
         self._asked = 0.0
 
     def join(self) -> None:
@@ -41,8 +55,9 @@ class Members:
 
     def admits(self, envelope: Envelope) -> bool:
         """Whether the message that the session received last counts; tells the runner of one that must not be."""
+        is_stranger = self._session.was_direct and self._session.source not in self._known
         if envelope.data_type not in self._ids:
-            return True
+            return not is_stranger
         if envelope.data_type == self._id:
             self._learn(envelope)
             return False
@@ -50,6 +65,32 @@ class Members:
             return False
         producers = self._table.producers(envelope)
         return producers is None or self._session.source in self._known or self._is_excused(producers)
+
+    def send(self, envelope: Envelope) -> bytes:
+        """Send a message of the world to the test's services alone, and return its frame.
+
+        From the begin of the test on, what a service of the deployment consumes that does not say where it listens
+        comes to the bus.
+        """
+        silent = [name for name in self._world.awaited_by(envelope) if name not in self._addresses]
+        if not silent or self._silent_from is None or time.monotonic() < self._silent_from:
+            return self._session.send_directly(envelope, self._others)
+        if envelope.data_type not in self._overheard:
+            self._overheard.add(envelope.data_type)
+            why = f"'{silent[0]}' does not use DoDo's base for services"
+            text = f"the application can hear {self._world.names[envelope.data_type]}, as service {why}"
+            print(json.dumps({"dodo": "note", "text": text}), flush=True)
+        return self._session.send_envelope(envelope)
+
+    def begin(self) -> None:
+        """The test begins: all of its services are ready, and have said their addresses if they ever do."""
+        self._silent_from = self._silent_from or time.monotonic()
+
+    def ask_for_missing(self) -> None:
+        """Ask now and then for the addresses of services that have not said theirs: a message may be lost."""
+        missing = self._world.services - self._addresses.keys() - {self._name}
+        if missing and time.monotonic() - self._asked > _MISSING_S:
+            self.join()
 
     def _is_excused(self, producers: Producers) -> bool:
         """A message from an unknown address: counts if it may be of a service that does not say its own.
@@ -84,8 +125,12 @@ class Members:
             return
         if said.asks:
             self._say()
-        if said.service not in self._table.services:
+        if said.service not in self._table.services and not self._is_of_the_world(said.service):
             return
         if self._addresses.setdefault(said.service, source) == source and said.leaves:
             self._addresses[said.service] = None
         self._known = frozenset(address for address in self._addresses.values() if address is not None)
+        self._others = sorted(self._known)
+
+    def _is_of_the_world(self, service: str) -> bool:
+        return service in self._world.services or service in self._world.silent

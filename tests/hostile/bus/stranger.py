@@ -7,6 +7,7 @@ the picture, 0 before the first.
 """
 
 import contextlib
+import math
 import os
 import socket
 import struct
@@ -27,6 +28,7 @@ FRAME, STATE = "opendlv.sim.Frame", "opendlv.sim.KinematicState"
 BOX, PROPERTY = (f"opendlv.logic.perception.Detection{kind}" for kind in ("BoundingBox", "Property"))
 SEEN = "opendlv.proxy.ImageReadingShm"
 IP_PKTINFO = 8
+BUS_PORT = 12175
 LATER = 5
 """The picture at which some attacks begin."""
 
@@ -39,6 +41,7 @@ class Application:
         self.heard: list[tuple[Envelope, tuple[str, int]]] = []
         self.sampled = 0
         self.steering = 0.0
+        self.names: set[str] = set()
 
     def send(self, name: str, stamp: int = 0, sampled: int | None = None, **fields: Any) -> None:
         self.session.send(self.messages.type(name)(**fields), self.sampled if sampled is None else sampled, stamp)
@@ -51,6 +54,10 @@ class Application:
     def listen(self) -> None:
         while (envelope := self.session.receive(0.0)) is not None:
             self.heard.append((envelope, self.session.source))
+            name = f"{self.messages.name(envelope.data_type)}/{envelope.sender_stamp}"
+            if name not in self.names:
+                self.names.add(name)
+                print(f"heard {name}", flush=True)
 
     def of(self, name: str, stamp: int = 0) -> Iterator[tuple[Envelope, Any, tuple[str, int]]]:
         id_ = self.messages.id(name)
@@ -124,7 +131,10 @@ def join_again(app: Application, number: int) -> None:
 
 def disguise(app: Application, number: int) -> None:
     """Datagrams with the address of the service that has the pose, whose port is free at another local address."""
-    for _, _, (host, port) in list(app.of(FRAME))[:1]:
+    if number != LATER:
+        return
+    for port in set(ports()) - {BUS_PORT, app.session.port}:
+        host = app.session.address[0]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
             try:
                 other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -137,6 +147,20 @@ def disguise(app: Application, number: int) -> None:
                 pose = app.frame(FRAME, app.sampled + step * 20_000, y=step * 0.1, qz=0.7071, qw=0.7071)
                 other.sendmsg([pose], [(socket.IPPROTO_IP, IP_PKTINFO, info)], 0, group(app.session.cid))
             print("disguised", flush=True)
+
+
+def directly(app: Application, number: int) -> None:
+    """Poses to all ports, past the bus."""
+    if number == LATER:
+        for frame in [app.frame(FRAME, app.sampled + step * 20_000, y=step * 0.1) for step in range(1, 45)]:
+            for port in set(ports()) - {BUS_PORT}:
+                app.session.send_directly(decode_frame(frame), [(app.session.address[0], port)])
+
+
+def true_pose(app: Application, number: int) -> None:
+    """It never looks at a picture: it steers by the vehicle's true pose, and would reach the finish."""
+    for _, pose, _ in app.of(FRAME):
+        app.steering = 1.8 * pose.x + 1.2 * (math.pi / 2 - 2 * math.atan2(pose.qz, pose.qw))
 
 
 def ports() -> list[int]:
@@ -250,7 +274,7 @@ def easy(app: Application, number: int) -> None:
 ATTACKS = {name.replace("_", "-"): function for name, function in list(globals().items()) if name in (
     "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "unrecorded", "join", "join_again",
     "disguise", "step_to_ports", "answer_to_ports", "step_on_bus", "answer_on_bus", "repeat_steps", "spy", "echo",
-    "boxes", "easy",
+    "boxes", "easy", "directly", "true_pose",
 )}  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 STRAIGHT, SIGNAL, PERCEPTION = "sil-closed-straight", "sil-open-straight", "sil-perception--light-1--clutter-0"
-REPLAY = "dil-kiwi-track"
+REPLAY, CURVE = "dil-kiwi-track", "sil-closed-left-curve"
 
 
 class BusAttack(NamedTuple):
@@ -62,6 +62,11 @@ ATTACKS = (
     BusAttack("echo", PERCEPTION, "realtime", "nothing was detected|no detection|left|recall"),
     BusAttack("boxes", PERCEPTION, "lockstep", only("opendlv.logic.perception.DetectionBoundingBox/9", "camera")),
     BusAttack("boxes", PERCEPTION, "realtime", only("opendlv.logic.perception.DetectionBoundingBox/9", "camera")),
+    BusAttack("directly", STRAIGHT, "realtime", only(FRAME, "pose")),
+    BusAttack("true-pose", STRAIGHT, "lockstep", WALL),
+    BusAttack("true-pose", STRAIGHT, "realtime", WALL),
+    BusAttack("true-pose", CURVE, "lockstep", WALL),
+    BusAttack("true-pose", STRAIGHT, "realtime", WALL, "host"),
     BusAttack("easy", SIGNAL, "lockstep", ""),
     BusAttack("easy", SIGNAL, "realtime", ""),
     BusAttack("finish", STRAIGHT, "lockstep", only(FRAME, "pose"), "host"),

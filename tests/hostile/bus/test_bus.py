@@ -12,6 +12,9 @@ from tests.drive.applications import dodo, results
 from tests.drive.variants import registry, variant
 from tests.hostile.bus.table import ATTACKS, BusAttack
 
+CAR = ("opendlv.proxy.", "opendlv.system.")
+DODO_S_OWN = {"dodo.Step/0", "dodo.StepDone/0", "dodo.Sender/0"}
+"""These carry steps, times and addresses, and nothing that only a simulation knows."""
 BUSY = "the machine was too busy to judge: "
 HERE = Path(__file__).parent
 FIRST_CID = 128
@@ -49,6 +52,9 @@ def attacked(folder: Path, attacks: list[BusAttack], isolation: str = "network")
     given = ("--application", str(compose), "--report", str(report), "--clock", attacks[0].clock)
     dodo("run", *specs, *given, code=(1, 3))
     found = {slug.partition("--")[0]: test for slug, test in results(report).items()}
+    for slug in results(report):
+        log = (report / slug / "logs" / "application.stranger.log").read_text()
+        found[slug.partition("--")[0]]["heard"] = {line[6:] for line in log.splitlines() if line.startswith("heard ")}
     if isolation == "network":
         assert {name: test["cid"] for name, test in found.items()} == {
             named(each): cid for cid, each in enumerate(attacks, FIRST_CID)
@@ -62,6 +68,7 @@ def check(test: dict[str, Any], attack: BusAttack) -> None:
     assert test["outcome"] == ("error" if is_busy else "failed"), test["reason"]
     reason = test["reason"].partition("; it found: ")[2].rpartition("; run it ")[0] if is_busy else test["reason"]
     assert re.search(attack.reason, reason), test["reason"]
+    assert {name for name in test["heard"] if not name.startswith(CAR)} <= DODO_S_OWN, "the application hears the world"
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -211,3 +212,27 @@ def test_without_the_kernel_s_time_a_datagram_came_now(cid: int, monkeypatch: py
         one.send(one.messages.type("opendlv.proxy.PedalPositionRequest")(position=0.5))
         envelope = two.receive(5)
     assert envelope and before <= envelope.received <= time.time_ns() // 1000 and two.lost == 0
+
+
+def test_what_is_sent_directly_only_one_hears_in_the_order_of_arrival(cid: int) -> None:
+    with Session(cid) as sender, Session(cid) as hearer, Session(cid) as other:
+        for session in (hearer, other):
+            session.hear_directly()
+        for number in range(6):
+            envelope = Envelope(1, b"", number, 0, 0, 0)
+            if number % 2:
+                sender.send_directly(envelope, [hearer.address])
+            else:
+                sender.send_envelope(envelope)
+        heard = [(e.sent, hearer.was_direct, hearer.source == sender.address) for e in drained(hearer)]
+        assert heard == [(number, number % 2 == 1, True) for number in range(6)]
+        assert [e.sent for e in drained(other)] == [0, 2, 4]
+        hearer.hear_directly(False)
+        sender.send_directly(Envelope(1, b"", 7, 0, 0, 0), [hearer.address])
+        sender.send_envelope(Envelope(1, b"", 8, 0, 0, 0))
+        assert [e.sent for e in drained(hearer)] == [8]
+
+
+def drained(session: Session) -> Iterator[Envelope]:
+    while (envelope := session.receive(0.2)) is not None:
+        yield envelope

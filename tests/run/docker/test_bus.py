@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.opendlv.bus.envelope import decode_frame
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.run.docker.bus import announce_begin
@@ -24,26 +25,26 @@ class Sandbox:
 
 def test_it_is_received_on_the_host(cid: int) -> None:
     with Session(cid) as session:
-        asyncio.run(announce_begin(cid, 7, None))
+        asyncio.run(announce_begin(7, [group(cid)], None))
         envelope = session.receive(5.0)
     assert envelope is not None
     assert session.messages.decode(envelope.data_type, envelope.payload).seed == 7  # type: ignore[attr-defined]
 
 
 def test_a_host_that_cannot_send_is_an_error() -> None:
-    with pytest.raises(BackendError, match="the begin of the test cannot be announced on its bus: "):
-        asyncio.run(announce_begin(999, 7, None))
+    with pytest.raises(BackendError, match="the begin of the test cannot be announced to its services: "):
+        asyncio.run(announce_begin(7, [("225.0.0.999", 1)], None))
 
 
-def test_the_sandbox_sends_the_datagram_to_the_group() -> None:
+def test_the_sandbox_sends_the_datagram_to_each_service() -> None:
     sandbox = Sandbox(0, b"")
-    asyncio.run(announce_begin(140, 7, sandbox))
-    *_, escaped, group, port = sandbox.words
-    assert (group, port) == ("225.0.0.140", "12175")
+    asyncio.run(announce_begin(7, [("10.1.0.2", 40000), ("10.1.0.3", 40001)], sandbox))
+    *_, escaped, first, second = sandbox.words
+    assert (first, second) == ("10.1.0.2/40000", "10.1.0.3/40001")
     assert decode_frame(bytes.fromhex(escaped.replace("\\x", ""))).data_type > 0
 
 
 @pytest.mark.parametrize(("output", "problem"), [(b"no such file\n", "no such file"), (None, "exit code 1")])
 def test_a_command_that_fails_is_an_error(output: bytes | None, problem: str) -> None:
-    with pytest.raises(BackendError, match=f"cannot be announced on its bus: {problem}$"):
-        asyncio.run(announce_begin(140, 7, Sandbox(1, output)))
+    with pytest.raises(BackendError, match=f"cannot be announced to its services: {problem}$"):
+        asyncio.run(announce_begin(7, [group(140)], Sandbox(1, output)))

@@ -5,10 +5,14 @@ from fractions import Fraction
 
 import pytest
 
+from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.lockstep.channel import Channel
+from services.base.lockstep.datagrams import encode
 from services.clock import model
 from services.clock.answers import Answers
+from services.clock.exchange import Exchange
 from services.clock.participants import Patience, Roles
 from services.clock.service import ClockService
 
@@ -52,3 +56,38 @@ def test_without_a_runner_it_begins_by_itself(
     with Session(cid) as session:
         driven(session, Roles((), (), ("gone",)))
     assert "did not answer the clock within 0.4 s" in capsys.readouterr().out
+
+
+def test_the_begin_comes_to_its_own_address_and_nothing_else_does(
+    cid: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An application must not answer where only the clock hears it."""
+    monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.1)
+    with Session(cid) as session, Session(cid) as other:
+        session.hear_directly()
+        other.send_directly(enveloped("opendlv.proxy.GroundSteeringRequest"), [session.address])
+        other.send_directly(enveloped("dodo.TestBegin"), [session.address])
+        driven(session, Roles((), (), ("gone",)))
+        assert not session.hears_directly
+    assert "did not answer the clock" in capsys.readouterr().out
+
+
+def test_what_an_application_that_starts_late_must_not_hear_is_not_sent_again(
+    cid: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DODO_WORLD", "pose")
+    monkeypatch.setenv("DODO_TRUTH", "0 opendlv.logic.perception.DetectionBoundingBox/0")
+    reading = "opendlv.proxy.DistanceReading"
+    names = ("opendlv.sim.Frame", "opendlv.logic.perception.DetectionBoundingBox", reading)
+    with Session(cid) as session, Session(cid) as application:
+        channel = Channel(cid, session.messages)
+        Exchange(session, channel, lambda _: None).repeat_on_bus(encode(enveloped(name)) for name in names)
+        channel.close()
+        envelope = application.receive(5.0)
+        assert envelope is not None and envelope.data_type == session.messages.id(reading)
+        assert application.receive(0.0) is None
+
+
+def enveloped(name: str) -> Envelope:
+    messages = MessageSet.standard()
+    return Envelope(messages.id(name), messages.encode(messages.type(name)()), 0, 0, 0, 0)

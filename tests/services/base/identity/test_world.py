@@ -1,0 +1,153 @@
+"""What only a simulation has goes to the test's services, and not to the bus."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.bus.proof import with_proof
+from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.base.clock import RealTimeClock
+from services.base.identity.members import Members
+from services.base.identity.senders import SenderTable
+from services.base.identity.world import TOLD, VARIABLE, World
+from services.base.loop import Loop
+from services.base.service import Output, Service
+
+KEY = b"a key of this test"
+FRAME, STATE, READING = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.proxy.DistanceReading"
+MESSAGES = MessageSet.standard()
+Join = Callable[..., tuple[Session, Members]]
+
+
+class Teller(Service):
+    """Sends one message of each kind, and is finished."""
+
+    period = 1_000
+
+    def update(self, now: int) -> list[Output]:
+        self.finished = True
+        return [Output(MESSAGES.type(name)(), 0) for name in (FRAME, STATE, READING)]
+
+
+@pytest.fixture
+def enter(cid: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Join]:
+    """Makes a service of the test with its session, which joins the others."""
+    monkeypatch.setenv(VARIABLE, "pose track own?=opendlv.sim.KinematicState/0")
+    with ExitStack() as stack:
+
+        def one(name: str, key: bytes = KEY) -> tuple[Session, Members]:
+            session = stack.enter_context(Session(cid))
+            session.hear_directly()
+            members = Members(session, name, SenderTable.load(session.messages, key), World.load(session.messages))
+            members.join()
+            return session, members
+
+        yield one
+
+
+@pytest.fixture
+def application(cid: int) -> Iterator[Session]:
+    with Session(cid) as session:
+        session.hear_directly()
+        yield session
+
+
+def taken(session: Session, members: Members | None = None) -> list[str]:
+    """Names of what comes, and of it what counts."""
+    names = []
+    while (envelope := session.receive(0.0)) is not None:
+        if members is None or members.admits(envelope):
+            names.append(session.messages.name(envelope.data_type))
+    return [name for name in names if name != "dodo.Sender"]
+
+
+def tell(session: Session, members: Members | None) -> None:
+    Loop("pose", Teller(), session, RealTimeClock(), 0, members).run(lambda: False)
+
+
+def frame(name: str = FRAME, key: bytes = b"") -> Envelope:
+    payload = with_proof(key, MESSAGES.id(name), MESSAGES.encode(MESSAGES.type(name)()))
+    return Envelope(MESSAGES.id(name), payload, 0, 0, 0, 0)
+
+
+def test_services_hear_it_and_the_application_does_not(enter: Join, application: Session) -> None:
+    pose, track = enter("pose"), enter("track")
+    taken(*pose), taken(*track)
+    tell(*pose)
+    assert taken(*track) == [FRAME, STATE, READING, "dodo.EndOfInput"]
+    assert taken(application) == [READING]
+
+
+def test_what_it_declares_it_is_told(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(TOLD, f"{FRAME}/0")
+    pose, track = enter("pose"), enter("track")
+    taken(*pose), taken(*track)
+    tell(*pose)
+    assert sorted(taken(*track)) == sorted([FRAME, STATE, READING, "dodo.EndOfInput"])
+    assert taken(application) == [FRAME, READING]
+
+
+def test_outside_of_a_test_the_bus_carries_everything(application: Session, cid: int) -> None:
+    with Session(cid) as session:
+        tell(session, None)
+    assert taken(application) == [FRAME, STATE, READING, "dodo.EndOfInput"]
+
+
+def test_a_service_that_does_not_say_where_it_listens_hears_it_on_the_bus(
+    enter: Join, application: Session, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From the begin on: before it, it may still come to say so."""
+    pose = enter("pose")
+    pose[1].send(frame(STATE))
+    assert taken(application) == []
+    pose[1].begin()
+    pose[1].send(frame(STATE))
+    pose[1].send(frame(STATE))
+    pose[1].send(frame())
+    assert taken(application) == [STATE, STATE]
+    assert capsys.readouterr().out.count("the application can hear opendlv.sim.KinematicState, as service 'own'") == 1
+    own = enter("own")
+    taken(*pose)
+    pose[1].send(frame(STATE))
+    assert (taken(application), taken(*own)) == ([], [STATE])
+
+
+def test_the_application_reaches_no_service_alone(
+    enter: Join, application: Session, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Else it could give the vehicle other requests than the recorder and the evaluators see."""
+    track = enter("track")
+    application.send_directly(frame(READING), [track[0].address])
+    application.send_directly(frame("dodo.TestBegin"), [track[0].address])
+    assert taken(*track) == []
+    application.send_directly(frame("dodo.TestBegin", KEY), [track[0].address])  # as the runner does
+    assert taken(*track) == ["dodo.TestBegin"]
+
+
+def test_who_has_left_or_is_unknown_hears_nothing(enter: Join, application: Session) -> None:
+    pose, track = enter("pose"), enter("track")
+    stranger, forger = enter("stranger"), enter("track", b"another key")
+    taken(*pose)
+    pose[1].send(frame())
+    track[1].leave()
+    taken(*pose)
+    pose[1].send(frame())
+    assert [taken(*each) for each in (track, stranger, forger)] == [[FRAME], [], []]
+
+
+def test_who_is_missing_is_asked_for_again(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As what it said may be lost."""
+    pose, track = enter("pose"), enter("track")
+    while pose[0].receive(0.0) is not None:
+        pass
+    monkeypatch.setattr("services.base.identity.members._MISSING_S", 0.0)
+    pose[1].ask_for_missing()
+    taken(*track), taken(*pose)
+    pose[1].send(frame())
+    assert taken(*track) == [FRAME]
+    taken(application)
+    pose[1].ask_for_missing()
+    assert application.receive(0.0) is None, "nobody is missing"
