@@ -23,8 +23,7 @@ TINY = Path(__file__).parent / "tiny"
 """A repository with one test, which takes no longer than it must."""
 
 RUN = ("run", "sil-tiny", "-q", "--report", "{report}")
-OUTSIDE = ("run", "{checkout}/tests/sil-tiny", "-q", "--report", "{report}",
-           "--application", "{checkout}/docker-compose.yml")  # fmt: skip
+OUTSIDE = ("run", "{checkout}/tests/sil-tiny", "-q", "--report", "{report}")
 NOT_UTF8 = "caf\udce9"
 """The bytes of a name, as Python has them."""
 

@@ -63,7 +63,7 @@ class Watch:
 
     def look(self) -> Seen:
         """The files that tests may depend on, as they are now."""
-        deployment = _deployment()
+        deployment = _deployment(self._options.test)
         named = [path for word in self._options.test if (path := Path(word)).exists()]
         folders = [*deployment.registry, *self._folders(deployment), deployment.root, *named]
         roots = [folder.resolve() if folder.is_dir() else folder.resolve().parent for folder in folders]
@@ -136,8 +136,8 @@ class Watch:
             self._stdout.writelines(f"{line}\n" for line in text.lines(comparison))
 
 
-def _deployment() -> Deployment:
-    return load_deployment(find_deployment(Path.cwd()))[0]
+def _deployment(words: Sequence[str]) -> Deployment:
+    return load_deployment(find_deployment(Path.cwd(), [path for path in map(Path, words) if path.exists()]))[0]
 
 
 def _is_in(path: Path, folders: Collection[Path]) -> bool:

@@ -5,7 +5,7 @@ import os
 import posixpath
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -68,13 +68,14 @@ def build_command(prefix: str, tag: str, *names: str) -> str:
     return shlex.join(["dodo", "images", "build", *names, *flags])
 
 
-def find_deployment(start: Path) -> Path | None:
-    """The nearest ``dodo.yml`` at or above a folder."""
+def find_deployment(start: Path, paths: Iterable[Path] = ()) -> Path | None:
+    """The nearest ``dodo.yml`` at or above a folder; where there is none, the one that is above all ``paths``."""
     folder = start.resolve()
     for candidate in (folder, *folder.parents):
         if (candidate / FILE_NAME).is_file():
             return candidate / FILE_NAME
-    return None
+    above = {find_deployment(path if path.is_dir() else path.parent) for path in paths}
+    return above.pop() if len(above) == 1 else None
 
 
 def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deployment, list[Diagnostic]]:

@@ -29,6 +29,17 @@ def test_the_nearest_file(tmp_path: Path) -> None:
     assert find_deployment(tmp_path / "a/b") == tmp_path / "a/dodo.yml"
 
 
+def test_outside_of_all_deployments_that_of_the_named_paths_counts(tmp_path: Path) -> None:
+    outside, one, other = (tmp_path / name for name in ("outside", "one", "other"))
+    for folder in (outside, one / "tests", other / "tests"):
+        folder.mkdir(parents=True)
+    for folder in (one, other):
+        (folder / "dodo.yml").write_text("dodo: 1\n")
+    assert find_deployment(outside, [one / "tests", one / "tests" / "a.dodo.yml"]) == one / "dodo.yml"
+    assert find_deployment(outside, [one / "tests", other / "tests"]) is None
+    assert find_deployment(other, [one / "tests"]) == other / "dodo.yml"
+
+
 def test_defaults(tmp_path: Path) -> None:
     deployment, problems = loaded(tmp_path, "")
     assert problems == []
