@@ -41,7 +41,7 @@ def compiled_templates() -> jinja2.BytecodeCache | None:
 
 
 def cache_home() -> Path:
-    """The folder of a user's caches. Raises KeyError for a user without a home folder; a relative path counts as none, as that specification says."""
+    """The folder of a user's caches; a relative path counts as none, as that specification says. Raises KeyError."""
     wanted = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (
         wanted if wanted.is_absolute() else Path(os.environ.get("HOME") or pwd.getpwuid(os.getuid()).pw_dir) / ".cache"
