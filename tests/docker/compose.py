@@ -46,7 +46,12 @@ class Crate:
         """A test of three scripts; ``app`` are keys of the application's service in its compose file."""
         plan = self.bench.plan(judge, STARTED + application, environment, f"{self.mark}-{slug}", timeout_s)
         camera, evaluator = plan.services
-        plan = replace(plan, services=(replace(camera, flags=(Flag("rec", "test.rec", "report"),)), evaluator))
+        access = replace(plan.application.access, paths=(str(self.bench.folder),))
+        plan = replace(
+            plan,
+            services=(replace(camera, flags=(Flag("rec", "test.rec", "report"),)), evaluator),
+            application=replace(plan.application, access=access),
+        )
         folder = self.bench.folder / "compiled" / plan.slug
         folder.mkdir(parents=True)
         (folder / "test.json").write_text(to_json(plan))

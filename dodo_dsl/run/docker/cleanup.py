@@ -14,6 +14,8 @@ from dodo_dsl.run.docker.client import engine_error
 PROJECT_LABEL = "com.docker.compose.project"
 SERVICE_LABEL = "com.docker.compose.service"
 _STOP_S = 2
+_WITHOUT_CONTAINER = "ep-"
+"""How an engine lists an endpoint whose container is gone, or never started."""
 _RESTS_S = 0.5, 1.0, 2.0
 """Waits before removing once more what the engine refuses to: it may still be busy with a container that has ended."""
 
@@ -97,9 +99,10 @@ def _remove_network(network: Any) -> None:
         raise
     except APIError:
         network.reload()
-        left = network.attrs.get("Containers") or {}
-        for about in left.values():
-            network.disconnect(about["Name"], force=True)
+        endpoints = network.attrs.get("Containers") or {}
+        left = [about["Name"] for key, about in endpoints.items() if key.startswith(_WITHOUT_CONTAINER)]
+        for name in left:
+            network.disconnect(name, force=True)
         if not left:
             raise
         network.remove()
