@@ -102,9 +102,9 @@ def load(
 ) -> Checked:
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
-    ``application`` are compose files that replace the deployment's, which is looked for at ``start`` and then above the
-    paths. ``reader`` may know texts that are not saved yet. Tests for which ``loader`` gives the specs of the ``former``
-    check keep what it found.
+    ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
+    paths. ``reader`` may know texts that are not saved yet. Tests for which ``loader`` gives the specs of the
+    ``former`` check keep what it found.
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
