@@ -62,10 +62,12 @@ def words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     shutil.copytree(ROOT / "tests_registry" / "maps", tmp_path / "tests" / "maps")
     (tmp_path / "blind.py").write_text(APPLICATION)
     said = {"out": ["opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"]}
+    passed = ["LD_PRELOAD", "DODO_TEST_NETEM", "DODO_TEST_CLOCK"]
+    (tmp_path / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"], "environment": passed}))
     service = {
         "image": "x",
         "command": "--cid=111",
-        "environment": ["LD_PRELOAD", "DODO_TEST_NETEM", "DODO_TEST_CLOCK"],
+        "environment": passed,
         "x-dodo": said,
         "x-dodo-process": ["python", str(tmp_path / "blind.py")],
     }
@@ -77,7 +79,7 @@ def words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def start(words: list[str], **variables: str) -> "subprocess.Popen[str]":
     process = subprocess.Popen(
         words,
-        cwd=ROOT,
+        cwd=Path(words[-1]).parent,
         env={**os.environ, **variables},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

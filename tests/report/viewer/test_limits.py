@@ -29,13 +29,13 @@ def test_the_place_of_a_limit_of_memory() -> None:
 @pytest.mark.parametrize(
     ("slug", "name", "expected"),
     [
-        ("sil-open-straight", "distance", [("max-distance", 21, "max-distance: 0.06")]),
-        ("sil-open-straight", "mean-over-time", [("max-mean", 19, "max-mean: 0.014")]),
-        ("sil-open-straight", "gap", [("", 13, "signal:")]),
+        ("sil-open-straight", "distance", [("max-distance", 22, "max-distance: 0.06")]),
+        ("sil-open-straight", "mean-over-time", [("max-mean", 20, "max-mean: 0.014")]),
+        ("sil-open-straight", "gap", [("", 14, "signal:")]),
         ("sil-open-straight", "unheard-of", []),
         ("sil-open-straight", "slow-answers", []),
-        ("dil-static-rig", "slow-answers", [("max", 9, RESPONSE)]),
-        ("dil-static-rig", "uncopied-sample-times", [("sample-times", 9, RESPONSE)]),
+        ("dil-static-rig", "slow-answers", [("max", 10, RESPONSE)]),
+        ("dil-static-rig", "uncopied-sample-times", [("sample-times", 10, RESPONSE)]),
     ],
 )
 def test_places_of_limits(slug: str, name: str, expected: list[tuple[str, int, str]]) -> None:
