@@ -72,7 +72,13 @@ def steps(page: str) -> Iterator[Command | Edit | New]:
 
 def follow(page: Path, folder: Path, programs: Path) -> None:
     """Raises AssertionError where the page is not right; ``programs`` is the folder of ``dodo``."""
-    environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "NO_COLOR": "1", "PYTEST_ADDOPTS": ""}
+    environment = {
+        **os.environ,
+        "PATH": f"{programs}:{os.environ['PATH']}",
+        "NO_COLOR": "1",
+        "PYTEST_ADDOPTS": "",
+        "COLUMNS": "80",
+    }
     for step in steps(page.read_text()):
         if isinstance(step, Edit | New):
             step.make(folder)
