@@ -18,7 +18,7 @@ CASES = (
     ("docker", Case("umask 077", umask=0o077)),
     ("docker", Case("odd path", ODD)),
     ("docker", Case("odd path in ASCII", ODD, environment={"LC_ALL": "C", "PYTHONUTF8": "0"})),
-    ("docker", Case("odd TMPDIR", ODD, environment={"TMPDIR": "{checkout}/tests"})),
+    ("docker", Case("odd TMPDIR", ODD.replace(":", ""), environment={"TMPDIR": "{checkout}/tests"})),
     ("docker", Case("no HOME", environment={"HOME": None})),
     ("mixed", Case("subfolder of a symlink", made="symlink", at="{checkout}/tests")),
     ("mixed", Case("umask 077", umask=0o077)),
