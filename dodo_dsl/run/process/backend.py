@@ -29,6 +29,8 @@ from dodo_dsl.run.services.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
+_OF_SANDBOX = ("bwrap:", "setpriv:")
+"""How lines of the programs begin that confine an application's."""
 
 
 class ProcessBackend:
@@ -102,8 +104,10 @@ class ProcessBackend:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
                 await asyncio.wait_for(output.done.wait(), 1.0)
         if failed:
-            why = " ".join(self.tail(exited)[-1:]) or f"exit code {code}"
-            self._events.put_nowait(Unstartable(exited, f"its sandbox cannot be set up: {why}"))
+            said = " ".join(self.tail(exited)[-1:])
+            why = said or f"exit code {code}"
+            is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
+            self._events.put_nowait(Unstartable(exited, f"its sandbox cannot be set up: {why}" if is_of_sandbox else why))
             return
         if used:
             most = self.plan.application.limits.memory
