@@ -30,6 +30,7 @@ from dodo_dsl.run.standing import Standing, standing
 READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
 BEGIN_PATIENCE_S = 2.0
+EXPLAIN_PATIENCE_S = 5.0
 LISTEN_PATIENCE_S, LISTEN_PERIOD_S = 10.0, 0.02
 
 
@@ -82,7 +83,7 @@ class Engine:
                 self.state.finished = self._now()
             self.state.keep_tails(self.backend)
             if self.state.is_to_explain():
-                self.state.shortage = self._shortage()
+                await self._explain()
             if not keep and self.state.outcome(self.backend).outcome == "passed":
                 self.passed()
             self.say("taking down")
@@ -90,11 +91,21 @@ class Engine:
             await self._collect_losses()
         return self.state.outcome(self.backend), kept
 
-    def _shortage(self) -> str:
-        """What of the machine, or of the limits that it was given, the test may have lacked."""
-        below = shortage.below(self.plan.application.limits) if self.state.ended_early() else ""
+    async def _explain(self) -> None:
+        """Tells the state what of the machine, or of the limits that it was given, the test may have lacked."""
+        application = None
+        try:
+            async with asyncio.timeout(EXPLAIN_PATIENCE_S):
+                application = await self.backend.application()
+        except TimeoutError:
+            pass
+        except asyncio.CancelledError:
+            asyncio.current_task().uncancel()  # type: ignore[union-attr]
         shared = shortage.Shared(self.backend.is_on_host, self.backend.has_engine)
-        return shortage.used_up(shared) or ("" if self.backend.has_engine else below)
+        self.state.shortage = shortage.used_up(shared, application)
+        below = shortage.below(self.plan.application.limits) if self.state.ended_early() else ""
+        if below and not self.backend.has_engine:
+            self.state.notes.append(below)
 
     async def _close(self, keep: bool) -> list[str]:
         """Teardown to its end, however often the run is interrupted meanwhile; its errors do not change the verdict."""

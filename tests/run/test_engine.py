@@ -19,6 +19,7 @@ from dodo_dsl.run.engine import (
 )
 from dodo_dsl.run.load import shortage
 from dodo_dsl.run.load.service_use import Used
+from dodo_dsl.run.load.shortage import Shortage
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.load.use_judgement import UNSEEN
 from dodo_dsl.run.protocol import (
@@ -612,14 +613,31 @@ def test_a_machine_that_had_nothing_left_is_not_the_applications_fault(
     monkeypatch: pytest.MonkeyPatch, event: Event, result: str
 ) -> None:
     """What it must not send, it did not send for want of anything."""
-    monkeypatch.setattr(shortage, "used_up", lambda _: "9 of 9 open files of this machine were in use")
+    text = "9 of 9 open files of this machine were in use"
+    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage(text, is_of_others=True))
     found = begun((1.0, event), (1.0, ENDED))
     assert found.outcome == result
     assert ("judged here: 9 of 9 open files of this machine were in use; it" in found.reason) == (result == "error")
 
 
+@pytest.mark.parametrize("event", [FAILED, Exited("app", 1), Stopped("unanswered", "did not answer frame 17")])
+def test_what_the_application_may_have_used_up_itself_is_no_excuse(
+    monkeypatch: pytest.MonkeyPatch, event: Event
+) -> None:
+    asked: list[object] = []
+
+    def used_up(*words: object) -> Shortage:
+        asked.extend(words)
+        return Shortage("the disk was full")
+
+    monkeypatch.setattr(shortage, "used_up", used_up)
+    found = begun((1.0, event), (1.0, ENDED))
+    assert (found.outcome, found.notes[-1:]) == ("failed", ("the disk was full, perhaps by the application itself",))
+    assert asked == [shortage.Shared(host=False, engine=False), [17]]
+
+
 def test_what_could_not_be_started_is_told_with_what_was_used_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shortage, "used_up", lambda _: "9 of 9 processes were in use")
+    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage("9 of 9 processes were in use"))
     found = begun((1.0, Unstartable("app", "python: Resource temporarily unavailable")))
     reason = (
         "service 'app' could not be started: python: Resource temporarily unavailable; 9 of 9 processes were in use"
@@ -637,7 +655,10 @@ def test_a_kill_for_want_of_memory_is_the_machines(
     assert found.reason.startswith("application service 'app' was killed by SIGKILL")
 
 
-def test_a_lower_limit_of_the_shell_explains_an_early_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shortage, "below", lambda _: "DoDo was started with at most 256 open files")
-    assert begun((1.0, Exited("app", 1))).outcome == "error"
-    assert begun((1.0, FAILED), (1.0, ENDED)).outcome == "failed"
+def test_a_lower_limit_of_the_shell_is_noted_at_an_early_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is told, and no excuse: nothing shows that it was met."""
+    text = "DoDo was started with at most 256 open files"
+    monkeypatch.setattr(shortage, "below", lambda _: text)
+    found = begun((1.0, Exited("app", 1)))
+    assert (found.outcome, text in found.notes) == ("failed", True)
+    assert text not in begun((1.0, FAILED), (1.0, ENDED)).notes

@@ -105,9 +105,9 @@ class ProcessBackend:
                 await asyncio.wait_for(output.done.wait(), 1.0)
         if failed:
             said = " ".join(self.tail(exited)[-1:])
-            why = said or f"exit code {code}"
             is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
-            self._events.put_nowait(Unstartable(exited, f"its sandbox cannot be set up: {why}" if is_of_sandbox else why))
+            what = "its sandbox cannot be set up: " if is_of_sandbox else ""
+            self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
             return
         if used:
             most = self.plan.application.limits.memory
@@ -202,6 +202,10 @@ class ProcessBackend:
             async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
                 return await asyncio.shield(self._asked[what])
         return None
+
+    async def application(self) -> Collection[int] | None:
+        """The sandbox, which DoDo's own services descend from, too; nothing leaves its process namespace."""
+        return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
         if keep and (pid := self._sandbox.pid):
