@@ -47,6 +47,9 @@ from dodo_dsl.run.protocol import (
 )
 
 MOST_NOTES = 100
+MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
+"""A note where a service was killed: which program it was, and by whose limit, the kernel's count does not say."""
+_KILLED = (-signal.SIGKILL, 128 + signal.SIGKILL)
 
 
 class Ended(Exception):
@@ -181,9 +184,8 @@ class RunState:
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
         if layer == "application":
             is_done = code == 0 and self.input_ended
-            if self._is_killed_for_others(code, out_of_memory):
-                ended = f"{ended}, as the machine ran out of memory"
-                self._end_by_exit("error", f"application service '{service}' {ended}", service)
+            if code in _KILLED and not out_of_memory and self.memory_kills() > self._killed_before:
+                self.notes.append(MEMORY_KILL)
             if not is_done and not self._all_verdicts_given():
                 self._end_by_exit(
                     "failed", f"application service '{service}' {ended}, before the test was decided", service
@@ -194,11 +196,6 @@ class RunState:
             self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
         elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
             self._end_by_exit("error", f"evaluator '{service}' ended without a verdict {when}", service)
-
-    def _is_killed_for_others(self, code: int, out_of_memory: bool) -> bool:
-        """Whether the kernel, not the test's own limit, has ended a program for want of memory."""
-        is_killed = code in (-signal.SIGKILL, 128 + signal.SIGKILL)
-        return is_killed and not out_of_memory and self.memory_kills() > self._killed_before
 
     def is_to_explain(self) -> bool:
         """Whether the machine may be the reason for how the test ended, if something of it was used up."""

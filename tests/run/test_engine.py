@@ -40,6 +40,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
+from dodo_dsl.run.run_state import MEMORY_KILL
 from dodo_dsl.run.standing import Standing
 from dodo_dsl.spec.resource_limits import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
@@ -645,13 +646,15 @@ def test_what_could_not_be_started_is_told_with_what_was_used_up(monkeypatch: py
     assert (found.outcome, found.reason) == ("error", reason)
 
 
-@pytest.mark.parametrize(("kills", "result"), [([3, 3], "failed"), ([3, 4], "error")])
-def test_a_kill_for_want_of_memory_is_the_machines(
-    monkeypatch: pytest.MonkeyPatch, kills: list[int], result: str
+@pytest.mark.parametrize(("kills", "notes"), [([3, 3], ()), ([3, 4], (MEMORY_KILL,))])
+def test_a_kill_for_want_of_memory_is_noted_and_no_excuse(
+    monkeypatch: pytest.MonkeyPatch, kills: list[int], notes: tuple[str, ...]
 ) -> None:
+    """It may be that of another test by its own limit."""
     monkeypatch.setattr(shortage, "memory_kills", lambda: kills.pop(0))
+    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage())
     found = begun((1.0, Exited("app", -9)))
-    assert found.outcome == result
+    assert (found.outcome, found.notes) == ("failed", notes)
     assert found.reason.startswith("application service 'app' was killed by SIGKILL")
 
 
