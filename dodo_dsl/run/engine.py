@@ -55,6 +55,7 @@ class Engine:
     _meter: LoadMeter = field(init=False)
     _use: UseMeter = field(init=False)
     _begin_sent: float = 0.0
+    _is_measured: bool = False
 
     async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
@@ -121,7 +122,9 @@ class Engine:
         return []
 
     async def _measure(self) -> None:
-        """Takes the last figures of what the application used, while it is there."""
+        """Takes the last figures of what the application used, while it is there, if they are not taken yet."""
+        if self._is_measured:
+            return
         try:
             await self._use.end()
         except Exception as error:  # noqa: BLE001  (whatever it is, it must not decide the test)
@@ -130,6 +133,7 @@ class Engine:
         began, finished = self.state.began, self.state.finished or self._now()
         whole = [] if began is None else [(began, 0.0), (finished, finished - began)]
         self.state.resources = self._use.figures(self.state.progress if self.plan.lockstep else whole)
+        self._is_measured = True
 
     async def _wind_up(self, keep: bool) -> list[str]:
         try:

@@ -22,6 +22,7 @@ from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.shortage import Shortage
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.load.use_judgement import UNSEEN
+from dodo_dsl.run.load.use_series import UseMeter
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
@@ -209,6 +210,15 @@ def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
     assert (found.outcome, found.resources) == ("passed", ())
     assert found.notes == (UNSEEN, "what the application used was not measured to the end: OSError: gone")[::-1]
     assert outcome(using(lambda _: None)).notes == ()
+
+
+def test_the_last_figures_are_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def end(_: UseMeter) -> None:
+        raise OSError("gone")
+
+    monkeypatch.setattr(UseMeter, "end", end)
+    notes = outcome(using(leaking)).notes
+    assert notes.count("what the application used was not measured to the end: OSError: gone") == 1
 
 
 def test_a_meter_that_breaks_costs_no_verdict() -> None:

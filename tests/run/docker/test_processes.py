@@ -1,5 +1,7 @@
 """The processes of containers: found by the engine's answers, and only on the machine that runs them."""
 
+import contextlib
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ from docker.errors import APIError
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import processes
 from dodo_dsl.run.docker.backend import init_said
+from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.processes import ContainerProcesses
 from dodo_dsl.run.load.snapshot import Times
 from tests.run.load.test_thread_times import Proc
@@ -67,6 +70,24 @@ def test_only_a_program_that_never_began_could_not_be_started(init: bool, lines:
     container = Container("c0ffee", 0)
     container.attrs["HostConfig"] = {"Init": init}
     assert init_said(container, lines) == (FATAL if is_said else "")
+
+
+def test_one_thread_at_a_time_measures(proc: Proc) -> None:
+    """Another may have been given up, and still be at it."""
+    both, met = threading.Barrier(2), []
+
+    class Slow(Container):
+        def reload(self) -> None:
+            with contextlib.suppress(threading.BrokenBarrierError):
+                met.append(both.wait(0.1))
+
+    use = ContainerUse({"app": Slow("c0ffee", 0)}, proc.root)
+    threads = [threading.Thread(target=use.take) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not met
 
 
 def services(proc: Proc, **containers: Any) -> dict[str, Times] | None:
