@@ -30,6 +30,7 @@ from dodo_dsl.run.standing import Standing, standing
 READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
 BEGIN_PATIENCE_S = 2.0
+EXPLAIN_PATIENCE_S = 5.0
 LISTEN_PATIENCE_S, LISTEN_PERIOD_S = 10.0, 0.02
 
 
@@ -54,6 +55,7 @@ class Engine:
     _meter: LoadMeter = field(init=False)
     _use: UseMeter = field(init=False)
     _begin_sent: float = 0.0
+    _is_measured: bool = False
 
     async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
@@ -82,7 +84,7 @@ class Engine:
                 self.state.finished = self._now()
             self.state.keep_tails(self.backend)
             if self.state.is_to_explain():
-                self.state.shortage = self._shortage()
+                await self._explain()
             if not keep and self.state.outcome(self.backend).outcome == "passed":
                 self.passed()
             self.say("taking down")
@@ -90,11 +92,21 @@ class Engine:
             await self._collect_losses()
         return self.state.outcome(self.backend), kept
 
-    def _shortage(self) -> str:
-        """What of the machine, or of the limits that it was given, the test may have lacked."""
-        below = shortage.below(self.plan.application.limits) if self.state.ended_early() else ""
+    async def _explain(self) -> None:
+        """Tells the state what of the machine, or of the limits that it was given, the test may have lacked."""
+        application = None
+        try:
+            async with asyncio.timeout(EXPLAIN_PATIENCE_S):
+                application = await self.backend.application()
+        except TimeoutError:
+            pass
+        except asyncio.CancelledError:
+            asyncio.current_task().uncancel()  # type: ignore[union-attr]
         shared = shortage.Shared(self.backend.is_on_host, self.backend.has_engine)
-        return shortage.used_up(shared) or ("" if self.backend.has_engine else below)
+        self.state.shortage = shortage.used_up(shared, application)
+        below = shortage.below(self.plan.application.limits) if self.state.ended_early() else ""
+        if below and not self.backend.has_engine:
+            self.state.notes.append(below)
 
     async def _close(self, keep: bool) -> list[str]:
         """Teardown to its end, however often the run is interrupted meanwhile; its errors do not change the verdict."""
@@ -110,7 +122,9 @@ class Engine:
         return []
 
     async def _measure(self) -> None:
-        """Takes the last figures of what the application used, while it is there."""
+        """Takes the last figures of what the application used, while it is there, if they are not taken yet."""
+        if self._is_measured:
+            return
         try:
             await self._use.end()
         except Exception as error:  # noqa: BLE001  (whatever it is, it must not decide the test)
@@ -119,6 +133,7 @@ class Engine:
         began, finished = self.state.began, self.state.finished or self._now()
         whole = [] if began is None else [(began, 0.0), (finished, finished - began)]
         self.state.resources = self._use.figures(self.state.progress if self.plan.lockstep else whole)
+        self._is_measured = True
 
     async def _wind_up(self, keep: bool) -> list[str]:
         try:

@@ -217,6 +217,10 @@ class Backend(Protocol):
         """What each service of the application used so far; None where that cannot be measured."""
         ...
 
+    async def application(self) -> Collection[int] | None:
+        """Processes of this machine of which the application's are, or descend; None where they are not known."""
+        ...
+
     async def close(self, keep: bool) -> list[str]:
         """Ends everything and cleans up; with ``keep``, leaves it and returns sentences on how to look inside."""
         ...

@@ -12,6 +12,7 @@ from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.recorder_service import RECORDER
 from dodo_dsl.run.load import response, use_judgement
 from dodo_dsl.run.load.judgement import consider
+from dodo_dsl.run.load.shortage import Shortage
 from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
@@ -46,6 +47,9 @@ from dodo_dsl.run.protocol import (
 )
 
 MOST_NOTES = 100
+MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
+"""A note where a service was killed: which program it was, and by whose limit, the kernel's count does not say."""
+_KILLED = (-signal.SIGKILL, 128 + signal.SIGKILL)
 
 
 class Ended(Exception):
@@ -76,8 +80,8 @@ class RunState:
     """Whether the clock of a lockstep test gave up as the application did not answer."""
     is_unstartable: bool = False
     """Whether the test ended as a program could not be started."""
-    shortage: str = ""
-    """What of the machine was used up when the test ended; a sentence."""
+    shortage: Shortage = field(default_factory=Shortage)
+    """What of the machine was used up when the test ended."""
     memory_kills: Callable[[], int] = lambda: 0
     """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
@@ -180,9 +184,8 @@ class RunState:
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
         if layer == "application":
             is_done = code == 0 and self.input_ended
-            if self._is_killed_for_others(code, out_of_memory):
-                ended = f"{ended}, as the machine ran out of memory"
-                self._end_by_exit("error", f"application service '{service}' {ended}", service)
+            if code in _KILLED and not out_of_memory and self.memory_kills() > self._killed_before:
+                self.notes.append(MEMORY_KILL)
             if not is_done and not self._all_verdicts_given():
                 self._end_by_exit(
                     "failed", f"application service '{service}' {ended}, before the test was decided", service
@@ -193,11 +196,6 @@ class RunState:
             self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
         elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
             self._end_by_exit("error", f"evaluator '{service}' ended without a verdict {when}", service)
-
-    def _is_killed_for_others(self, code: int, out_of_memory: bool) -> bool:
-        """Whether the kernel, not the test's own limit, has ended a program for want of memory."""
-        is_killed = code in (-signal.SIGKILL, 128 + signal.SIGKILL)
-        return is_killed and not out_of_memory and self.memory_kills() > self._killed_before
 
     def is_to_explain(self) -> bool:
         """Whether the machine may be the reason for how the test ended, if something of it was used up."""
@@ -212,13 +210,20 @@ class RunState:
         return bool(self._ended_by)
 
     def _explained(self, finding: Finding) -> Finding:
-        """An error in place of a failure that may be due to what others used up."""
-        if not self.shortage:
-            return finding
-        if self._is_of_conditions(finding):
-            reason = f"the application cannot be judged here: {self.shortage}; it found: {finding.reason}"
+        """An error in place of a failure that may be due to what others used up.
+
+        What the application itself may have used up is told in a note, see ``_shortage_notes``.
+        """
+        shortage = self.shortage
+        if shortage.is_of_others and self._is_of_conditions(finding):
+            reason = f"the application cannot be judged here: {shortage.text}; it found: {finding.reason}"
             return replace(finding, result="error", reason=reason)
-        return replace(finding, reason=f"{finding.reason}; {self.shortage}") if self.is_unstartable else finding
+        is_told = shortage.text and self.is_unstartable
+        return replace(finding, reason=f"{finding.reason}; {shortage.text}") if is_told else finding
+
+    def _shortage_notes(self) -> tuple[str, ...]:
+        is_told = self.shortage.is_of_others or self.is_unstartable or not self.shortage.text
+        return () if is_told else (f"{self.shortage.text}, perhaps by the application itself",)
 
     def _end_by_exit(self, result: Result, reason: str, service: str) -> None:
         self._ended_by = service
@@ -266,7 +271,7 @@ class RunState:
             checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks, *use.checks),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
-            notes=(*self.notes, *losses, *answers.notes, *use.notes),
+            notes=(*self.notes, *self._shortage_notes(), *losses, *answers.notes, *use.notes),
             machine=considered.load,
             response=self.response,
             resources=self.resources,

@@ -128,6 +128,9 @@ class ScriptedBackend:
     async def use(self) -> Mapping[str, Used] | None:
         return self.uses(asyncio.get_running_loop().time())
 
+    async def application(self) -> Collection[int] | None:
+        return [17]
+
     async def close(self, keep: bool) -> list[str]:
         await self._call("close")
         if self.close_problem:

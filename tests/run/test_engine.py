@@ -19,8 +19,10 @@ from dodo_dsl.run.engine import (
 )
 from dodo_dsl.run.load import shortage
 from dodo_dsl.run.load.service_use import Used
+from dodo_dsl.run.load.shortage import Shortage
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.load.use_judgement import UNSEEN
+from dodo_dsl.run.load.use_series import UseMeter
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
@@ -39,6 +41,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
+from dodo_dsl.run.run_state import MEMORY_KILL
 from dodo_dsl.run.standing import Standing
 from dodo_dsl.spec.resource_limits import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
@@ -207,6 +210,15 @@ def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
     assert (found.outcome, found.resources) == ("passed", ())
     assert found.notes == (UNSEEN, "what the application used was not measured to the end: OSError: gone")[::-1]
     assert outcome(using(lambda _: None)).notes == ()
+
+
+def test_the_last_figures_are_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def end(_: UseMeter) -> None:
+        raise OSError("gone")
+
+    monkeypatch.setattr(UseMeter, "end", end)
+    notes = outcome(using(leaking)).notes
+    assert notes.count("what the application used was not measured to the end: OSError: gone") == 1
 
 
 def test_a_meter_that_breaks_costs_no_verdict() -> None:
@@ -612,14 +624,31 @@ def test_a_machine_that_had_nothing_left_is_not_the_applications_fault(
     monkeypatch: pytest.MonkeyPatch, event: Event, result: str
 ) -> None:
     """What it must not send, it did not send for want of anything."""
-    monkeypatch.setattr(shortage, "used_up", lambda _: "9 of 9 open files of this machine were in use")
+    text = "9 of 9 open files of this machine were in use"
+    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage(text, is_of_others=True))
     found = begun((1.0, event), (1.0, ENDED))
     assert found.outcome == result
     assert ("judged here: 9 of 9 open files of this machine were in use; it" in found.reason) == (result == "error")
 
 
+@pytest.mark.parametrize("event", [FAILED, Exited("app", 1), Stopped("unanswered", "did not answer frame 17")])
+def test_what_the_application_may_have_used_up_itself_is_no_excuse(
+    monkeypatch: pytest.MonkeyPatch, event: Event
+) -> None:
+    asked: list[object] = []
+
+    def used_up(*words: object) -> Shortage:
+        asked.extend(words)
+        return Shortage("the disk was full")
+
+    monkeypatch.setattr(shortage, "used_up", used_up)
+    found = begun((1.0, event), (1.0, ENDED))
+    assert (found.outcome, found.notes[-1:]) == ("failed", ("the disk was full, perhaps by the application itself",))
+    assert asked == [shortage.Shared(host=False, engine=False), [17]]
+
+
 def test_what_could_not_be_started_is_told_with_what_was_used_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shortage, "used_up", lambda _: "9 of 9 processes were in use")
+    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage("9 of 9 processes were in use"))
     found = begun((1.0, Unstartable("app", "python: Resource temporarily unavailable")))
     reason = (
         "service 'app' could not be started: python: Resource temporarily unavailable; 9 of 9 processes were in use"
@@ -627,17 +656,22 @@ def test_what_could_not_be_started_is_told_with_what_was_used_up(monkeypatch: py
     assert (found.outcome, found.reason) == ("error", reason)
 
 
-@pytest.mark.parametrize(("kills", "result"), [([3, 3], "failed"), ([3, 4], "error")])
-def test_a_kill_for_want_of_memory_is_the_machines(
-    monkeypatch: pytest.MonkeyPatch, kills: list[int], result: str
+@pytest.mark.parametrize(("kills", "notes"), [([3, 3], ()), ([3, 4], (MEMORY_KILL,))])
+def test_a_kill_for_want_of_memory_is_noted_and_no_excuse(
+    monkeypatch: pytest.MonkeyPatch, kills: list[int], notes: tuple[str, ...]
 ) -> None:
+    """It may be that of another test by its own limit."""
     monkeypatch.setattr(shortage, "memory_kills", lambda: kills.pop(0))
+    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage())
     found = begun((1.0, Exited("app", -9)))
-    assert found.outcome == result
+    assert (found.outcome, found.notes) == ("failed", notes)
     assert found.reason.startswith("application service 'app' was killed by SIGKILL")
 
 
-def test_a_lower_limit_of_the_shell_explains_an_early_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shortage, "below", lambda _: "DoDo was started with at most 256 open files")
-    assert begun((1.0, Exited("app", 1))).outcome == "error"
-    assert begun((1.0, FAILED), (1.0, ENDED)).outcome == "failed"
+def test_a_lower_limit_of_the_shell_is_noted_at_an_early_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is told, and no excuse: nothing shows that it was met."""
+    text = "DoDo was started with at most 256 open files"
+    monkeypatch.setattr(shortage, "below", lambda _: text)
+    found = begun((1.0, Exited("app", 1)))
+    assert (found.outcome, text in found.notes) == ("failed", True)
+    assert text not in begun((1.0, FAILED), (1.0, ENDED)).notes

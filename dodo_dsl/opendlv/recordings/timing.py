@@ -36,10 +36,11 @@ def within(recording: Recording, rows: Numbers) -> Numbers:
     return np.clip(times, others.min(), others.max()) if len(others) else times
 
 
-def fault(recording: Recording, rows: Numbers) -> str:
+def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:
     """What is wrong with the times of rows, in a sentence with the first of them; empty where they may be right.
 
-    ``time`` counts: the sample time, or where that is zero when the message was received, or else sent.
+    ``time`` counts: the sample time, or where that is zero when the message was received, or else sent. With
+    ``in_order`` those of a message and sender must not go back, nor a message repeat.
     """
     rows = rows[~np.isin(recording.index["data_type"][rows], list(TOOLS))]
     times = recording.index["time"][rows]
@@ -48,7 +49,8 @@ def fault(recording: Recording, rows: Numbers) -> str:
     if len(apart := rows[~together(times)]):
         others = rows[together(times)]
         return f"{_some(recording, apart, len(rows))} times that lie {_distance(recording, apart, others)} the others'"
-    return next((text for part in streams(recording.index, rows) if (text := _disorder(recording, part))), "")
+    parts = streams(recording.index, rows) if in_order else ()
+    return next((text for part in parts if (text := _disorder(recording, part))), "")
 
 
 def repeated(recording: Recording, rows: Numbers) -> str:

@@ -6,7 +6,7 @@ import ipaddress
 import os
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -162,16 +162,10 @@ class DockerBackend:
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
-        if code in _NOT_STARTED and (why := self._init_said(name)):
+        if code in _NOT_STARTED and (why := init_said(self._containers[name], self._outputs[name].tail())):
             self._events.put_nowait(Unstartable(name, why))
             return
         self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
-
-    def _init_said(self, name: str) -> str:
-        """Why the engine's own first process of a container could not start the program; empty where it did."""
-        last = " ".join(self._outputs[name].tail()[-1:])
-        has_init = bool(self._containers[name].attrs["HostConfig"].get("Init"))
-        return last if has_init and last.startswith(_INIT) else ""
 
     async def _was_out_of_memory(self, name: str, code: int) -> bool:
         for _ in range(_MEMORY_TURNS):
@@ -261,6 +255,10 @@ class DockerBackend:
     async def use(self) -> Mapping[str, Used] | None:
         return await asyncio.to_thread(self._use.take)
 
+    async def application(self) -> Collection[int] | None:
+        names = {s.name for s in self.plan.application.services}
+        return await asyncio.to_thread(self._processes.first, names)
+
     async def close(self, keep: bool) -> list[str]:
         self._watch.ignores = True
         kept = []
@@ -293,6 +291,15 @@ class DockerBackend:
     def tail(self, service: str) -> list[str]:
         output = self._outputs.get(service)
         return output.tail() if output else []
+
+
+def init_said(container: Any, lines: Sequence[str]) -> str:
+    """Why the engine's own first process of a container could not start the program; empty where it did.
+
+    ``lines`` are the last of the container's: where the program never began, there is only this one.
+    """
+    has_init = bool(container.attrs["HostConfig"].get("Init"))
+    return lines[0] if has_init and len(lines) == 1 and lines[0].startswith(_INIT) else ""
 
 
 def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:

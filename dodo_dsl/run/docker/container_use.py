@@ -1,6 +1,7 @@
 """What the containers of a test's application have used."""
 
 import contextlib
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from dodo_dsl.run.load.service_use import ServiceUse, Used
 
 
 class ContainerUse:
-    """``containers`` are those of the engine's client, by service. May be used by one thread at a time.
+    """``containers`` are those of the engine's client, by service.
 
     What the kernel counts for a container's control group is read where the container runs on this machine, else the
     engine is asked. Where the kernel counts no memory of groups, as on a Raspberry Pi by default, processes add up.
@@ -28,9 +29,14 @@ class ContainerUse:
         self._elsewhere: list[str] = []
         self._processes = ServiceUse(proc)
         self._last: dict[str, Used] = {}
+        self._lock = threading.Lock()
 
     def take(self) -> dict[str, Used] | None:
-        """By service; None where nothing can be told of one."""
+        """By service; None where nothing can be told of one. One thread at a time does it, as one may be given up."""
+        with self._lock:
+            return self._take()
+
+    def _take(self) -> dict[str, Used] | None:
         if not self._limits:
             self._find()
         found = {name: used for name, group in self._groups.items() if (used := group.used())}

@@ -40,6 +40,10 @@ class ContainerProcesses:
             found = {name for pid, name in services.items() if members(cid, self._proc / str(pid)) != 0}
         return found
 
+    def first(self, names: Collection[str]) -> Collection[int] | None:
+        """The first processes of containers that run; None where one of them is not found here."""
+        return self._pids({name: c for name, c in self._containers.items() if name in names})
+
     def _pids(self, containers: Mapping[str, Any]) -> dict[int, str] | None:
         """The first process of each container that runs; None where one of them is not found here."""
         from docker.errors import DockerException

@@ -54,6 +54,9 @@ class MixedBackend:
     async def use(self) -> Mapping[str, Used] | None:
         return await self._containers.use()
 
+    async def application(self) -> Collection[int] | None:
+        return await self._containers.application()
+
     async def close(self, keep: bool) -> list[str]:
         kept = await asyncio.gather(self._processes.close(keep), self._containers.close(keep))
         return [line for lines in kept for line in lines]

@@ -29,6 +29,8 @@ from dodo_dsl.run.services.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
+_OF_SANDBOX = ("bwrap:", "setpriv:")
+"""How lines of the programs begin that confine an application's."""
 
 
 class ProcessBackend:
@@ -102,8 +104,10 @@ class ProcessBackend:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
                 await asyncio.wait_for(output.done.wait(), 1.0)
         if failed:
-            why = " ".join(self.tail(exited)[-1:]) or f"exit code {code}"
-            self._events.put_nowait(Unstartable(exited, f"its sandbox cannot be set up: {why}"))
+            said = " ".join(self.tail(exited)[-1:])
+            is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
+            what = "its sandbox cannot be set up: " if is_of_sandbox else ""
+            self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
             return
         if used:
             most = self.plan.application.limits.memory
@@ -198,6 +202,10 @@ class ProcessBackend:
             async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
                 return await asyncio.shield(self._asked[what])
         return None
+
+    async def application(self) -> Collection[int] | None:
+        """The sandbox, which DoDo's own services descend from, too; nothing leaves its process namespace."""
+        return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
         if keep and (pid := self._sandbox.pid):

@@ -16,6 +16,7 @@ from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
 MICROSECONDS = 1_000_000
 _AROUND = 60 * MICROSECONDS
 """How far a mark may lie from the steps, and a message behind the end of a recording."""
+PLAYER = MessageSet.standard().id("cluon.data.PlayerStatus")
 BEGIN, STEP, END = "dodo.TestBegin", "dodo.RecordedStep", "dodo.RecordingEnd"
 
 
@@ -109,13 +110,17 @@ def _damage(recording: Recording) -> str:
 
 
 def _own_fault(recording: Recording, marks: Marks) -> str:
-    """What is wrong with messages of the test's services, which have no time of receipt; others may send anything."""
+    """What is wrong with messages of the test's services, which have no time of receipt; others may send anything.
+
+    A player may begin its recording anew, and then goes back to the times in it: steps alone give the order.
+    """
     received = _received(recording)
     own = np.flatnonzero((received == 0) & ~np.isin(recording.index["data_type"], list(marks.ids)))
+    in_order = PLAYER not in recording.index["data_type"][own]
     for rows in timing.streams(recording.index, own):
-        if fault := _apart(recording, rows) or timing.fault(recording, rows):
+        if fault := _apart(recording, rows) or timing.fault(recording, rows, in_order):
             return fault
-    return timing.repeated(recording, np.flatnonzero(received == 0))
+    return timing.repeated(recording, np.flatnonzero(received == 0)) if in_order else ""
 
 
 def _apart(recording: Recording, rows: Numbers) -> str:

@@ -1,5 +1,7 @@
 """The processes of containers: found by the engine's answers, and only on the machine that runs them."""
 
+import contextlib
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -8,16 +10,21 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import processes
+from dodo_dsl.run.docker.backend import init_said
+from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.processes import ContainerProcesses
 from dodo_dsl.run.load.snapshot import Times
 from tests.run.load.test_thread_times import Proc
+
+FATAL = "[FATAL tini (7)] exec drive failed: No such file or directory"
 
 
 class Container:
     """A container as the engine's client shows it."""
 
     def __init__(self, number: str, pid: int, problem: Exception | None = None) -> None:
-        self.id, self.attrs, self.problem = number, {"State": {"Pid": pid}}, problem
+        self.id, self.problem = number, problem
+        self.attrs: dict[str, Any] = {"State": {"Pid": pid}}
 
     def reload(self) -> None:
         if self.problem:
@@ -45,6 +52,42 @@ def test_which_containers_listen_on_a_bus(proc: Proc, monkeypatch: pytest.Monkey
     assert containers.listeners(["camera"], 130) is None
     monkeypatch.setattr(processes, "listening", lambda *_: None)
     assert (containers.listeners(["app"], 131), containers.listeners(["app"], 130)) == ({"app"}, set())
+
+
+def test_the_first_processes_of_the_application(proc: Proc) -> None:
+    """None where the engine runs one of them elsewhere, or does not tell."""
+    containers = {"app": Container("c0ffee", 10), "ended": Container("beef", 0), "far": Container("beef", 11)}
+    found = ContainerProcesses({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc.root)
+    assert found.first(["app", "ended"]) == {10: "app"}
+    assert (found.first(["app", "far"]), found.first(["mute"])) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("init", "lines", "is_said"),
+    [(True, [FATAL], True), (False, [FATAL], False), (True, ["it drives", FATAL], False), (True, [], False)],
+)
+def test_only_a_program_that_never_began_could_not_be_started(init: bool, lines: list[str], is_said: bool) -> None:
+    container = Container("c0ffee", 0)
+    container.attrs["HostConfig"] = {"Init": init}
+    assert init_said(container, lines) == (FATAL if is_said else "")
+
+
+def test_one_thread_at_a_time_measures(proc: Proc) -> None:
+    """Another may have been given up, and still be at it."""
+    both, met = threading.Barrier(2), []
+
+    class Slow(Container):
+        def reload(self) -> None:
+            with contextlib.suppress(threading.BrokenBarrierError):
+                met.append(both.wait(0.1))
+
+    use = ContainerUse({"app": Slow("c0ffee", 0)}, proc.root)
+    threads = [threading.Thread(target=use.take) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not met
 
 
 def services(proc: Proc, **containers: Any) -> dict[str, Times] | None:

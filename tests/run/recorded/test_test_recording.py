@@ -101,6 +101,18 @@ def test_an_order_that_cannot_be_right_is_told(tmp_path: Path, envelopes: list[E
     assert "goes back" in inspect(write(tmp_path / "swapped.rec", *late, *envelopes[:20])).fault
 
 
+def test_a_player_may_begin_anew(tmp_path: Path) -> None:
+    """With the times of its recording; one that the application sends is none."""
+    playing = message("cluon.data.PlayerStatus", EPOCH)
+    rounds = [message(PEDAL, WALL + second * 2_000_000) for _ in range(3) for second in range(3)]
+    steps = [step(2, 0), begin(), *(each for n, m in enumerate(rounds, 3) for each in (m, step(n, n * 10_000)))]
+    assert not inspect(write(tmp_path / "played.rec", playing, *steps)).fault
+    forged = playing._replace(received=WALL)
+    assert "goes back" in inspect(write(tmp_path / "forged.rec", forged, *steps)).fault
+    lost = [each._replace(**ZERO) if each is rounds[4] else each for each in steps]
+    assert inspect(write(tmp_path / "lost.rec", playing, *lost)).fault.startswith("1 of 9 messages, the first is")
+
+
 def test_bytes_that_are_no_message_are_told_but_at_the_end(tmp_path: Path) -> None:
     path = write(tmp_path / "a.rec", *LOCKSTEP)
     whole = path.read_bytes()

@@ -122,7 +122,7 @@ def test_the_tests_own_limit_holds(tmp_path: Path, processes: int) -> None:
         assert any("can't start new thread" in line for line in outcome.last_lines)
     else:
         assert outcome.outcome == "error", outcome
-        assert outcome.reason.startswith("service 'app' could not be started: bwrap: ")
+        assert outcome.reason.startswith("service 'app' could not be started: its sandbox cannot be set up: bwrap: ")
 
 
 @pytest.mark.slow
