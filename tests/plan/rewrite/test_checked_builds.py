@@ -23,6 +23,7 @@ services:
       cache_to: ["type=local,dest=./c"]
       tags: [x]
       shm_size: 64g
+      x-bake: {output: ["type=local,dest=/etc"]}
     command: --cid=111
   b: {build: ., command: --cid=111}
   c: {image: c, command: --cid=111}
