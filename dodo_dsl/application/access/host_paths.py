@@ -30,17 +30,17 @@ def repository(folder: Path) -> tuple[Path, ...]:
 
 def link_out(file: Path) -> str:
     """Where a file leads to, if its symbolic links leave a repository in which it is named; else empty."""
-    whole, real = Path(os.path.abspath(file)), Path(_real(file))  # noqa: PTH100  (links stay)
+    whole, out = Path(os.path.abspath(file)), Path(real(file))  # noqa: PTH100  (links stay)
     named = (place for place in whole.parents if not _is_home(place))
     roots = (place for place in named if any((place / name).exists() for name in (".git", "dodo.yml")))
-    return "" if all(real.is_relative_to(_real(root)) for root in roots) else str(real)
+    return "" if all(out.is_relative_to(real(root)) for root in roots) else str(out)
 
 
 def _is_home(folder: Path) -> bool:
     homes = ["/", os.environ.get("HOME") or "/"]
     with contextlib.suppress(KeyError):  # a user without an entry
         homes.append(pwd.getpwuid(os.getuid()).pw_dir)
-    return str(folder) in {name for home in homes for name in (home, _real(home))}
+    return str(folder) in {name for home in homes for name in (home, real(home))}
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class HostPaths:
     def names(self, text: str) -> tuple[str, ...]:
         """The path as it is written, and where its symbolic links lead: with ``..`` resolved before and after them."""
         written = self.folder / _expanded(text)
-        return tuple(dict.fromkeys((self.whole(text), _real(self.whole(text)), _real(written))))
+        return tuple(dict.fromkeys((self.whole(text), real(self.whole(text)), real(written))))
 
     def is_own(self, text: str) -> bool:
         """Whether a path, and what its symbolic links lead to, lie in the repository or below an allowed path."""
@@ -89,7 +89,7 @@ class HostPaths:
         """Where symbolic links lead to that leave the repository and the allowed paths; empty without such a link."""
         if not _below(self.whole(text), self._places):
             return ""
-        places = [_real(place) for place in self._places]
+        places = [real(place) for place in self._places]
         return next((name for name in self.names(text)[1:] if not _below(name, places)), "")
 
     def is_open(self, text: str) -> bool:
@@ -120,10 +120,10 @@ class HostPaths:
 
     @property
     def _real_roots(self) -> list[str]:
-        return [name for root in self.roots for name in (str(root), _real(root))]
+        return [name for root in self.roots for name in (str(root), real(root))]
 
     def _is_to_read(self, text: str) -> bool:
-        places = (*TO_READ, *map(_real, TO_READ))
+        places = (*TO_READ, *map(real, TO_READ))
         return all(_below(name, places) for name in self.names(text))
 
     def _where(self, text: str) -> str:
@@ -140,7 +140,7 @@ def _expanded(text: str) -> str:
     return os.path.expanduser(text) if text.startswith("~") else text  # noqa: PTH111  (it never raises)
 
 
-def _real(path: str | Path) -> str:
+def real(path: str | Path) -> str:
     """Where symbolic links lead to; the path itself where that may not be known, as in ``/proc``."""
     try:
         return os.path.realpath(path)
