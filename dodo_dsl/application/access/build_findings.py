@@ -52,7 +52,7 @@ def short_name(image: str) -> str:
 
 def is_remote(text: str, paths: HostPaths) -> bool:
     """Whether a context is elsewhere: of one that is a file of the repository, too, builders take that."""
-    if not text.startswith(_SCHEMES) or ".." in text.split("/"):
+    if not text.startswith(_SCHEMES) or ".." in text.split("/") or "\0" in text:
         return False
     return not any(os.path.lexists(place / text) for place in (paths.folder, *paths.roots))
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from dodo_dsl.application import host_access
 
 ASK = "keep it in the repository, or allow it with 'paths' in dodo.yml"
+NUL = "a path has a NUL character, so it can be no file"
 INSIDE = "put the files themselves in its place"
 
 TO_READ = ("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
@@ -68,7 +69,7 @@ class HostPaths:
 
     def is_own(self, text: str) -> bool:
         """Whether a path, and what its symbolic links lead to, lie in the repository or below an allowed path."""
-        return _below(self.whole(text), self._places) and not self.link(text)
+        return "\0" not in text and _below(self.whole(text), self._places) and not self.link(text)
 
     def is_of_repository(self, text: str) -> bool:
         """Whether a path that is the application's own is a file of the repository, and so nobody's to write to."""
@@ -98,12 +99,16 @@ class HostPaths:
 
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
+        if "\0" in text:
+            return NUL
         if self.is_open(text) or self.is_own(text):
             return ""
         return f"'{written or text}' {self._where(text)}"
 
     def mount_problem(self, text: str) -> tuple[str, str]:
         """Why a path may not be mounted, and what to do; empty when it may, if only to be read."""
+        if "\0" in text:
+            return NUL, "remove it"
         if self.is_open(text) or self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
             return "", ""
         if self.link(text):
@@ -144,5 +149,5 @@ def real(path: str | Path) -> str:
     """Where symbolic links lead to; the path itself where that may not be known, as in ``/proc``."""
     try:
         return os.path.realpath(path)
-    except OSError:
+    except (OSError, ValueError):  # of a path with a NUL
         return str(path)

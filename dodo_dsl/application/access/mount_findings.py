@@ -54,7 +54,9 @@ def _bind(
     if paths.is_open(found.source):
         return
     every = [host_access.Mount(path, found.target, found.read_only) for path in paths.names(found.source)]
-    if any(map(host_access.is_machine, every)):
+    if "\0" in found.source:
+        problem, hint = paths.mount_problem(found.source)
+    elif any(map(host_access.is_machine, every)):
         problem, hint = f"{_called(found.source, paths)} belongs to the host, so tests would share it", _SOCKET_HINT
     elif any(host_access.is_of_machine(seen.source) for seen in every):
         problem, hint = f"{_called(found.source, paths)} gives access to the host's disks or memory", "remove it"
