@@ -1,17 +1,14 @@
 """Problems of an application as a whole: missing files, dependency cycles, and no service that takes a CID."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application import host_access, opendlv_flags
-from dodo_dsl.application.access import filled
-from dodo_dsl.application.access.access_diagnostics import diagnostic
-from dodo_dsl.application.access.model import AccessFinding
+from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.host_access import references
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain, text
+from dodo_dsl.application.nested_mounts import nested_mounts
 from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.application.service_problems import Written, problems
 from dodo_dsl.application.slips.flags import cid_slips
@@ -32,7 +29,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         found.extend(_missing_files(service, application))
         found.extend(_missing_folder(service, application))
         found.extend(missing_program(service, application.folder))
-    found.extend(_nested(application))
+    found.extend(nested_mounts(application))
     found.extend(_cycles(application))
     found.extend(_same_variable(application))
     yield from found
@@ -57,26 +54,6 @@ def _missing_folder(service: ComposeService, application: ApplicationSource) -> 
     if application.paths.is_own(context.value) and not (application.folder / context.value).is_dir():
         hint = "create it, or remove 'build'; paths are relative to this file"
         yield Diagnostic(context.span, "application-file", f"there is no folder '{context.text}'", hint, "warning")
-
-
-def _nested(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Mounts of folders in others of ``paths``, to which a service may write, and so lead the inner ones elsewhere."""
-    mounts = []
-    for service in application.services.values():
-        written = plain(filled.node(service.node, application.known)).get("volumes")
-        for item, volume in enumerate(written if isinstance(written, list) else ()):
-            seen = host_access.mount(volume)
-            if "$" not in seen.source and host_access.is_bind(volume, seen.source) and not host_access.is_token(seen):
-                place = Path(application.paths.names(seen.source)[-1])
-                mounts.append((service, ("volumes", item), seen, place))
-    open_to = [(s.name, p) for s, _, seen, p in mounts if not seen.read_only and application.paths.is_writable(str(p))]
-    for service, steps, seen, place in mounts:
-        for name, outer in open_to:
-            if place != outer and place.is_relative_to(outer):
-                message = f"'{seen.source}' lies in '{outer}', where '{name}' could put a link in its place"
-                finding = AccessFinding(steps, message, f"mount '{outer}' in both, or read-only (:ro)")
-                yield diagnostic(finding, service.node, service.span)
-                break
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:

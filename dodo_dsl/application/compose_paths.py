@@ -190,12 +190,19 @@ def _file(node: Node, change: Change) -> Node:
     return _mapped(node, {"file": _path}, change) if isinstance(node, source.Mapping) else node
 
 
+def _may_be_bound(kind: Node | None, device: Node | None) -> bool:
+    """Whether ``o`` makes the device a path: a variable's default may, and its value if the device looks like one."""
+    if not isinstance(kind, Scalar) or not isinstance(device, Scalar):
+        return False
+    is_word = bool({"bind", "rbind"} & set(re.split(r"[^a-z]+", kind.text)))
+    return is_word or ("$" in kind.text and is_path(device.text))
+
+
 def _named_volume(node: Node, change: Change) -> Node:
     options = node.get("driver_opts") if isinstance(node, source.Mapping) else None
     if not isinstance(node, source.Mapping) or not isinstance(options, source.Mapping):
         return node
-    kind = options.get("o")
-    if not isinstance(kind, Scalar) or "bind" not in kind.text.split(","):
+    if not _may_be_bound(options.get("o"), options.get("device")):
         return node
     return _mapped(node, {"driver_opts": lambda o, c: _mapped(o, {"device": _scalar}, c)}, change)
 

@@ -129,8 +129,18 @@ def is_true(value: object) -> bool:
 
 def is_bound(volume: object) -> bool:
     """Whether a top-level volume is a folder of the host."""
+    return bool({"bind", "rbind"} & {word.strip() for word in volume_options(volume)})
+
+
+def volume_options(volume: object) -> list[str]:
+    """The words of ``o`` of a top-level volume, as the engine splits them: it keeps spaces."""
     options = volume.get("driver_opts") if isinstance(volume, dict) else None
-    return isinstance(options, dict) and bool({"bind", "rbind"} & set(str(options.get("o") or "").split(",")))
+    return str(options.get("o") or "").split(",") if isinstance(options, dict) else []
+
+
+def is_read_only(volume: object) -> bool:
+    """Whether a top-level volume can only be read; of ``ro`` and ``rw``, the last one counts."""
+    return [word for word in volume_options(volume) if word in ("ro", "rw")][-1:] == ["ro"]
 
 
 def is_external(volume: object) -> bool:

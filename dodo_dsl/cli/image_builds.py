@@ -25,5 +25,9 @@ def show(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     stderr.write(format_text(problems))
     if source is None or has_errors(problems):
         return Exit.PROBLEMS
-    stdout.write(json.dumps(checked_builds(source), indent=2) + "\n")
+    builds, problems = checked_builds(source)
+    stderr.write(format_text(problems))
+    if has_errors(problems):
+        return Exit.PROBLEMS
+    stdout.write(json.dumps(builds, indent=2) + "\n")
     return Exit.OK

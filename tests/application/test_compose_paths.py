@@ -96,6 +96,26 @@ def test_paths_at_the_top_level() -> None:
     }
 
 
+@pytest.mark.parametrize(
+    ("options", "device", "moved"),
+    [
+        ("bind", "b", True),
+        ("rbind,ro", "b", True),
+        (" bind, ro", "./b", True),
+        ("${O:-bind}", "b", True),
+        ("ro,${O-rbind}", "./b", True),
+        ("${O}", "./b", True),
+        ("${O:-size=1m}", "tmpfs", False),
+        ("size=1m", "tmpfs", False),
+        ("addr=bindings", "./b", False),
+    ],
+)
+def test_devices_of_volumes_that_may_be_folders(options: str, device: str, moved: bool) -> None:
+    volumes = mapping(f"v: {{driver_opts: {{o: '{options}', device: {device}}}}}")
+    rest = mapped_rest({"volumes": volumes}, lambda path: f"<{path}>")
+    assert plain(rest["volumes"])["v"]["driver_opts"]["device"] == (f"<{device}>" if moved else device)
+
+
 def test_paths_and_names_of_volumes() -> None:
     assert all(map(is_path, ("./a", "../a", "/a", "~/a", "$A")))
     assert not is_path("name")

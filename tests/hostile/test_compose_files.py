@@ -139,15 +139,39 @@ def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
         ("{}/data:/d", "{}/link:/x", True),
         ("{}/data:/d:ro", "{}/data/x:/x", False),
         ("{}/data:/d", "{}/data:/x", False),
+        ("{}/data:/d", "{}/data/out:/x", True),
+        ("{}/data:/d", {"volumes": "{}/data/x"}, True),
+        ({"volumes": "{}/data"}, "{}/data/x:/x", True),
+        ({"volumes": "{}/data"}, {"secrets": "{}/data/x/key"}, True),
+        ({"volumes": "{}/data", "o": "bind,ro"}, {"secrets": "{}/data/x/key"}, False),
+        ("{}/data:/d", {"configs": "{}/data/x/key"}, True),
+        ("{}/data:/d:ro", {"configs": "{}/data/x/key"}, False),
+        ("/dev/shm:/d", {"volumes": "/dev/shm/x"}, True),
     ],
 )
-def test_folders_in_a_folder_that_is_allowed(outer: str, inner: str, refused: bool, tmp_path: Path) -> None:
+def test_folders_in_a_folder_that_is_allowed(
+    outer: str | dict[str, str], inner: str | dict[str, str], refused: bool, tmp_path: Path
+) -> None:
     """No service leads another one's mount elsewhere in a folder to which dodo.yml lets it write."""
-    (tmp_path / "host" / "data" / "x").mkdir(parents=True)
-    (tmp_path / "host" / "link").symlink_to("data/x")
-    volumes = [text.format(tmp_path / "host") for text in (outer, inner)]
-    services = {f"s{n}": {"image": "x", "command": "--cid=111", "volumes": [v]} for n, v in enumerate(volumes)}
-    file = written({"file": {"services": services}}, tmp_path)
+    host = tmp_path / "host"
+    (host / "data" / "x").mkdir(parents=True)
+    (host / "link").symlink_to("data/x")
+    (host / "data" / "out").symlink_to("../other")
+    document: dict[str, dict[str, Any]] = {"services": {}}
+    for number, mount in enumerate((outer, inner)):
+        own: dict[str, Any] = {"image": "x", "command": "--cid=111"}
+        if isinstance(mount, str):
+            own["volumes"] = [mount.format(host)]
+        elif "volumes" in mount:
+            own["volumes"] = [f"v{number}:/v"]
+            options = {"type": "none", "o": mount.get("o", "bind"), "device": mount["volumes"].format(host)}
+            document.setdefault("volumes", {})[f"v{number}"] = {"driver_opts": options}
+        else:
+            ((key, path),) = mount.items()
+            own[key] = ["c"]
+            document[key] = {"c": {"file": path.format(host)}}
+        document["services"][f"s{number}"] = own
+    file = written({"file": document}, tmp_path)
     source, problems = read_application(file, Access(paths=(str(tmp_path / "host"),)))
     assert (source is None) == refused
     assert ["could put a link in its place" in problem.message for problem in problems] == [True] * refused

@@ -1,5 +1,6 @@
 """What the build of a service's image may not use."""
 
+import os
 import posixpath
 from collections.abc import Iterator
 from typing import Any
@@ -49,14 +50,17 @@ def short_name(image: str) -> str:
     return name
 
 
-def _is_remote(text: str) -> bool:
-    return text.startswith(_SCHEMES)
+def is_remote(text: str, paths: HostPaths) -> bool:
+    """Whether a context is elsewhere: of one that is a file of the repository, too, builders take that."""
+    if not text.startswith(_SCHEMES) or ".." in text.split("/") or "\0" in text:
+        return False
+    return not any(os.path.lexists(place / text) for place in (paths.folder, *paths.roots))
 
 
 def _context(build: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     context = build.get("context")
     context = context if isinstance(context, str) and context else "."
-    if _is_remote(context) or "$" in context:
+    if paths.is_open(context) or is_remote(context, paths):
         return
     if problem := _folder_problem(context, paths):
         yield AccessFinding(("context",), problem, ASK)
@@ -75,13 +79,15 @@ def _folder_problem(text: str, paths: HostPaths) -> str:
 def _others(name: str, build: dict[str, Any], paths: HostPaths) -> Iterator[AccessFinding]:
     contexts = build.get("additional_contexts")
     for step, text in _pairs(contexts):
-        if text and not _is_remote(text) and "$" not in text and (problem := _folder_problem(text, paths)):
+        if paths.is_open(text) or is_remote(text, paths):
+            continue
+        if text and (problem := _folder_problem(text, paths)):
             yield AccessFinding(("additional_contexts", step), problem, ASK)
     for step, text in _pairs(build.get("ssh")):
         if text and (problem := paths.file_problem(text)):
             yield AccessFinding(("ssh", step), problem, ASK)
     network = str(build.get("network") or "")
-    if "$" not in network and network not in NETWORKS:
+    if not paths.is_open(network) and network not in NETWORKS:
         message = f"a build of '{name}' on the network '{network}' reaches services of the host"
         yield AccessFinding(("network",), message, "remove it")
     if host_access.is_true(build.get("privileged", False)):

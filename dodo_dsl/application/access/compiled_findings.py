@@ -57,7 +57,7 @@ def _written(volumes: Mapping[str, Any], paths: HostPaths) -> Iterator[AccessFin
     for name, about in volumes.items():
         options = about.get("driver_opts") if host_access.is_bound(about) else {}
         device = str(options.get("device") or "")
-        if device and "ro" not in str(options.get("o")).split(",") and not paths.is_writable(device):
+        if device and not host_access.is_read_only(about) and not paths.is_writable(device):
             yield AccessFinding(("volumes", name, "driver_opts", "o"), f"'{device}' is mounted to be written to")
 
 

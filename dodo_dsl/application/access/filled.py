@@ -1,6 +1,6 @@
 """Compose files with their variables filled in, as far as the values are known."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -42,12 +42,17 @@ def value(written: Any, known: Mapping[str, str]) -> Any:
 
 def node(written: Node, known: Mapping[str, str]) -> Node:
     """The same for a node; every part keeps its place."""
+    return changed(written, lambda word: text(word, known))
+
+
+def changed(written: Node, change: Callable[[str], str]) -> Node:
+    """A node with ``change`` applied to each text that has a variable; every part keeps its place."""
     if isinstance(written, source.Mapping):
-        entries = {key: Entry(entry.key, node(entry.value, known)) for key, entry in written.entries.items()}
+        entries = {key: Entry(entry.key, changed(entry.value, change)) for key, entry in written.entries.items()}
         return replace(written, entries=entries)
     if isinstance(written, source.Sequence):
-        return replace(written, items=tuple(node(item, known) for item in written.items))
+        return replace(written, items=tuple(changed(item, change) for item in written.items))
     if not isinstance(written.value, str) or "$" not in written.value:
         return written
-    filled = text(written.value, known)
+    filled = change(written.value)
     return replace(written, value=filled, text=filled)

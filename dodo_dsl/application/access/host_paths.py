@@ -10,10 +10,11 @@ from pathlib import Path
 from dodo_dsl.application import host_access
 
 ASK = "keep it in the repository, or allow it with 'paths' in dodo.yml"
+NUL = "a path has a NUL character, so it can be no file"
 INSIDE = "put the files themselves in its place"
 
 TO_READ = ("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
-           "/run/udev", "/sys")  # fmt: skip
+           "/run/udev/data", "/sys")  # fmt: skip
 """What all users of a machine may read, and nobody keeps own files in."""
 _TMP, _MEMORY = "/tmp", "/dev/shm"
 
@@ -30,17 +31,17 @@ def repository(folder: Path) -> tuple[Path, ...]:
 
 def link_out(file: Path) -> str:
     """Where a file leads to, if its symbolic links leave a repository in which it is named; else empty."""
-    whole, real = Path(os.path.abspath(file)), Path(_real(file))  # noqa: PTH100  (links stay)
+    whole, out = Path(os.path.abspath(file)), Path(real(file))  # noqa: PTH100  (links stay)
     named = (place for place in whole.parents if not _is_home(place))
     roots = (place for place in named if any((place / name).exists() for name in (".git", "dodo.yml")))
-    return "" if all(real.is_relative_to(_real(root)) for root in roots) else str(real)
+    return "" if all(out.is_relative_to(real(root)) for root in roots) else str(out)
 
 
 def _is_home(folder: Path) -> bool:
     homes = ["/", os.environ.get("HOME") or "/"]
     with contextlib.suppress(KeyError):  # a user without an entry
         homes.append(pwd.getpwuid(os.getuid()).pw_dir)
-    return str(folder) in {name for home in homes for name in (home, _real(home))}
+    return str(folder) in {name for home in homes for name in (home, real(home))}
 
 
 @dataclass(frozen=True)
@@ -64,11 +65,11 @@ class HostPaths:
     def names(self, text: str) -> tuple[str, ...]:
         """The path as it is written, and where its symbolic links lead: with ``..`` resolved before and after them."""
         written = self.folder / _expanded(text)
-        return tuple(dict.fromkeys((self.whole(text), _real(self.whole(text)), _real(written))))
+        return tuple(dict.fromkeys((self.whole(text), real(self.whole(text)), real(written))))
 
     def is_own(self, text: str) -> bool:
         """Whether a path, and what its symbolic links lead to, lie in the repository or below an allowed path."""
-        return _below(self.whole(text), self._places) and not self.link(text)
+        return "\0" not in text and _below(self.whole(text), self._places) and not self.link(text)
 
     def is_of_repository(self, text: str) -> bool:
         """Whether a path that is the application's own is a file of the repository, and so nobody's to write to."""
@@ -89,7 +90,7 @@ class HostPaths:
         """Where symbolic links lead to that leave the repository and the allowed paths; empty without such a link."""
         if not _below(self.whole(text), self._places):
             return ""
-        places = [_real(place) for place in self._places]
+        places = [real(place) for place in self._places]
         return next((name for name in self.names(text)[1:] if not _below(name, places)), "")
 
     def is_open(self, text: str) -> bool:
@@ -98,12 +99,16 @@ class HostPaths:
 
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
+        if "\0" in text:
+            return NUL
         if self.is_open(text) or self.is_own(text):
             return ""
         return f"'{written or text}' {self._where(text)}"
 
     def mount_problem(self, text: str) -> tuple[str, str]:
         """Why a path may not be mounted, and what to do; empty when it may, if only to be read."""
+        if "\0" in text:
+            return NUL, "remove it"
         if self.is_open(text) or self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
             return "", ""
         if self.link(text):
@@ -120,10 +125,10 @@ class HostPaths:
 
     @property
     def _real_roots(self) -> list[str]:
-        return [name for root in self.roots for name in (str(root), _real(root))]
+        return [name for root in self.roots for name in (str(root), real(root))]
 
     def _is_to_read(self, text: str) -> bool:
-        places = (*TO_READ, *map(_real, TO_READ))
+        places = (*TO_READ, *map(real, TO_READ))
         return all(_below(name, places) for name in self.names(text))
 
     def _where(self, text: str) -> str:
@@ -140,9 +145,9 @@ def _expanded(text: str) -> str:
     return os.path.expanduser(text) if text.startswith("~") else text  # noqa: PTH111  (it never raises)
 
 
-def _real(path: str | Path) -> str:
+def real(path: str | Path) -> str:
     """Where symbolic links lead to; the path itself where that may not be known, as in ``/proc``."""
     try:
         return os.path.realpath(path)
-    except OSError:
+    except (OSError, ValueError):  # of a path with a NUL
         return str(path)

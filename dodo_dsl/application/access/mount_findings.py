@@ -53,15 +53,16 @@ def _bind(
     problem, hint = "", ""
     if paths.is_open(found.source):
         return
-    written, *others = (host_access.Mount(path, found.target, found.read_only) for path in paths.names(found.source))
-    every = (written, *others)
-    if any(map(host_access.is_machine, every)):
+    every = [host_access.Mount(path, found.target, found.read_only) for path in paths.names(found.source)]
+    if "\0" in found.source:
+        problem, hint = paths.mount_problem(found.source)
+    elif any(map(host_access.is_machine, every)):
         problem, hint = f"{_called(found.source, paths)} belongs to the host, so tests would share it", _SOCKET_HINT
     elif any(host_access.is_of_machine(seen.source) for seen in every):
         problem, hint = f"{_called(found.source, paths)} gives access to the host's disks or memory", "remove it"
     elif any(rig_ports.is_port(seen.source, ports) for seen in every):
         yield AccessFinding((), f"'{found.source}' of '{name}' {rig_ports.WHY}", rig_ports.HINT, "port")
-    elif host_access.is_hardware(written) and found.source.startswith(("/", "~")):
+    elif _is_hardware(found, every, paths):
         yield AccessFinding((), f"'{found.source}' of '{name}' {_WITHOUT}", kind="hardware")
     else:
         is_of_test = not compiled and host_access.is_token(found)
@@ -70,6 +71,12 @@ def _bind(
             problem = f"'{found.source}' is mounted to be written to"
     if problem:
         yield AccessFinding((), problem, hint)
+
+
+def _is_hardware(found: host_access.Mount, every: Sequence[host_access.Mount], paths: HostPaths) -> bool:
+    """Whether a whole path is hardware, also where its links lead; a link of the repository is none."""
+    is_whole = found.source.startswith(("/", "~"))
+    return is_whole and all(map(host_access.is_hardware, every)) and not paths.link(found.source)
 
 
 def _called(source: str, paths: HostPaths) -> str:

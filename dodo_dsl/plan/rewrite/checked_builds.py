@@ -1,43 +1,73 @@
 """The builds of an application's services, as far as they are checked: for whoever builds without running a test."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from dodo_dsl.application import compose_paths
 from dodo_dsl.application.access import filled
+from dodo_dsl.application.access.access_diagnostics import diagnostic
+from dodo_dsl.application.access.build_findings import build_findings, is_remote
 from dodo_dsl.application.access.compose_keys import BUILD, removed
+from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.limit_findings import service_excesses
-from dodo_dsl.application.model import ApplicationSource, environment, plain
+from dodo_dsl.application.access.shared_findings import shared_findings
+from dodo_dsl.application.interpolation import EnvironmentProblem, interpolate
+from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
+from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan.rewrite.container_limits import put
+from dodo_dsl.source import Entry
+from dodo_dsl.source import Mapping as Node
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _LEFT_OUT = (*removed(BUILD), "privileged", "ssh")
 
 
-def checked_builds(application: ApplicationSource) -> dict[str, Any]:
-    """A compose file with the builds alone: whole paths, and every variable whose value is known filled in.
+def checked_builds(application: ApplicationSource) -> tuple[dict[str, Any], list[Diagnostic]]:
+    """A compose file with the builds alone, and what they may not have: whole paths, and no variables.
 
-    ``application`` has no problems. What a build must not have is left out, as it is of a test.
+    Variables whose values are not known are empty: whoever builds has others in his environment. What a build must not
+    have is left out, as it is of a test.
     """
-    base = str(application.folder)
-
-    def change(path: str) -> str:
-        return compose_paths.rebased(path, base)
-
-    services = {}
+    paths = replace(application.paths, literal=True)
+    services: dict[str, Any] = {}
+    found: list[Diagnostic] = []
     for name, service in application.services.items():
-        build = plain(compose_paths.mapped_service(service.node, change)).get("build")
-        if build is not None:
-            own = {"build": build if isinstance(build, dict) else {"context": build}}
-            own["build"] = {key: value for key, value in own["build"].items() if key not in _LEFT_OUT}
-            if "args" in own["build"]:
-                own["build"]["args"] = _with_values(own["build"]["args"], application.known)
-            for excess in list(service_excesses(own, application.limits)):
-                if excess.steps[0] == "build":
-                    put(own, excess)
-            services[name] = _literal(own, application)
-    rest = compose_paths.mapped_rest(application.rest, change)
-    secrets = {"secrets": _literal(plain(rest["secrets"]), application)} if "secrets" in rest else {}
-    return {"services": services, **secrets}
+        node = Node(service.node.span, {k: e for k, e in service.node.entries.items() if k == "build"})
+        try:
+            written = _literal(node, application.known)
+        except EnvironmentProblem as problem:
+            found.append(Diagnostic(service.span, "application-file", f"the build of '{name}': {problem}", "set it"))
+            continue
+        own = plain(compose_paths.mapped_service(written, lambda path: _whole(path, paths)))
+        if own.get("build") is not None:
+            services[name] = _checked(own["build"], application.known, application.limits)
+            found.extend(_problems(service, services[name], paths))
+    secrets, problems = _secrets(application, paths)
+    return compose_paths.escaped_values({"services": services, **secrets}), [*found, *problems]
+
+
+def _literal(node: Node, known: Mapping[str, str]) -> Node:
+    written = filled.changed(node, lambda text: interpolate(text, known))
+    assert isinstance(written, Node)
+    return written
+
+
+def _whole(path: str, paths: HostPaths) -> str:
+    """A path from the root, so that it does not matter where the file with the builds is kept."""
+    return path if "://" in path or is_remote(path, paths) else paths.whole(path)
+
+
+def _checked(written: Any, known: Mapping[str, str], limits: SandboxLimits) -> dict[str, Any]:
+    build = written if isinstance(written, dict) else {"context": written}
+    build = {key: value for key, value in build.items() if key not in _LEFT_OUT and not key.startswith("x-")}
+    if "args" in build:
+        build["args"] = _with_values(build["args"], known)
+    own = {"build": build}
+    for excess in list(service_excesses(own, limits)):
+        if excess.steps[0] == "build":
+            put(own, excess)
+    return own
 
 
 def _with_values(arguments: Any, known: Mapping[str, str]) -> dict[str, Any]:
@@ -46,13 +76,23 @@ def _with_values(arguments: Any, known: Mapping[str, str]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def _literal(value: Any, application: ApplicationSource) -> Any:
-    """A value with its variables filled in, which compose reads as it is."""
-    if isinstance(value, dict):
-        return {key: _literal(below, application) for key, below in value.items()}
-    if isinstance(value, list):
-        return [_literal(item, application) for item in value]
-    if not isinstance(value, str) or "$" not in value:
-        return value
-    text = filled.text(value, application.known)
-    return text if text == value else text.replace("$", "$$")
+def _problems(service: ComposeService, own: dict[str, Any], paths: HostPaths) -> Iterator[Diagnostic]:
+    for finding in build_findings(service.name, own, paths):
+        yield diagnostic(finding.below("build"), service.node, service.span)
+
+
+def _secrets(application: ApplicationSource, paths: HostPaths) -> tuple[dict[str, Any], list[Diagnostic]]:
+    """The secrets from which builds may take theirs, and those that they may not have."""
+    written = application.rest.get("secrets")
+    if written is None:
+        return {}, []
+    node = Node(written.span, {"secrets": Entry(written.span, written)})
+    try:
+        entries = {key: entry.value for key, entry in _literal(node, application.known).entries.items()}
+    except EnvironmentProblem as problem:
+        place = Span(written.span.file, written.span.line)
+        return {}, [Diagnostic(place, "application-file", f"the secrets: {problem}", "set it")]
+    moved = compose_paths.mapped_rest(entries, lambda path: _whole(path, paths))
+    secrets = {key: plain(value) for key, value in moved.items()}
+    found = shared_findings(secrets, paths, application.access.passed)
+    return secrets, [diagnostic(finding, node, written.span) for finding in found]

@@ -18,7 +18,8 @@ def remove_machine_settings(copy: ServiceCopy) -> None:
         copy.remove(key, why)
     build = copy.service.get("build")
     if isinstance(build, dict):
-        _remove_from_build(copy, build, removed(BUILD))
+        own = [key for key in build if key.startswith("x-")]  # builders take x-bake for theirs
+        _remove_from_build(copy, build, (*removed(BUILD), *own))
     scale, deploy = copy.service.pop("scale", None), copy.service.get("deploy")
     if isinstance(deploy, dict):
         scale = deploy.get("replicas", scale)

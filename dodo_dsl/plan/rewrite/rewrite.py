@@ -77,7 +77,7 @@ def plan_application(
             rest[key] = {name: volumes.without_name(about) for name, about in rest[key].items()}
     changes = other_changes.of_all(changes, list(services))
     if "volumes" in rest or copies.sources:
-        rest["volumes"] = volumes.own_volumes(rest.get("volumes"), changes, copies.sources, limits, known)
+        rest["volumes"] = volumes.own_volumes(rest.get("volumes"), changes, copies.sources, limits, known, paths)
     changes += other_changes.of_top_level(application, rest)
     planned = tuple(_planned(service, cid) for service in application.services.values())
     carried = variables.carried(application, cid, base, path_variables)

@@ -5,6 +5,7 @@ from typing import Any
 
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access import filled
+from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.limit_findings import volume_excesses
 from dodo_dsl.application.interpolation import split_outside
 from dodo_dsl.plan.rewrite.container_limits import put
@@ -82,30 +83,41 @@ def without_name(about: Any) -> Any:
     return {key: value for key, value in about.items() if key != "name"} if isinstance(about, dict) else about
 
 
+def _to_read(about: Any, paths: HostPaths | None) -> str:
+    """``o`` of a volume that could be written to and is only to be read; empty for all others."""
+    if not host_access.is_bound(about) or host_access.is_read_only(about):
+        return ""
+    device = str(about["driver_opts"].get("device") or "")
+    if "$" not in device and (paths is None or not paths.is_only_read(device)):
+        return ""
+    words = (word.strip() for word in host_access.volume_options(about))
+    return ",".join([*(word for word in words if word not in ("", "ro", "rw")), "ro"])
+
+
 def own_volumes(
     volumes: Any,
     changes: MutableSequence[str],
     copies: Collection[str] = (),
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
     known: Mapping[str, str] | None = None,
+    paths: HostPaths | None = None,
 ) -> dict[str, Any]:
     """Top-level ``volumes``: each test has its own, so names that all of the host would share are removed.
 
     File systems in memory get no more than a service may have; ``known`` are variables whose values are known. A folder
-    of the repository is one of the ``copies``, or else only to be read.
+    of the repository is one of the ``copies``; what ``paths`` lets be read alone, or does not know, is read-only.
     """
     found: dict[str, Any] = {}
     for excess in list(volume_excesses(filled.value(volumes or {}, known or {}), limits)):
         put(volumes, excess)
         changes.append(f"volume {excess.steps[0]}: o is {excess.allowed}")
     for name, about in (volumes or {}).items():
-        options = about.get("driver_opts") if host_access.is_bound(about) else None
-        if options and "$" in str(filled.value(options.get("device"), known or {})):
-            options["o"] = ",".join([*(word for word in options["o"].split(",") if word != "rw"), "ro"])
-            changes.append(f"volume {own_name(name)}: is only read")
         if own_name(name) in copies:
             found[own_name(name)] = {}
             continue
+        if options := _to_read(filled.value(about, known or {}), paths):
+            about["driver_opts"]["o"] = options
+            changes.append(f"volume {own_name(name)}: is only read")
         if isinstance(about, dict) and about.pop("labels", None):
             changes.append(f"volume {own_name(name)}: labels removed, programs of the host act on them")
         is_external = host_access.is_external(about)

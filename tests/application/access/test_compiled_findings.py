@@ -69,6 +69,16 @@ def test_what_is_refused(service: dict[str, Any], places: list[str]) -> None:
     assert found(service) == places
 
 
+@pytest.mark.parametrize(
+    ("options", "refused"),
+    [("bind,ro", False), ("rbind,rw,ro", False), ("bind", True), ("bind,ro,rw", True), ("bind, ro", True)],
+)
+def test_volumes_that_could_be_written_to(options: str, refused: bool) -> None:
+    """The engine takes the last word, and none with a space."""
+    bound = {"driver_opts": {"type": "none", "o": options, "device": "/usr/share"}}
+    assert found({}, volumes={"v": bound}) == ["volumes.v.driver_opts.o"] * refused
+
+
 def test_images_of_dodo_are_not_built() -> None:
     places = found({"build": {"context": "/builds/team"}, "image": "dodo/judge:1"})
     assert places == ["services.driver.build", "services.driver.image"]

@@ -43,7 +43,7 @@ def test_what_may_be_written_to(paths: HostPaths, path: str) -> None:
     assert paths.is_writable(path) and not paths.is_only_read(path)
 
 
-@pytest.mark.parametrize("path", [".", "../maps", "inner", "/usr/share/x", "/etc/localtime", "/run/udev"])
+@pytest.mark.parametrize("path", [".", "../maps", "inner", "/usr/share/x", "/etc/localtime", "/run/udev/data"])
 def test_what_may_only_be_read(paths: HostPaths, path: str) -> None:
     assert paths.mount_problem(path) == ("", "")
     assert paths.is_only_read(path) and not paths.is_writable(path)
@@ -54,6 +54,7 @@ def test_what_may_only_be_read(paths: HostPaths, path: str) -> None:
     [
         *("/etc", "/home", "/home/team", "/home/team/.ssh", "/root/.docker/config.json", "/var/lib/x", "/builds/other"),
         *("../..", "link", "/optional", "~", "/opt/../etc", "/opt/models", "/srv", "/mnt/x", "/home/team/maps"),
+        *("/run/udev", "/run/udev/control"),
         *("/tmp/x", "/dev/x", "~/x", "/usr/local", "/etc/ros/../passwd", "/usr/share/../../etc"),
     ],
 )
