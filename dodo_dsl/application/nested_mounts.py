@@ -57,7 +57,7 @@ def _of_rest(application: ApplicationSource, services: dict[str, dict[str, Any]]
         if not isinstance(node, Mapping):
             continue
         for name, about in plain(filled.node(node, application.known)).items():
-            if host_access.is_bound(about):
+            if host_access.is_bound(about) or "$" in "".join(host_access.volume_options(about)):
                 writer = "" if host_access.is_read_only(about) else writers.get(name, "")
                 device = str(about["driver_opts"].get("device") or "")
                 yield _Shown(node, node.span, (name, "driver_opts", "device"), device, writer)

@@ -141,6 +141,7 @@ def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
         ("{}/data:/d", "{}/data:/x", False),
         ("{}/data:/d", "{}/data/out:/x", True),
         ("{}/data:/d", {"volumes": "{}/data/x"}, True),
+        ("{}/data:/d", {"volumes": "{}/data/x", "o": "${NOBODY}"}, True),
         ({"volumes": "{}/data"}, "{}/data/x:/x", True),
         ({"volumes": "{}/data"}, {"secrets": "{}/data/x/key"}, True),
         ({"volumes": "{}/data", "o": "bind,ro"}, {"secrets": "{}/data/x/key"}, False),
