@@ -128,6 +128,14 @@ def test_it_passes(case: Case, scratch: Path) -> None:
         started(case, scratch, checkout)
 
 
+def test_it_passes_below_tmp() -> None:
+    """Each test has a ``/tmp`` of its own, through which its application has to get to its folder."""
+    case = Case("below /tmp", umask=0o077)
+    scratch = tempfile.TemporaryDirectory(prefix="dodo-tests-", dir="/tmp")
+    with scratch as name, checkout_of(case, Path(name)) as checkout:
+        started(case, Path(name), checkout)
+
+
 @contextlib.contextmanager
 def checkout_of(case: Case, scratch: Path, **service: object) -> Iterator[Path]:
     """The repository as the case has it, owned by who runs it; ``service`` are keys of the application's."""

@@ -25,6 +25,7 @@ _OPEN_TREE, _MOVE_MOUNT, _MOUNT_SETATTR = 428, 429, 442
 """System calls that have the same number on every processor."""
 _AT_FDCWD, _AT_EMPTY_PATH, _AT_RECURSIVE = -100, 0x1000, 0x8000
 _OPEN_TREE_CLONE, _MOVE_MOUNT_F_EMPTY_PATH, _MOUNT_ATTR_IDMAP = 1, 4, 0x00100000
+_ENTERED = 0o755
 _SHARED_SIZE = "size=1g,mode=1777"
 SHARED = (Path("/tmp"), Path("/dev/shm"))
 """Where shared memories have their names."""
@@ -245,8 +246,12 @@ def _make_private(folder: Path) -> None:
 
 
 def _bind_old(old: int, target: Path) -> None:
-    """Shows a folder of an old one, of which ``old`` is a descriptor, in the new one that took its place."""
+    """Shows a folder of an old one, of which ``old`` is a descriptor, in the new one that took its place.
+
+    The application, which sees it without what is mounted there, has to get through to its own folder.
+    """
     target.mkdir(exist_ok=True)
+    target.chmod(_ENTERED)
     with contextlib.suppress(FileNotFoundError):  # it was removed meanwhile
         bind(Path(f"/proc/self/fd/{old}", target.name), target, deep=True)
 
