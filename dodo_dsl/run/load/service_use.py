@@ -1,5 +1,6 @@
 """What services use so far, with all their processes, by ``/proc``."""
 
+import contextlib
 import os
 import time
 from collections import defaultdict
@@ -67,6 +68,7 @@ class ServiceUse:
             self._look(services)
         found: dict[str, Used] = {}
         for pid, name in services.items():
+            self._add_children(name)
             alive = self._count(pid, name, services)
             ticks = self._ticks[name] + self._lost[name]
             found[name] = Used(ticks / _TICKS, self._memory(name, alive, now) if alive else 0)
@@ -92,6 +94,16 @@ class ServiceUse:
         self._pids = {name: [pid for _, pid in sorted(pids)] for name, pids in found.items()}
         self._held = {name: process_memory.held(pids, self._proc) for name, pids in self._pids.items()}
         self._look_at_s = time.monotonic() + _patience_s(began)
+
+    def _add_children(self, name: str) -> None:
+        """Adds what known processes have started since the last look, which is cheap to read.
+
+        A sandbox that is just being set up has not started the service yet. Other threads' children wait for the look.
+        """
+        pids = self._pids.get(name, [])
+        for pid in pids:  # which grows: children have children
+            with contextlib.suppress(OSError), open(f"{self._proc}/{pid}/task/{pid}/children", "rb") as file:  # noqa: PTH123
+                pids += [child for child in map(int, file.read().split()) if child not in pids]
 
     def _count(self, first: int, name: str, services: Mapping[int, str]) -> list[int]:
         """Adds up the processor time of a service; returns its processes.

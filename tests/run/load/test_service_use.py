@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.run.load import service_use
 from dodo_dsl.run.load.service_use import ServiceUse, Used
 
 TICK = 1 / os.sysconf("SC_CLK_TCK")
@@ -137,3 +138,26 @@ def test_the_kernel_s_own(code: str, processor_s: float, megabytes: int) -> None
     assert use["app"].processor_s - use["plain"].processor_s >= processor_s - 0.05
     more = (use["app"].memory - use["plain"].memory) / MB
     assert megabytes - 1 <= more <= megabytes + 16, "what forks write to is their own"
+
+
+CHILD_LATER = """
+import subprocess, sys
+input()
+code = "held = bytearray(b'x' * 50_000_000); print('held', flush=True); input()"
+subprocess.run([sys.executable, "-c", code])
+"""
+
+
+def test_a_process_that_begins_after_the_first_look_counts_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sandbox that is looked at while it is set up has not started the application yet."""
+    monkeypatch.setattr(service_use, "_LOOK_S", 1e6)
+    words = [sys.executable, "-c", CHILD_LATER]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None and process.stdout is not None
+        use = ServiceUse()
+        assert use.take({process.pid: "app"})["app"].memory < 50_000_000
+        process.stdin.write("\n")
+        process.stdin.flush()
+        assert process.stdout.readline() == "held\n"
+        assert use.take({process.pid: "app"})["app"].memory > 50_000_000
+        process.stdin.close()
