@@ -131,8 +131,9 @@ class Engine:
             why = f"{type(error).__name__}: {error}"
             self.state.notes.append(f"what the application used was not measured to the end: {why}")
         began, finished = self.state.began, self.state.finished or self._now()
+        in_steps = self.plan.lockstep is not None
         whole = [] if began is None else [(began, 0.0), (finished, finished - began)]
-        self.state.resources = self._use.figures(self.state.progress if self.plan.lockstep else whole)
+        self.state.resources = self._use.figures(self.state.progress if in_steps else whole, in_steps)
         self._is_measured = True
 
     async def _wind_up(self, keep: bool) -> list[str]:
