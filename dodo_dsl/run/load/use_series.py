@@ -20,7 +20,7 @@ _LEAST_SHARE = 1 / 6
 """Of the rise that each half of it has to have: memory that is taken once, whenever that is, does not grow."""
 _LEAST_POINTS, _MOST_POINTS = 3, 60
 _LEAST_TIMES = 8
-"""Times of the test that have to be known within the second half: what was measured between two of them may be of either."""
+"""Known times of the test within the second half: what was measured between two of them may be of either."""
 _MOST_KEPT = 2000
 
 Point = tuple[float, float]
@@ -76,9 +76,7 @@ class UseMeter(Meter):
             return ()
         passed_s = test_time(progress, self._times[-1]) - test_time(progress, self._times[0])
         known = {at_s for _, at_s in progress} if in_steps else None
-        return tuple(
-            _figures(name, self._services[name], progress, passed_s, known) for name in sorted(self._services)
-        )
+        return tuple(_figures(name, self._services[name], progress, passed_s, known) for name in sorted(self._services))
 
 
 def _figures(
