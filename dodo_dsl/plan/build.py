@@ -12,7 +12,7 @@ from dodo_dsl.check import world
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.replayed import WITHOUT
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.check.senders import senders, truth_delay_s, withheld_truth
+from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses, clock_service, recorder_service
 from dodo_dsl.plan.clock_service import lockstep
@@ -221,8 +221,7 @@ class _Builder:
             pool=self._pooled() if spec.pool else None,
             messages=messages,
             senders=senders(self.test),
-            truth=(truth := withheld_truth(self.test)),
-            truth_delay_s=truth_delay_s(self.test) if truth else 0.0,
+            truth=truth(self.test),
             world=world.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in world.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,

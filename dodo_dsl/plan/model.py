@@ -127,7 +127,7 @@ class Plan:
     ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,
     relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
     ``goals`` score a passed test and never change its outcome.
-    ``truth`` are messages by which evaluators judge; in real time they come to the bus ``truth_delay_s`` late.
+    ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
     ``import_paths`` are folders that hold Python packages of the deployment's own services, relative to the compiled
@@ -158,7 +158,6 @@ class Plan:
     messages: tuple[str, ...] = ()
     senders: tuple[str, ...] = ()
     truth: tuple[str, ...] = ()
-    truth_delay_s: float = 0.0
     world: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
@@ -170,9 +169,13 @@ class Plan:
         """Environment variables that give the test's services their clock, their rig, and who may send what."""
         stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
         rig = {"DODO_RIG": self.rig} if self.rig else {}
-        truth = {"DODO_TRUTH": " ".join([f"{self.truth_delay_s:g}", *self.truth])} if self.truth else {}
-        lists = {"DODO_SENDERS": self.senders, "DODO_WORLD": self.world, "DODO_TOLD": self.told}
-        return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}, **truth}
+        lists = {
+            "DODO_SENDERS": self.senders,
+            "DODO_WORLD": self.world,
+            "DODO_TOLD": self.told,
+            "DODO_TRUTH": self.truth,
+        }
+        return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}}
 
     def layer(self, name: str) -> tuple[PlannedService, ...]:
         return tuple(s for s in self.services if s.layer == name)

@@ -67,7 +67,6 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         application["limits"] = SandboxLimits(**{**application["limits"], "reads": reads})
         application["access"] = _access(application["access"])
         raw["application"] = Application(**application)
-        raw["truth_delay_s"] = float(raw["truth_delay_s"])
         if settings.seed is not None:
             raw["seed"] = settings.seed
         if settings.wall_timeout_s is not None and raw["lockstep"]:
@@ -104,7 +103,6 @@ def _problem(plan: Plan) -> str:
         "messages": all(_is_inside(path) for path in plan.messages),
         "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in _words(plan)),
         "import path": all(isinstance(path, str) and "\0" not in path for path in plan.import_paths),
-        "truth_delay_s": isinstance(plan.truth_delay_s, int | float) and 0 <= plan.truth_delay_s <= 86_400,
         "goal": all(isinstance(goal.check, str) and is_goal(goal) for goal in plan.goals),
         "service name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "service layer": all(s.layer in LAYERS for s in plan.services),

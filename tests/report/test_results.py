@@ -80,7 +80,10 @@ def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
     page = (tmp_path / "index.html").read_text()
     for shown in ("1.23 s (25 %)", "150 MB", "300 MB/min", "1,460 MB", "too short to tell"):
         assert f">{shown}</td>" in page
-    assert second.in_words() == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to tell whether that grows"
+    assert (
+        second.in_words()
+        == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to tell whether that grows"
+    )
 
 
 @pytest.mark.parametrize("number", ["1" + "0" * 400, "-1" + "0" * 400, "1e999", "NaN", "1" * 5000])
