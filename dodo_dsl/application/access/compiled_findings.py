@@ -35,7 +35,7 @@ class CompiledTest:
 def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator[AccessFinding]:
     """Findings in what ``docker compose config --format json`` prints, each of which refuses the test."""
     rest = {key: value for key, value in config.items() if key != _SERVICES}
-    yield from shared_findings(rest, test.paths, test.access.passed)
+    yield from shared_findings(rest, test.paths, test.access.passed, compiled=True)
     volumes = rest.get("volumes") or {}
     others = {name: about for name, about in volumes.items() if name not in OWN_VOLUMES}
     yield from volume_findings(others, test.limits, compiled=True)
