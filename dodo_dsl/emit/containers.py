@@ -2,12 +2,14 @@
 
 import math
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dodo_dsl.application.mounted_folders import WAY_OUT
 from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, PlannedService
+from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
@@ -64,10 +66,37 @@ def containers(plan: Plan, layer: str) -> list[Container]:
     ]
 
 
-def copy_command(volumes: Iterable[str]) -> str:
-    """What the service does that copies files of the repository: links stay links, and nothing follows them."""
-    copies = [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in volumes]
-    return " && ".join([*copies, "touch /run/copied", "exec sleep infinity"])
+_COUNT = """\
+files=0 size=0
+fits() {
+  own=$(find "$1" | head -n %(most)s | wc -l); files=$((files + own))
+  [ $files -le %(files)s ] || fail "$2" "at least $own files" "%(files)s" copied-files
+  own=$(du -sk --apparent-size "$1" | cut -f1); size=$((size + own))
+  [ $size -le %(size)s ] || fail "$2" "$((own * 128 / 125000)) MB" "%(shown)s MB" copies
+}
+fail() {
+  echo "'$1' holds $2, and the copies of a test may hold $3: %(way_out)s"
+  exit 1
+}
+"""
+
+
+def copy_command(copies: Mapping[str, str], limits: SandboxLimits) -> str:
+    """What the service does that copies folders of the repository: links stay links, and nothing follows them.
+
+    It counts before it copies. Variables are for the shell: compose fills in none.
+    """
+    way_out = WAY_OUT.format(key="$4")
+    count = _COUNT % {
+        "most": limits.copied_files + 1,
+        "files": limits.copied_files,
+        "size": limits.copies // 1024,
+        "shown": limits.copies // 10**6,
+        "way_out": way_out,
+    }
+    words = [f"fits {shlex.quote(f'/from/{name}')} {shlex.quote(source)}" for name, source in copies.items()]
+    words += [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in copies]
+    return f"{count}{' && '.join([*words, 'touch /run/copied', 'exec sleep infinity'])}".replace("$", "$$")
 
 
 def _word(flag: Flag) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.mounted_folders import large_folders
 from dodo_dsl.check import world
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.replayed import WITHOUT
@@ -95,7 +96,8 @@ def build(
         before_each()
         plans.append(builder.plan())
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
-    problems = list(itertools.chain.from_iterable(b.problems for b in builders))
+    of_copies = large_folders(application, [*deployment.registry, *deployment.services])
+    problems = [*of_copies, *itertools.chain.from_iterable(b.problems for b in builders)]
     return Compiled(Suite(tuple(plans), deployment.gates), files), problems
 
 

@@ -14,6 +14,8 @@ _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0
 """The seconds that every service may take to get ready."""
 LAYERS = (*spec_model.LAYERS, "application")
+STARTED, HEALTHY, COMPLETED = "service_started", "service_healthy", "service_completed_successfully"
+"""The conditions of ``depends_on``."""
 
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
 
@@ -51,7 +53,8 @@ class PlannedService:
 class ApplicationService:
     """A service under test; ``process`` starts it without containers, None when only its image can.
 
-    ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``.
+    ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``. ``after`` are
+    the services for which it waits, each with its condition.
     """
 
     name: str
@@ -63,6 +66,7 @@ class ApplicationService:
     env_files: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
+    after: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,10 @@ import orjson
 
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.plan.model import (
+    COMPLETED,
+    HEALTHY,
     LAYERS,
+    STARTED,
     Application,
     ApplicationService,
     Flag,
@@ -119,9 +122,16 @@ def _problem(plan: Plan) -> str:
         "access": _is_access(plan.application.access),
         "resources": plan.resources is None or is_valid(plan.resources),
         "message": all(isinstance(m, str) for s in plan.application.services for m in (*s.inputs, *s.outputs)),
+        "condition": all(_is_after(s.after, plan.application) for s in plan.application.services),
         "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
+
+
+def _is_after(after: dict[str, str], application: Application) -> bool:
+    names = {service.name for service in application.services}
+    conditions = {STARTED, HEALTHY, COMPLETED}
+    return all(name in names and c in conditions for name, c in after.items())
 
 
 def _words(plan: Plan) -> tuple[str, ...]:
