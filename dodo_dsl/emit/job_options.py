@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from dodo_dsl.plan.model import Plan
 
@@ -19,6 +20,9 @@ def _unknown(_plans: Sequence[Plan]) -> Mapping[str, float]:
 class JobOptions:
     """``tags`` of the runners of all jobs that occupy no rig, and their ``image``; empty for the runner's own.
 
+    ``services`` are theirs, too, and ``before_script`` are their first commands; ``artifacts_access`` says who may
+    download what any job keeps, empty for all. Values are those of GitLab's keywords.
+
     ``run_options`` are those of ``dodo run`` in each test, which a variable ``DODO_RUN_OPTIONS`` replaces. ``images``
     are those of the application that the parent has built, as lines ``DODO_IMAGE_<SERVICE>=<image>``. Where
     ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds``.
@@ -30,6 +34,9 @@ class JobOptions:
     images: tuple[str, ...] = ()
     most_jobs: int = 0
     seconds: Seconds = _unknown
+    services: tuple[str | Mapping[str, Any], ...] = ()
+    before_script: str = ""
+    artifacts_access: str = ""
 
     @property
     def backend(self) -> str:
