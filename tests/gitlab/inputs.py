@@ -1,5 +1,6 @@
 """Templates as GitLab includes them: inputs are checked and put into the parsed YAML, then jobs extend others."""
 
+import functools
 import json
 import re
 from collections.abc import Mapping
@@ -25,13 +26,18 @@ class Refused(Exception):
 
 def specified(template: Path) -> Config:
     """The inputs that a template takes, by name."""
-    header, _ = yaml.safe_load_all(template.read_text())
-    return dict(header["spec"]["inputs"])
+    return dict(_parsed(template)[0]["spec"]["inputs"])
+
+
+@functools.cache
+def _parsed(template: Path) -> tuple[Config, Config]:
+    header, body = yaml.load_all(template.read_text(), Loader=yaml.CSafeLoader)
+    return header, body
 
 
 def included(template: Path, **inputs: Any) -> Config:
     """A template with its inputs, an underscore for each hyphen of their names."""
-    _, config = yaml.safe_load_all(template.read_text())
+    config = _parsed(template)[1]
     specs = specified(template)
     given = {name.replace("_", "-"): value for name, value in inputs.items()}
     if unknown := given.keys() - specs.keys():

@@ -32,6 +32,7 @@ _REQUEST = {
 PUSH = {**_BRANCH, "CI_PIPELINE_SOURCE": "push"}
 REVIEWED = {**PUSH, **_OPEN}
 REQUEST = _REQUEST
+CHILD_OF_REQUEST = {**_REQUEST, "CI_PIPELINE_SOURCE": "parent_pipeline"}
 KINDS: Mapping[str, Variables] = {
     "push to a branch": PUSH,
     "push to a branch whose merge request is open": REVIEWED,
@@ -57,7 +58,7 @@ KINDS: Mapping[str, Variables] = {
     "API": {**_BRANCH, **_OPEN, "CI_PIPELINE_SOURCE": "api"},
     "web": {**_BRANCH, **_OPEN, "CI_PIPELINE_SOURCE": "web"},
     "child of a branch's pipeline": {**_BRANCH, **_OPEN, "CI_PIPELINE_SOURCE": "parent_pipeline"},
-    "child of a merge request's pipeline": {**_REQUEST, "CI_PIPELINE_SOURCE": "parent_pipeline"},
+    "child of a merge request's pipeline": CHILD_OF_REQUEST,
 }
 """The variables of each kind of pipeline by which rules tell it; others are empty."""
 
