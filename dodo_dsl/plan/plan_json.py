@@ -21,6 +21,7 @@ from dodo_dsl.plan.model import (
     Pooled,
     is_device,
 )
+from dodo_dsl.plan.test_files import is_shared_name
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.goals import Goal, is_goal
 from dodo_dsl.spec.instances.matrix import SLUG
@@ -103,6 +104,7 @@ def _problem(plan: Plan) -> str:
         "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
         "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in _words(plan)),
+        "shared file": all(_is_inside(path) and is_shared_name(name) for path, name in plan.shared.items()),
         "import path": all(isinstance(path, str) and "\0" not in path for path in plan.import_paths),
         "truth_delay_s": isinstance(plan.truth_delay_s, int | float) and 0 <= plan.truth_delay_s <= 86_400,
         "goal": all(isinstance(goal.check, str) and is_goal(goal) for goal in plan.goals),

@@ -2,7 +2,7 @@
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
@@ -20,6 +20,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.pools import named
 from dodo_dsl.plan.runs import runs
+from dodo_dsl.plan.test_files import file_problem
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.rigs.attendance import is_real
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
@@ -38,6 +39,7 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
             )
         plans, deployment = [load_compiled(folder, settings) for folder in options.compiled], _deployment(stdout)
         folders = {plan.slug: path.resolve() for plan, path in zip(plans, options.compiled, strict=True)}
+        _refuse_other_files(plans, folders)
         if len(folders) < len(plans):
             raise UsageError("--compiled names two tests of one name, or one of them twice")
     else:
@@ -52,6 +54,13 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
         first = found.get(plan.slug)
         found[plan.slug] = replace(first, others=(*first.others, job)) if first else job
     return list(found.values()), deployment
+
+
+def _refuse_other_files(plans: Sequence[Plan], folders: Mapping[str, Path]) -> None:
+    """Raises UsageError for shared files that are missing, or, in the repository, not those that were compiled."""
+    for test in plans:
+        if problem := file_problem(folders[test.slug], test.shared):
+            raise UsageError(f"{test.name}: {problem}")
 
 
 def load_compiled(folder: Path, settings: Settings) -> Plan:
