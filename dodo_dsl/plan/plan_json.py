@@ -76,6 +76,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
         raw["resources"] = ResourceLimits(**raw["resources"]) if raw["resources"] else None
         raw |= {key: tuple(raw[key]) for key in _LISTS}
+        raw["shared"] = dict(raw["shared"])
         raw["pool"] = Pooled(**raw["pool"]) if raw["pool"] else None
         raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
