@@ -2,7 +2,7 @@
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
@@ -39,7 +39,6 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
             )
         plans, deployment = [load_compiled(folder, settings) for folder in options.compiled], _deployment(stdout)
         folders = {plan.slug: path.resolve() for plan, path in zip(plans, options.compiled, strict=True)}
-        _refuse_other_files(plans, folders)
         if len(folders) < len(plans):
             raise UsageError("--compiled names two tests of one name, or one of them twice")
     else:
@@ -56,16 +55,11 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     return list(found.values()), deployment
 
 
-def _refuse_other_files(plans: Sequence[Plan], folders: Mapping[str, Path]) -> None:
-    """Raises UsageError for shared files that are missing, or, in the repository, not those that were compiled."""
-    for test in plans:
-        if problem := file_problem(folders[test.slug], test.shared):
-            raise UsageError(f"{test.name}: {problem}")
-
-
 def load_compiled(folder: Path, settings: Settings) -> Plan:
-    """The Plan of a compiled test, whose clock and isolation are settled."""
+    """The Plan of a compiled test, whose clock and isolation are settled, and whose files are those that it needs."""
     plan = _load_plan(folder, settings)
+    if problem := file_problem(folder.resolve(), plan.shared):
+        raise UsageError(f"{plan.name}: {problem}")
     if settings.clock not in (None, plan.clock):
         raise UsageError(f"this test is compiled for clock {plan.clock}; compile it again for another")
     if settings.isolation == "network" and is_real(plan):
