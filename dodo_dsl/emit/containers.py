@@ -9,6 +9,7 @@ from typing import Any
 from dodo_dsl.application.mounted_folders import WAY_OUT
 from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, PlannedService
+from dodo_dsl.plan.test_files import SHARED
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 FILES = "/dodo/files"
@@ -113,11 +114,23 @@ def _environment(plan: Plan, service: PlannedService) -> tuple[tuple[str, str], 
     return tuple((name, value) for name, value in own.items() if value)
 
 
+def _shared(plan: Plan, service: PlannedService) -> list[str]:
+    """The shared files to which the service's own paths lead."""
+    paths = {*plan.messages, *(flag.value for flag in service.flags if flag.kind == "path")}
+    found = {name for target, name in plan.shared.items() if any(f"{target}/".startswith(f"{p}/") for p in paths)}
+    return sorted(found)
+
+
+def _shared_mount(name: str) -> Mapping[str, Any]:
+    """The place to which the test's link leads in a container."""
+    return {**FILES_MOUNT, "source": f"../{SHARED}/{name}", "target": f"/{SHARED}/{name}"}
+
+
 def _volumes(plan: Plan, service: PlannedService) -> tuple[str | Mapping[str, Any], ...]:
     kinds = {flag.kind for flag in service.flags}
     volumes: list[str | Mapping[str, Any]] = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
     if "path" in kinds or plan.messages:
-        volumes.append(FILES_MOUNT)
+        volumes += [FILES_MOUNT, *(_shared_mount(name) for name in _shared(plan, service))]
     if "report" in kinds:
         volumes.append(f"report:{REPORT}")
     return tuple(volumes)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dodo_dsl import package_data
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounted_folders import large_folders
 from dodo_dsl.check import world
@@ -20,7 +21,7 @@ from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
+from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment.deployment import Deployment
@@ -49,10 +50,12 @@ def build(
     out: Path,
     settings: Settings,
     before_each: Callable[[], None] = lambda: None,
+    from_repository: bool = False,
 ) -> tuple[Compiled, list[Diagnostic]]:
     """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below.
 
-    ``before_each`` is called before each test.
+    ``before_each`` is called before each test. Large files of the repository are linked instead of copied where they
+    come ``from_repository``.
     """
     ordered = sorted(tests, key=lambda test: test.spec.slug)
     try:
@@ -96,9 +99,26 @@ def build(
         before_each()
         plans.append(builder.plan())
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
+    files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
+    plans = [_sharing(plan, files[plan.slug]) for plan in plans]
     of_copies = large_folders(application, [*deployment.registry, *deployment.services])
     problems = [*of_copies, *itertools.chain.from_iterable(b.problems for b in builders)]
     return Compiled(Suite(tuple(plans), deployment.gates), files), problems
+
+
+def _in_repository(deployment: Deployment, out: Path) -> Callable[[Path], bool]:
+    """Whether a job that checks out the repository has a file; raises FilesError where ``out`` cannot link to it."""
+    root = deployment.root.resolve()
+    if not out.is_relative_to(root):
+        raise FilesError(f"--files repository needs an output folder in the repository '{root}', and '{out}' is none")
+    shipped = package_data.registry().resolve()
+    is_own = not shipped.is_relative_to(root) or package_data.root().resolve() == root
+    return lambda path: path.is_relative_to(root) and (is_own or not path.is_relative_to(shipped))
+
+
+def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
+    shared = {copy.target: copy.shared for copy in files if copy.shared}
+    return replace(plan, shared=shared) if shared else plan
 
 
 def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:

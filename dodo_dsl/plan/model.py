@@ -135,7 +135,8 @@ class Plan:
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
     ``import_paths`` are folders that hold Python packages of the deployment's own services, relative to the compiled
-    test's.
+    test's. ``shared`` are files below ``files/`` that are links, each with the name of its file in the folder of files
+    that tests share.
     """
 
     name: str
@@ -166,6 +167,7 @@ class Plan:
     told: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
     import_paths: tuple[str, ...] = ()
+    shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)
 
     @property

@@ -24,6 +24,7 @@ from dodo_dsl.plan.model import (
     Pooled,
     is_device,
 )
+from dodo_dsl.plan.test_files import is_shared_name
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.goals import Goal, is_goal
 from dodo_dsl.spec.instances.matrix import SLUG
@@ -77,6 +78,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
         raw["resources"] = ResourceLimits(**raw["resources"]) if raw["resources"] else None
         raw |= {key: tuple(raw[key]) for key in _LISTS}
+        raw["shared"] = dict(raw["shared"])
         raw["pool"] = Pooled(**raw["pool"]) if raw["pool"] else None
         raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
@@ -105,6 +107,7 @@ def _problem(plan: Plan) -> str:
         "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
         "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in _words(plan)),
+        "shared file": all(_is_inside(path) and is_shared_name(name) for path, name in plan.shared.items()),
         "import path": all(isinstance(path, str) and "\0" not in path for path in plan.import_paths),
         "goal": all(isinstance(goal.check, str) and is_goal(goal) for goal in plan.goals),
         "service name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
