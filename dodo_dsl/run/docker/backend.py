@@ -13,13 +13,14 @@ from typing import Any
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
+from dodo_dsl.run.docker import shared_files
 from dodo_dsl.run.docker.bus import announce_begin
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.events import Watch
-from dodo_dsl.run.docker.processes import ContainerProcesses
+from dodo_dsl.run.docker.processes import ELSEWHERE, ContainerProcesses
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.docker.teardown import take_down, writers
 from dodo_dsl.run.load.service_use import Used
@@ -68,6 +69,7 @@ class DockerBackend:
         self.cid = plan.cid
         self.report = report
         self.project = project
+        self._folder = folder
         self._client = client
         self._pulls = pulls
         self._subnets = subnets
@@ -94,9 +96,27 @@ class DockerBackend:
 
     async def open(self) -> None:
         await self._compose.read()
+        await self._require_files()
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets, self._key)
         await self._start_watching()
+
+    async def _require_files(self) -> None:
+        """Raises BackendError where the engine does not see what the test mounts; once for all tests of a run."""
+        await self._pulls.once(shared_files.IMAGE, self._provide_empty_image)
+        paths = shared_files.mounted(self._compose.services, self._folder)
+        others = [str(path) for path in paths if not path.is_relative_to(self._folder)]
+        await self._pulls.once(f"files {self._folder.parent} {others}", lambda: self._look_for(paths))
+
+    async def _provide_empty_image(self) -> str:
+        await asyncio.to_thread(shared_files.provide_image, self._client)
+        return ""
+
+    async def _look_for(self, paths: Sequence[Path]) -> str:
+        missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self.project)
+        if missing:
+            raise BackendError(": ".join(shared_files.problem(missing)))
+        return ""
 
     async def _start_watching(self) -> None:
         from docker.errors import DockerException
@@ -285,6 +305,8 @@ class DockerBackend:
         return await asyncio.to_thread(self._processes.listeners, names, self.cid)
 
     async def begin(self) -> None:
+        if self.is_on_host and await self.application() is None:
+            raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
         for _ in range(_ADDRESS_TURNS):
             if self._addresses.keys() >= {*that_hear(self.plan)}:
                 break
