@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dodo_dsl import source
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounted_folders import large_folders
 from dodo_dsl.check import world
@@ -20,6 +21,7 @@ from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.volumes import too_long
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -97,8 +99,24 @@ def build(
         plans.append(builder.plan())
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     of_copies = large_folders(application, [*deployment.registry, *deployment.services])
-    problems = [*of_copies, *itertools.chain.from_iterable(b.problems for b in builders)]
+    of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
+    problems = [
+        *of_copies,
+        *itertools.islice(of_volumes, 1),
+        *itertools.chain.from_iterable(b.problems for b in builders),
+    ]
     return Compiled(Suite(tuple(plans), deployment.gates), files), problems
+
+
+def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
+    """A volume that the engine cannot make for a test, as its name has to tell tests apart."""
+    name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
+    if not name:
+        return None
+    node, first = application.rest.get("volumes"), next(iter(application.services.values())).span
+    span = node.entries[name].key if isinstance(node, source.Mapping) and name in node.entries else first
+    message = f"the name of the volume '{name}' is too long for the engine together with that of '{plan.slug}'"
+    return Diagnostic(span, "application-file", message, "shorten one of them: they may have 242 characters together")
 
 
 def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:
