@@ -1,6 +1,7 @@
 """A planned service as a container: command, volumes and what it waits for."""
 
 import math
+import posixpath
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,9 +9,8 @@ from typing import Any
 
 from dodo_dsl.application.mounted_folders import WAY_OUT
 from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
-from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, PlannedService
+from dodo_dsl.plan.model import LAYERS, READY_S, Application, Flag, Plan, PlannedService
 from dodo_dsl.plan.test_files import SHARED
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
@@ -82,22 +82,30 @@ fail() {
 """
 
 
-def copy_command(copies: Mapping[str, str], limits: SandboxLimits) -> str:
+def copy_command(application: Application) -> str:
     """What the service does that copies folders of the repository: links stay links, and nothing follows them.
 
     It counts before it copies. Variables are for the shell: compose fills in none.
     """
-    way_out = WAY_OUT.format(key="$4")
+    copies, limits = application.copies, application.limits
     count = _COUNT % {
         "most": limits.copied_files + 1,
         "files": limits.copied_files,
         "size": limits.copies // 1024,
         "shown": limits.copies // 10**6,
-        "way_out": way_out,
+        "way_out": WAY_OUT.format(key="$4"),
     }
-    words = [f"fits {shlex.quote(f'/from/{name}')} {shlex.quote(source)}" for name, source in copies.items()]
+    shown = {name: _as_written(source, application.folder) for name, source in copies.items()}
+    words = [f"fits {shlex.quote(f'/from/{name}')} {shlex.quote(source)}" for name, source in shown.items()]
     words += [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in copies]
     return f"{count}{' && '.join([*words, 'touch /run/copied', 'exec sleep infinity'])}".replace("$", "$$")
+
+
+def _as_written(source: str, folder: str) -> str:
+    """A path of the compiled test as it is in the application's compose file, relative to its ``folder``."""
+    if source.startswith(("/", "$", "~")):
+        return source
+    return f"./{posixpath.relpath(source, folder)}"
 
 
 def _word(flag: Flag) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dodo_dsl import package_data
+from dodo_dsl import package_data, source
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounted_folders import large_folders
 from dodo_dsl.check import world
@@ -21,6 +21,7 @@ from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.volumes import too_long
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -102,7 +103,12 @@ def build(
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
     of_copies = large_folders(application, [*deployment.registry, *deployment.services])
-    problems = [*of_copies, *itertools.chain.from_iterable(b.problems for b in builders)]
+    of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
+    problems = [
+        *of_copies,
+        *itertools.islice(of_volumes, 1),
+        *itertools.chain.from_iterable(b.problems for b in builders),
+    ]
     return Compiled(Suite(tuple(plans), deployment.gates), files), problems
 
 
@@ -119,6 +125,17 @@ def _in_repository(deployment: Deployment, out: Path) -> Callable[[Path], bool]:
 def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
     shared = {copy.target: copy.shared for copy in files if copy.shared}
     return replace(plan, shared=shared) if shared else plan
+
+
+def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
+    """A volume that the engine cannot make for a test, as its name has to tell tests apart."""
+    name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
+    if not name:
+        return None
+    node, first = application.rest.get("volumes"), next(iter(application.services.values())).span
+    span = node.entries[name].key if isinstance(node, source.Mapping) and name in node.entries else first
+    message = f"the name of the volume '{name}' is too long for the engine together with that of '{plan.slug}'"
+    return Diagnostic(span, "application-file", message, "shorten one of them: they may have 242 characters together")
 
 
 def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:
