@@ -109,11 +109,13 @@ def _first_of(group: Sequence[Diagnostic], suffix: str) -> Sequence[Diagnostic]:
 
 
 def closest(word: str, known: Iterable[str]) -> list[str]:
-    """The known words of the same parts in another order, such as ``virtual-camera`` for ``camera-virtual``.
+    """The known word in another case, or of the same parts in another order: ``virtual-camera``, ``camera-virtual``.
 
     Otherwise at most two that are spelt alike, the nearest first.
     """
     choices = sorted(known)
+    if same := [choice for choice in choices if choice.lower() == word.lower()]:
+        return same[:1]
     parts = sorted(_PARTS.split(word.lower()))
     turned = [choice for choice in choices if len(parts) > 1 and sorted(_PARTS.split(choice.lower())) == parts]
     return turned[:1] or difflib.get_close_matches(word.lower(), choices, n=2, cutoff=0.6)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application.compose_files import variables_of
+from dodo_dsl.application.host_access import is_true
 from dodo_dsl.application.model import EnvFile
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.source import Scalar
@@ -23,7 +24,7 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
         path = item.get("path") if isinstance(item, source.Mapping) else item
         required = item.get("required") if isinstance(item, source.Mapping) else None
         if isinstance(path, Scalar) and isinstance(path.value, str):
-            optional = isinstance(required, Scalar) and required.value is False
+            optional = isinstance(required, Scalar) and not is_true(required.value)
             yield EnvFile(path.text, path.span, not optional)
 
 

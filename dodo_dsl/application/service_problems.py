@@ -1,6 +1,7 @@
 """Problems of a service in a compose file: its name, commands, references, and what cannot be isolated."""
 
 import functools
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +16,8 @@ from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, o
 from dodo_dsl.source import Node
 
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
+
+_DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
 _LONGEST = 63
 """A service's name is also one in the test's network (RFC 1035)."""
@@ -139,6 +142,9 @@ def _volumes(written: Written) -> Iterator[Diagnostic]:
     """Named volumes that are not declared, which compose refuses; a test may set the variables of others."""
     known = written.around.volumes
     for item, volume in enumerate(written.plain.get("volumes") or ()):
+        if isinstance(volume, str) and _DRIVE.match(volume):
+            message = f"compose takes '{volume[:2]}' of '{volume}' for a drive of Windows, and mounts no volume"
+            yield _bad(place(written.node, ("volumes", item), written.key), message, "give the volume a longer name")
         name = host_access.named_volume(volume)
         if name and name not in known:
             steps = ("volumes", item, "source") if isinstance(volume, dict) else ("volumes", item)

@@ -25,7 +25,8 @@ class JobOptions:
 
     ``run_options`` are those of ``dodo run`` in each test, which a variable ``DODO_RUN_OPTIONS`` replaces. ``images``
     are those of the application that the parent has built, as lines ``DODO_IMAGE_<SERVICE>=<image>``. Where
-    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds``.
+    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds``. Jobs have large files ``from_repository``,
+    as they check it out, or else from the artifact of the parent, which may have ``artifact_mb`` MB; 0 for any number.
     """
 
     tags: tuple[str, ...] = DEFAULT_TAGS
@@ -37,6 +38,8 @@ class JobOptions:
     services: tuple[str | Mapping[str, Any], ...] = ()
     before_script: str = ""
     artifacts_access: str = ""
+    from_repository: bool = False
+    artifact_mb: int = 0
 
     @property
     def backend(self) -> str:

@@ -130,7 +130,7 @@ BUILD: Rows = {
     "entitlements": ("refused", "a build with them reaches the host"),
     "extra_hosts": ("kept", "names of addresses"),
     "isolation": ("removed", "it is for Windows"),
-    "labels": ("kept", "labels of the image"),
+    "labels": ("removed", "programs of the host act on them"),
     "network": ("kept", "default and none only"),
     "no_cache": ("kept", "builds anew"),
     "no_cache_filter": ("kept", "builds stages anew"),
@@ -156,7 +156,32 @@ MOUNT: Rows = {
     "target": ("kept", "a path in the container"),
     "tmpfs": ("rewritten", "the memory of `sandbox` at most"),
     "type": ("kept", "bind, volume, tmpfs and image only"),
-    "volume": ("kept", "options of a volume"),
+    "volume": ("rewritten", "see the options of a volume"),
+}
+
+DEPLOY: Rows = {
+    "endpoint_mode": ("removed", "each test has a network of its own"),
+    "labels": ("removed", "programs of the host act on them"),
+    "mode": ("removed", "each service runs once"),
+    "placement": ("removed", "a test runs on one machine"),
+    "replicas": ("removed", "each service runs once"),
+    "resources": ("rewritten", "within the limits"),
+    "restart_policy": ("removed", "containers are not restarted"),
+    "rollback_config": ("removed", "each service runs once"),
+    "update_config": ("removed", "each service runs once"),
+}
+
+RESERVATIONS: Rows = {
+    "cpus": ("kept", "compose ignores it"),
+    "devices": ("kept", "graphics processors; no other devices (CDI)"),
+    "generic_resources": ("removed", "they are for a swarm"),
+    "memory": ("removed", "a test has limits only"),
+}
+
+MOUNTED_VOLUME: Rows = {
+    "labels": ("removed", "programs of the host act on them"),
+    "nocopy": ("kept", "what an image has there"),
+    "subpath": ("kept", "a folder of the volume"),
 }
 
 VOLUME: Rows = {
@@ -196,11 +221,23 @@ CONFIG: Rows = {
     **{key: SECRET[key] for key in ("environment", "external", "file", "labels", "name", "template_driver")},
 }
 
+BELOW: dict[str, Rows] = {
+    "build": BUILD,
+    "deploy": DEPLOY,
+    "deploy.resources.reservations": RESERVATIONS,
+    "volumes.*": MOUNT,
+    "volumes.*.volume": MOUNTED_VOLUME,
+}
+"""The tables of mappings below a service, by their paths; ``*`` is an item of a list."""
+
 TABLES = {
     "the whole file": TOP,
     "a service": SERVICE,
     "`build`": BUILD,
+    "`deploy`": DEPLOY,
+    "`deploy.resources.reservations`": RESERVATIONS,
     "a mount (`volumes` of a service)": MOUNT,
+    "options of a volume (`volume` of a mount)": MOUNTED_VOLUME,
     "a volume": VOLUME,
     "a network": NETWORK,
     "a secret": SECRET,

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
-from dodo_dsl.application.access.model import AccessFinding, Steps
+from dodo_dsl.application.access.compose_keys import BELOW
+from dodo_dsl.application.access.model import AccessFinding, Steps, key_findings
 from dodo_dsl.diagnostics import did_you_mean, only_fix
 
 _FILE = "source target uid gid mode"
@@ -22,12 +23,10 @@ _KEYS = {
     "configs.*": _FILE,
     "credential_spec": "config file registry",
     "depends_on.*": "condition restart required",
-    "deploy": "mode endpoint_mode replicas labels rollback_config update_config resources restart_policy placement",
     "deploy.placement": "constraints preferences max_replicas_per_node",
     "deploy.placement.preferences.*": "spread",
     "deploy.resources": "limits reservations",
     "deploy.resources.limits": "cpus memory pids",
-    "deploy.resources.reservations": "cpus memory generic_resources devices",
     "deploy.resources.reservations.devices.*": _DEVICE,
     "deploy.resources.reservations.generic_resources.*": "discrete_resource_spec",
     "deploy.resources.reservations.generic_resources.*.discrete_resource_spec": "kind value",
@@ -47,18 +46,25 @@ _KEYS = {
     "volumes.*.bind": "propagation create_host_path recursive selinux",
     "volumes.*.image": "subpath",
     "volumes.*.tmpfs": "size mode",
-    "volumes.*.volume": "labels nocopy subpath",
 }
-NESTED = {path: tuple(keys.split()) for path, keys in _KEYS.items()}
+_ELSEWHERE = ("build", "volumes.*")
+"""Mappings that are judged with what they hold."""
+NESTED = {path: tuple(keys.split()) for path, keys in _KEYS.items()} | {
+    path: tuple(rows) for path, rows in BELOW.items() if path not in _ELSEWHERE
+}
 """The keys of each mapping in a service by its path; ``*`` is an item of a list, or a name."""
 
 
-def nested_findings(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
-    """Unknown keys below those of a service, which messages call ``name``."""
+def nested_findings(name: str, service: dict[str, Any], compiled: bool = False) -> Iterator[AccessFinding]:
+    """Unknown keys below those of a service, which messages call ``name``.
+
+    Of a ``compiled`` one compose shows those of ``blkio_config`` in capitals.
+    """
     for path, known in NESTED.items():
-        for steps, value in _found(service, path.split(".")):
+        for steps, value in mappings(service, path):
             for key in value:
-                if str(key) not in known and not str(key).startswith("x-"):
+                seen = str(key).lower() if compiled and path.startswith("blkio_config.") else str(key)
+                if seen not in known and not str(key).startswith("x-"):
                     hint, fix = did_you_mean(str(key), known), only_fix(str(key), known, value)
                     place = ".".join(str(step) for step in steps if isinstance(step, str))
                     yield AccessFinding(
@@ -66,8 +72,21 @@ def nested_findings(name: str, service: dict[str, Any]) -> Iterator[AccessFindin
                     )
 
 
-def _found(value: Any, path: list[str], steps: Steps = ()) -> Iterator[tuple[Steps, dict[str, Any]]]:
+def removed_findings(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
+    """Keys below those of a compiled service that no copy has."""
+    for path, rows in BELOW.items():
+        for steps, value in mappings(service, path):
+            known = {key: about for key, about in value.items() if key in rows}
+            what = f"'{path.removesuffix('.*')}' of '{name}'"
+            yield from (f.below(*steps) for f in key_findings(what, rows, known, compiled=True))
+
+
+def mappings(service: dict[str, Any], path: str) -> Iterator[tuple[Steps, dict[str, Any]]]:
     """The mappings at a path, with the steps that lead to them."""
+    yield from _found(service, path.split("."))
+
+
+def _found(value: Any, path: list[str], steps: Steps = ()) -> Iterator[tuple[Steps, dict[str, Any]]]:
     if not path:
         if isinstance(value, dict):
             yield steps, value

@@ -13,7 +13,7 @@ from dodo_dsl.application.access.host_paths import ASK, HostPaths
 from dodo_dsl.application.access.limit_findings import limit_findings
 from dodo_dsl.application.access.model import AccessFinding, Steps, key_findings
 from dodo_dsl.application.access.mount_findings import mount_findings
-from dodo_dsl.application.access.nested_keys import nested_findings
+from dodo_dsl.application.access.nested_keys import nested_findings, removed_findings
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 PROFILE_HINT = "give the service a profile, so that it starts with 'docker compose --profile' and not in a test"
@@ -45,7 +45,8 @@ class Surroundings:
 def service_findings(name: str, service: dict[str, Any], around: Surroundings) -> Iterator[AccessFinding]:
     """Everything that ``service`` may not have; ``name`` is how messages call it."""
     yield from key_findings(f"'{name}'", _WITHOUT_SPECIAL, service, around.compiled)
-    yield from nested_findings(name, service)
+    yield from nested_findings(name, service, around.compiled)
+    yield from removed_findings(name, service) if around.compiled else ()
     yield from _namespaces(service, around)
     yield from mount_findings(name, service, around.paths, around.volumes, around.ports, around.compiled)
     yield from _strangers(service, around)

@@ -28,8 +28,13 @@ _OPTIONS = "use a tmpfs (type: tmpfs), or a folder of the repository (o: bind)"
 _OF_SERVICES = ("image", "build", "command", "x-dodo", "x-dodo-process")
 
 
-def shared_findings(document: Mapping[str, Any], paths: HostPaths, passed: Collection[str]) -> Iterator[AccessFinding]:
-    """Everything beside the services, in a mapping of the file's other keys."""
+def shared_findings(
+    document: Mapping[str, Any], paths: HostPaths, passed: Collection[str], compiled: bool = False
+) -> Iterator[AccessFinding]:
+    """Everything beside the services, in a mapping of the file's other keys; in a ``compiled`` test compose names all.
+
+    Its network is DoDo's.
+    """
     for finding in key_findings("the compose file", TOP, document):
         about = document.get(str(finding.steps[0])) if finding.kind == "unknown" else None
         is_service = isinstance(about, dict) and any(key in about for key in _OF_SERVICES)
@@ -38,7 +43,9 @@ def shared_findings(document: Mapping[str, Any], paths: HostPaths, passed: Colle
         entries = document.get(key)
         for name, about in entries.items() if isinstance(entries, dict) else ():
             if isinstance(about, dict):
-                yield from (f.below(key, name) for f in key_findings(f"{what} '{name}'", rows, about))
+                seen = {word: value for word, value in about.items() if word != "name"} if compiled else about
+                is_judged = compiled and key != "networks" and name not in OWN_VOLUMES
+                yield from (f.below(key, name) for f in key_findings(f"{what} '{name}'", rows, seen, is_judged))
                 yield from (f.below(key, name) for f in _values(key, name, about, paths, passed))
 
 

@@ -32,6 +32,7 @@ EXAMPLES = """examples:
   dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
   dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
   dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
+  dodo compile --files repository          its jobs take recordings from their checkout, and not from an artifact
 """
 
 

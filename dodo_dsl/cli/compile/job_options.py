@@ -17,6 +17,9 @@ _ACCESS = ("all", "developer", "none")
 _NOTHING = ":"
 """The shell's command that does nothing, which a template has where no commands are given."""
 _RUBY_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
+ARTIFACT, REPOSITORY = "artifact", "repository"
+ARTIFACT_MB = 100
+"""What an artifact may have by default in a GitLab of one's own."""
 _IMAGE = re.compile(r"DODO_IMAGE_[A-Z0-9_]+=[A-Za-z0-9_.:/@-]+")
 
 
@@ -41,6 +44,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--images", type=Path, metavar="FILE",
                         help="lines DODO_IMAGE_<SERVICE>=IMAGE of the application's images that were built: tests run "
                         "in containers of them")  # fmt: skip
+    parser.add_argument("--files", choices=(ARTIFACT, REPOSITORY), default=ARTIFACT,
+                        help="where jobs have files of 1 MB and more from: the artifact of this command's output, or "
+                        "the repository, Git LFS included, which they check out (default: artifact)")  # fmt: skip
+    parser.add_argument("--artifact-limit", type=positive, default=ARTIFACT_MB, metavar="MB",
+                        help="warn when the files of all tests are larger (default: %(default)d, as GitLab's "
+                        "own)")  # fmt: skip
 
 
 def job_options(options: argparse.Namespace) -> JobOptions:
@@ -56,6 +65,8 @@ def job_options(options: argparse.Namespace) -> JobOptions:
         services=options.services,
         before_script="" if before == _NOTHING else before,
         artifacts_access="" if options.artifacts_access == "all" else options.artifacts_access,
+        from_repository=options.files == REPOSITORY,
+        artifact_mb=options.artifact_limit,
     )
     return replace(made, seconds=_seconds(options.times)) if options.jobs or options.forecast else made
 

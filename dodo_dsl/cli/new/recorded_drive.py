@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.rules import memories
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
 from dodo_dsl.cli.new.new_file import New, filled
 from dodo_dsl.cli.new.scaffold import spec_files
@@ -39,6 +41,8 @@ DEFAULT_GAP_S = 1
 """Longer gaps are shortened by the player unless it is told otherwise, but not in a target."""
 LARGEST_BYTES = 200 << 20
 _START_UP_S = 10
+_MEMORIES = ("video0.argb", "video0.i420")
+"""In which rec-replay shows pictures by default."""
 _PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
 
 
@@ -147,6 +151,16 @@ def files(name: str, path: Path, drive: Drive, registry: Path, root: Path) -> tu
         share_of_distance=SHARE_OF_DISTANCE,
     )
     return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)
+
+
+def unpassable(path: Path, drive: Drive, application: ApplicationSource | None) -> str:
+    """A warning where services of the application read pictures, of which the recording has none."""
+    readers = [] if drive.cameras or application is None else memories.readers(application, _MEMORIES)
+    if not readers:
+        return ""
+    named = " and ".join(f"'{name}'" for name in readers)
+    waits = "waits" if len(readers) == 1 else "wait"
+    return f"warning: {named} of the application {waits} for pictures, and '{path.name}' has none: it cannot pass\n"
 
 
 def _quoted(text: str) -> str:

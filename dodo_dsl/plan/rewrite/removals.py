@@ -5,48 +5,43 @@ from typing import Any
 
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access import rig_ports
-from dodo_dsl.application.access.compose_keys import BUILD, SERVICE, removed
+from dodo_dsl.application.access.compose_keys import BELOW, SERVICE, removed
+from dodo_dsl.application.access.nested_keys import mappings
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 _REMOVED = {key: why for key, why in removed(SERVICE).items() if key != "scale"}
-_DEPLOY = ("labels", "replicas", "mode", "restart_policy", "placement", "update_config", "rollback_config")
+_REFUSED = [key for key, (treatment, _) in SERVICE.items() if treatment == "refused"]
+"""Keys that a copy has only where they ask for nothing."""
 
 
 def remove_machine_settings(copy: ServiceCopy) -> None:
     """Removes names, ports and policies; each service of a test runs once."""
     for key, why in _REMOVED.items():
         copy.remove(key, why)
-    build = copy.service.get("build")
-    if isinstance(build, dict):
-        own = [key for key in build if key.startswith("x-")]  # builders take x-bake for theirs
-        _remove_from_build(copy, build, (*removed(BUILD), *own))
+    for key in _REFUSED:
+        copy.remove(key, "it asks for nothing")
+    _note_replicas(copy)
+    for path, rows in BELOW.items():
+        for _, below in list(mappings(copy.service, path)):
+            own = [key for key in below if key.startswith("x-")] if path == "build" else []  # builders take x-bake
+            _remove_below(copy, path, below, (*removed(rows), *own))
+    if not copy.service.get("deploy", True):
+        copy.service.pop("deploy")
+
+
+def _note_replicas(copy: ServiceCopy) -> None:
     scale, deploy = copy.service.pop("scale", None), copy.service.get("deploy")
-    if isinstance(deploy, dict):
-        scale = deploy.get("replicas", scale)
-        kept = {key: value for key, value in deploy.items() if key not in _DEPLOY}
-        if len(kept) < len(deploy):
-            copy.note("deploy keeps only resources")
-        copy.service["deploy"] = kept
-        _remove_reserved_memory(copy, kept)
-        if not kept:
-            copy.service.pop("deploy")
-    if scale not in (None, 1):
+    scale = deploy.get("replicas", scale) if isinstance(deploy, dict) else scale
+    if str(scale) not in ("None", "1"):
         copy.note(f"starts once, not {scale} times")
 
 
-def _remove_reserved_memory(copy: ServiceCopy, deploy: dict[str, Any]) -> None:
-    """The engine refuses one above the limit, which a test sets."""
-    resources = deploy.get("resources")
-    reserved = resources.get("reservations") if isinstance(resources, dict) else None
-    if isinstance(reserved, dict) and reserved.pop("memory", None) is not None:
-        copy.note("reserved memory removed, a test has limits only")
-
-
-def _remove_from_build(copy: ServiceCopy, build: dict[str, Any], keys: Collection[str]) -> None:
-    taken = [key for key in build if key in keys]
+def _remove_below(copy: ServiceCopy, path: str, mapping: dict[str, Any], keys: Collection[str]) -> None:
+    taken = [key for key in mapping if key in keys]
+    for key in taken:
+        del mapping[key]
     if taken:
-        copy.service["build"] = {key: value for key, value in build.items() if key not in keys}
-        copy.note(f"{', '.join(taken)} removed from build")
+        copy.note(f"{', '.join(taken)} removed from {path.removesuffix('.*')}")
 
 
 def remove_hardware(copy: ServiceCopy) -> None:
@@ -60,7 +55,7 @@ def remove_hardware(copy: ServiceCopy) -> None:
         _remove_unconfined(copy)
         build = service.get("build")
         if isinstance(build, dict):
-            _remove_from_build(copy, build, ("privileged",))
+            _remove_below(copy, "build", build, ("privileged",))
     _remove_ports(copy)
     if setting.hil:
         return

@@ -203,7 +203,8 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     wanted = error.validator_value
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
-    message = f"{place.name} {found}, expected {' or '.join(names)}"
+    expected = error.schema.get("x-expect") if "boolean" in wanted else ""
+    message = f"{place.name} {found}, expected {expected or ' or '.join(names)}"
     hint, fix = error.schema.get(_HINT) or _of_file(place) or _in_quotes(error, place), None
     if not hint and wanted == "array" and "examples" in error.schema:
         hint = f"write for example {place.name[1:-1]}: {_in_line(error.schema['examples'][0])}"
@@ -240,6 +241,9 @@ def _meant(value: object, wanted: object, place: _Place) -> tuple[str, Fix | Non
     """A hint how to write a value of another type, and the only fix; empty and None for most values."""
     if wanted == "boolean" and isinstance(value, str):
         return boolean_meant(value)
+    if isinstance(wanted, list) and "boolean" in wanted and value in (0, 1):
+        meant = "true" if value else "false"
+        return f"write {meant}; compose takes no number here", Fix(str(value), meant)
     if wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
         return (f"write {value}, without quotation marks" if place.fits(int(value)) else ""), None
     names = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []

@@ -1,33 +1,35 @@
 """The tables of compose's keys have every key of its schema and no other, and their page is up to date."""
 
 from pathlib import Path
-from typing import Any
 
-import check_jsonschema
-import orjson
 import pytest
 
 from dodo_dsl.application.access import compose_keys
 from tests.application.access import keys_page
+from tests.application.access.compose_forms import schema
 
-VENDORED = Path(check_jsonschema.__file__).parent / "builtin_schemas" / "vendor" / "compose-spec.json"
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "compose-keys.md"
-
-
-def schema() -> dict[str, Any]:
-    read: dict[str, Any] = orjson.loads(VENDORED.read_bytes())
-    return read
 
 
 def keys(*names: str) -> set[str]:
     return {key for name in names for key in schema()["$defs"][name]["properties"]}
 
 
-def of_object(definition: str, key: str) -> set[str]:
-    """The keys of the long form of a value."""
+def below(definition: str, *steps: str) -> set[str]:
+    """The keys of a mapping within a definition."""
+    about = schema()["$defs"][definition]
+    for step in steps:
+        about = about["properties"][step]
+    return set(about["properties"])
+
+
+def of_object(definition: str, key: str, *steps: str) -> set[str]:
+    """The keys of the long form of a value, or of a mapping in it."""
     about = schema()["$defs"][definition]["properties"][key]
-    forms = about.get("oneOf") or about["items"]["oneOf"]
-    return {name for form in forms for name in form.get("properties", ())}
+    (form,) = (form for form in about.get("oneOf") or about["items"]["oneOf"] if "properties" in form)
+    for step in steps:
+        form = form["properties"][step]
+    return set(form["properties"])
 
 
 @pytest.mark.parametrize(
@@ -36,7 +38,10 @@ def of_object(definition: str, key: str) -> set[str]:
         (compose_keys.TOP, set(schema()["properties"])),
         (compose_keys.SERVICE, keys("service", "container_spec", "workload_spec")),
         (compose_keys.BUILD, of_object("workload_spec", "build")),
+        (compose_keys.DEPLOY, keys("deployment")),
+        (compose_keys.RESERVATIONS, below("deployment", "resources", "reservations")),
         (compose_keys.MOUNT, of_object("container_spec", "volumes")),
+        (compose_keys.MOUNTED_VOLUME, of_object("container_spec", "volumes", "volume")),
         (compose_keys.VOLUME, keys("volume")),
         (compose_keys.NETWORK, keys("network")),
         (compose_keys.SECRET, keys("secret")),

@@ -11,7 +11,7 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.access.nested_keys import NESTED
 from dodo_dsl.application.read import read_application
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from tests.application.access.test_compose_keys import schema
+from tests.application.access.compose_forms import schema
 
 ELSEWHERE = ("build", "volumes.*")
 """Mappings whose keys have a table of their own."""

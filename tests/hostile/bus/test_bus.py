@@ -2,6 +2,8 @@
 
 import re
 import shutil
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +26,18 @@ def named(attack: BusAttack) -> str:
     return f"{attack.name}-{attack.test.partition('--')[0]}"
 
 
-def chosen(clock: str, isolation: str) -> list[BusAttack]:
-    return sorted((each for each in ATTACKS if (each.clock, each.isolation) == (clock, isolation)), key=named)
+def chosen(clock: str, isolation: str, long: bool | None = None) -> list[BusAttack]:
+    """Attacks of both forms, or of the ``long`` or the short one, by their names."""
+    found = (each for each in ATTACKS if (each.clock, each.isolation) == (clock, isolation))
+    return sorted((each for each in found if long in (None, each.long)), key=named)
 
 
-LOCKSTEP, REALTIME = (chosen(clock, "network") for clock in ("lockstep", "realtime"))
-ON_THE_HOST = [
-    pytest.param(each, id=f"{each.name}-{each.clock}", marks=getattr(pytest.mark, mark))
-    for clock, mark in (("lockstep", "slow"), ("realtime", "realtime"))
-    for each in chosen(clock, "host")
-]
+def parameters(clock: str, isolation: str) -> list[Any]:
+    """Attacks, of which the long form is for ``make proof``."""
+    return [
+        pytest.param(each, id=f"{named(each)}-{clock}", marks=[pytest.mark.proof] if each.long else [])
+        for each in chosen(clock, isolation)
+    ]
 
 
 def attacked(folder: Path, attacks: list[BusAttack], isolation: str = "network") -> dict[str, dict[str, Any]]:
@@ -71,33 +75,45 @@ def check(test: dict[str, Any], attack: BusAttack) -> None:
     assert {name for name in test["heard"] if not name.startswith(CAR)} <= DODO_S_OWN, "the application hears the world"
 
 
-@pytest.fixture(scope="module")
-def lockstep(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    return attacked(tmp_path_factory.mktemp("lockstep"), LOCKSTEP)
+Found = Callable[[BusAttack], dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def realtime(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    return attacked(tmp_path_factory.mktemp("realtime"), REALTIME)
+def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
+    """What became of an attack, in one run with all others of its clock and form."""
+
+    @cache
+    def run(clock: str, long: bool) -> dict[str, dict[str, Any]]:
+        return attacked(tmp_path_factory.mktemp(clock), chosen(clock, "network", long))
+
+    return lambda attack: run(attack.clock, attack.long)[named(attack)]
 
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("bus-lockstep")
-@pytest.mark.parametrize("attack", LOCKSTEP, ids=named)
-def test_it_does_not_get_through(lockstep: dict[str, dict[str, Any]], attack: BusAttack) -> None:
+@pytest.mark.parametrize("attack", parameters("lockstep", "network"))
+def test_it_does_not_get_through(found: Found, attack: BusAttack) -> None:
     """An application that sends what only services may send does not decide its test."""
-    check(lockstep[named(attack)], attack)
+    check(found(attack), attack)
 
 
 @pytest.mark.realtime
 @pytest.mark.xdist_group("bus-realtime")
-@pytest.mark.parametrize("attack", REALTIME, ids=named)
-def test_nor_in_real_time(realtime: dict[str, dict[str, Any]], attack: BusAttack) -> None:
+@pytest.mark.parametrize("attack", parameters("realtime", "network"))
+def test_nor_in_real_time(found: Found, attack: BusAttack) -> None:
     """The same in real time, where the attack races what the services send."""
-    check(realtime[named(attack)], attack)
+    check(found(attack), attack)
 
 
-@pytest.mark.parametrize("attack", ON_THE_HOST)
+@pytest.mark.slow
+@pytest.mark.parametrize("attack", parameters("lockstep", "host"))
 def test_nor_on_the_host(tmp_path: Path, attack: BusAttack) -> None:
     """The same on the host, with the leases of this user, which keep it apart from other tests there."""
+    check(attacked(tmp_path, [attack], "host")[named(attack)], attack)
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("attack", parameters("realtime", "host"))
+def test_nor_on_the_host_in_real_time(tmp_path: Path, attack: BusAttack) -> None:
+    """The same on the host in real time."""
     check(attacked(tmp_path, [attack], "host")[named(attack)], attack)

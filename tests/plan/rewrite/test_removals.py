@@ -28,15 +28,25 @@ def test_names_ports_and_policies() -> None:
         (
             {"scale": 3, "deploy": {"replicas": 2, "resources": {}}},
             {"deploy": {"resources": {}}},
-            ["a: deploy keeps only resources", "a: starts once, not 2 times"],
+            ["a: starts once, not 2 times", "a: replicas removed from deploy"],
         ),
-        ({"deploy": {"mode": "global"}}, {}, ["a: deploy keeps only resources"]),
+        ({"deploy": {"mode": "global", "endpoint_mode": "vip"}}, {}, ["a: mode, endpoint_mode removed from deploy"]),
         (
             {"deploy": {"resources": {"reservations": {"memory": "8g", "cpus": "1"}}}},
             {"deploy": {"resources": {"reservations": {"cpus": "1"}}}},
-            ["a: reserved memory removed, a test has limits only"],
+            ["a: memory removed from deploy.resources.reservations"],
         ),
-        ({"deploy": {"labels": ["x"]}}, {}, ["a: deploy keeps only resources"]),
+        ({"deploy": {"labels": ["x"]}}, {}, ["a: labels removed from deploy"]),
+        (
+            {"volumes": [{"type": "volume", "target": "/v", "volume": {"labels": ["x"], "nocopy": True}}]},
+            {"volumes": [{"type": "volume", "target": "/v", "volume": {"nocopy": True}}]},
+            ["a: labels removed from volumes.*.volume"],
+        ),
+        (
+            {"build": {"context": ".", "labels": ["x"], "tags": ["y"], "x-bake": {}}},
+            {"build": {"context": "."}},
+            ["a: labels, tags, x-bake removed from build"],
+        ),
     ],
 )
 def test_each_service_runs_once(service: dict[str, Any], changed: dict[str, Any], notes: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""The pictures of the documentation show today's pages: `.venv/bin/python scripts/make-pictures` draws them again."""
+"""The pictures of the documentation show today's pages: `scripts/make-pictures` draws them again."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from tests.report.documented import pages, palette
 from tests.report.documented.likeness import MOST_UNLIKE, Picture, unlike
 from tests.report.viewer.chromium import Chromium
 
-DRAW = "stale: .venv/bin/python scripts/make-pictures draws it again"
+DRAW = "stale: scripts/make-pictures draws it again"
 
 
 def read(name: str) -> Picture:

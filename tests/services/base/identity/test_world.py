@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import RealTimeClock
 from services.base.identity.members import Members
 from services.base.identity.senders import SenderTable
-from services.base.identity.world import TOLD, VARIABLE, World
+from services.base.identity.world import TOLD, TRUTH, VARIABLE, World
 from services.base.loop import Loop
 from services.base.service import Output, Service
 
@@ -30,6 +30,16 @@ class Teller(Service):
     def update(self, now: int) -> list[Output]:
         self.finished = True
         return [Output(MESSAGES.type(name)(), 0) for name in (FRAME, STATE, READING)]
+
+
+class Relaying(RealTimeClock):
+    """Counts what the clock of a test in lockstep would pass on."""
+
+    relays = True
+    count = 0
+
+    def sent(self, _frame: bytes) -> None:
+        self.count += 1
 
 
 @pytest.fixture
@@ -88,6 +98,28 @@ def test_what_it_declares_it_is_told(enter: Join, application: Session, monkeypa
     tell(*pose)
     assert sorted(taken(*track)) == sorted([FRAME, STATE, READING, "dodo.EndOfInput"])
     assert taken(application) == [FRAME, READING]
+
+
+def test_truth_it_is_never_told(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither late nor where it declares that, as it is judged by it."""
+    monkeypatch.setenv(TRUTH, f"{READING}/0")
+    monkeypatch.setenv(TOLD, f"{READING}/0")
+    pose, track = enter("pose"), enter("track")
+    taken(*pose), taken(*track)
+    tell(*pose)
+    assert taken(*track) == [FRAME, STATE, READING, "dodo.EndOfInput"]
+    assert taken(application) == []
+
+
+@pytest.mark.parametrize("truth", ["", f"{READING}/0"])
+def test_in_lockstep_the_clock_gets_everything(cid: int, monkeypatch: pytest.MonkeyPatch, truth: str) -> None:
+    monkeypatch.setenv(VARIABLE, "pose")
+    monkeypatch.setenv(TRUTH, truth)
+    clock = Relaying()
+    with Session(cid) as session, Session(cid) as listener:
+        Loop("pose", Teller(), session, clock, 0).run(lambda: False)
+        assert taken(listener) == ([] if truth else [READING])
+    assert clock.count == 4
 
 
 def test_outside_of_a_test_the_bus_carries_everything(application: Session, cid: int) -> None:
