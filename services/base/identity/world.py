@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
+from dodo_dsl.opendlv.bus.address import is_of_the_world
 from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.world import is_of_the_world
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 VARIABLE = "DODO_WORLD"

@@ -76,6 +76,6 @@ ATTACKS = (
     BusAttack("easy", SIGNAL, "realtime", "", long=True),
     BusAttack("finish", STRAIGHT, "lockstep", only(FRAME, "pose"), "host"),
     BusAttack("finish", STRAIGHT, "realtime", only(FRAME, "pose"), "host", long=True),
-    BusAttack("spy", STRAIGHT, "lockstep", WALL, "host", long=True),
-    BusAttack("spy", STRAIGHT, "realtime", WALL, "host"),
+    BusAttack("spy", STRAIGHT, "lockstep", WALL, "host"),
+    BusAttack("spy", STRAIGHT, "realtime", WALL, "host", long=True),
 )

@@ -170,6 +170,30 @@ def test_who_has_left_or_is_unknown_hears_nothing(enter: Join, application: Sess
     assert [taken(*each) for each in (track, stranger, forger)] == [[FRAME], [], []]
 
 
+def test_addresses_are_said_on_the_bus_only_to_whom_nobody_knows(enter: Join, application: Session) -> None:
+    """The application starts when all know one another, and hears nothing of that."""
+    pose = enter("pose")
+    assert taken_whole(application) == ["dodo.Sender"]
+    track = enter("track")
+    assert taken_whole(application) == ["dodo.Sender"]
+    taken(*pose), taken(*track), taken(*pose)
+    pose[1].send(frame())
+    assert taken(*track) == [FRAME]
+    track[1].leave()
+    taken(*pose)
+    pose[1].send(frame())
+    assert taken(*track) == []
+    assert taken_whole(application) == []
+
+
+def taken_whole(session: Session) -> list[str]:
+    """Names of all that comes."""
+    names = []
+    while (envelope := session.receive(0.0)) is not None:
+        names.append(session.messages.name(envelope.data_type) or "")
+    return names
+
+
 def test_who_is_missing_is_asked_for_again(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     """As what it said may be lost."""
     pose, track = enter("pose"), enter("track")
