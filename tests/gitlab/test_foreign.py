@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
-from tests.gitlab.inputs import TEMPLATES
+from dodo_dsl.cli.compile.pipeline_rules import KINDS
+from tests.gitlab.inputs import TEMPLATES, included, listed, merged
 from tests.gitlab.test_local import PROGRAMS, commit, pipeline, run
+from tests.gitlab.test_rules import FOREIGN, foreign
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +41,6 @@ make: {stage: build, script: [make]}
 MONOREPO = """\
 stages: [test, tools]
 tools: {stage: tools, script: [make], rules: [{changes: [tools/**/*]}]}
-variables: {DODO_COMPOSE_FILE: robots/kiwi/docker-compose.yml}
 """
 COMPONENTS = """\
   - component: $CI_SERVER_FQDN/$CI_PROJECT_PATH/deployment@$CI_COMMIT_SHA
@@ -49,6 +51,10 @@ COMPONENTS = """\
 INPUTS = """\
   - local: .gitlab/dodo/application.gitlab-ci.yml
     inputs: {stage: verify}
+"""
+ROBOT = """\
+  - local: .gitlab/dodo/application.gitlab-ci.yml
+    inputs: {compose-file: robots/kiwi/docker-compose.yml}
 """
 NO_IMAGES = """\
   - local: .gitlab/dodo/application.gitlab-ci.yml
@@ -74,7 +80,7 @@ CASES: dict[str, tuple[str, str, Jobs, Jobs, str]] = {
     "a stage by an input": (INPUTS, OWN_STAGE, {"make": "build"}, {**COMMON, **IMAGES}, "verify"),
     "components with inputs": (COMPONENTS, OWN_STAGE, {"make": "build"}, {**COMMON, **IMAGES}, "verify"),
     "processes alone": (NO_IMAGES, LINT, {"lint": "test"}, {**COMMON, "compile": ""}, "test"),
-    "a monorepo": (APPLICATION, MONOREPO, {}, {**COMMON, **IMAGES}, "test"),
+    "a monorepo": (ROBOT, MONOREPO, {}, {**COMMON, **IMAGES}, "test"),
 }
 
 
@@ -91,11 +97,12 @@ def repository(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def jobs(folder: Path) -> dict[str, dict[str, Any]]:
-    """The jobs of a merge request's pipeline that would run, by name."""
+def jobs(folder: Path, **variables: str) -> dict[str, dict[str, Any]]:
+    """The jobs that would run in a pipeline with these variables, by name."""
     commit(folder)
     run(folder, "git", "update-ref", "refs/remotes/origin/main", "HEAD")
-    result = pipeline(folder, "--list-json", "--variable", "CI_PIPELINE_SOURCE=merge_request_event")
+    words = [word for name, value in variables.items() for word in ("--variable", f"{name}={value}")]
+    result = pipeline(folder, "--list-json", *words)
     assert result.returncode == 0, result.stdout + result.stderr
     listed = json.loads(result.stdout[result.stdout.index("[\n") :])
     return {job["name"]: job for job in listed if job["when"] != "never"}
@@ -105,7 +112,7 @@ def jobs(folder: Path) -> dict[str, dict[str, Any]]:
 def test_the_jobs_are_there_and_foreign_ones_stay(case: str, repository: Path) -> None:
     includes, text, foreign, expected, stage = CASES[case]
     (repository / ".gitlab-ci.yml").write_text(f"include:\n{includes}{text}")
-    found = jobs(repository)
+    found = jobs(repository, CI_PIPELINE_SOURCE="merge_request_event")
     assert {name: job["stage"] for name, job in found.items()} == {**foreign, **dict.fromkeys(expected, stage)}
     needs = {name: ",".join(need["job"] for need in found[name]["needs"] if need["job"] in found) for name in expected}
     assert needs == expected
@@ -115,3 +122,34 @@ def test_gitlab_accepts_them(tmp_path: Path, accepted: Callable[..., None]) -> N
     for name, (includes, text, *_) in CASES.items():
         (tmp_path / f"{name}.yml").write_text(f"include:\n{includes}{text}")
     accepted(*tmp_path.iterdir())
+
+
+SHORT = [("nightly", "schedule"), ("pre-post", "merge request"), ("multi-project", "another project's pipeline")]
+OTHERS = [(name, kind) for name in FOREIGN for kind in KINDS if (name, kind) not in SHORT]
+UNREAD = "include:\n  - template: Workflows/MergeRequest-Pipelines.gitlab-ci.yml\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [*SHORT, *(pytest.param(*other, marks=pytest.mark.proof) for other in OTHERS)]
+)
+def test_gitlab_ci_local_reads_rules_alike(name: str, kind: str, repository: Path) -> None:
+    """It makes all pipelines, and adds a job without rules to each, as GitLab does with such a workflow as here.
+
+    Jobs with ``only`` or ``except`` are left out, as it adds them to each pipeline, too, and so are those with
+    ``changes``, of which there are none here.
+    """
+    config, inputs = foreign(name)
+    inputs = {"rules": "merge-requests", **inputs}
+    given = {key.replace("_", "-"): value for key, value in inputs.items()}
+    templates = [f".gitlab/dodo/{template.parent.name}.gitlab-ci.yml" for template in TEMPLATES]
+    include = yaml.safe_dump({"include": [{"local": local, "inputs": given} for local in templates]})
+    text = FOREIGN[name].read_text().replace(UNREAD, "")
+    (repository / ".gitlab-ci.yml").write_text(f"{include}{text}")
+    around = {**config, "workflow": {"rules": [{"when": "always"}]}}
+    expected = listed(merged(*(included(template, **inputs) for template in TEMPLATES), around), KINDS[kind])
+    found = {job.partition(":")[0] for job in jobs(repository, **{"CI_COMMIT_BRANCH": "", **KINDS[kind]})}
+    jobs_of_theirs = {job: value for job, value in config.items() if isinstance(value, dict)}
+    unread = {
+        job for job, value in jobs_of_theirs.items() if {"only", "except"} & value.keys() or "changes" in str(value)
+    }
+    assert found - unread == expected - unread

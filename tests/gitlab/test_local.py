@@ -25,10 +25,19 @@ PROGRAMS = CACHE / "dodo/gitlab-ci-local/node_modules/.bin"
 FOREIGN = """\
 include:
   - local: .gitlab/dodo/application.gitlab-ci.yml
+    inputs:
+      compose-file: kiwi/docker-compose.yml
+      needs: [configure]
+      before-script: echo "before $CI_JOB_NAME"
+      variables: [DODO_RUN_OPTIONS, DODO_REGISTRY]
   - local: .gitlab/dodo/deployment.gitlab-ci.yml
+    inputs:
+      needs: [configure]
+      before-script: echo "before $CI_JOB_NAME"
+      variables: [DODO_RUN_OPTIONS, DODO_REGISTRY]
 stages: [prepare, test, release]
 default: {before_script: [echo of foreign jobs only]}
-variables: {DODO_COMPOSE_FILE: kiwi/docker-compose.yml, DODO_RUN_OPTIONS: "", DODO_REGISTRY: ""}
+variables: {DODO_RUN_OPTIONS: "", DODO_REGISTRY: "", GIT_STRATEGY: none}
 configure: {stage: prepare, script: [echo configured]}
 lint: {script: [echo linted]}
 publish: {stage: release, script: [echo published]}
@@ -104,6 +113,8 @@ def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> 
     said = re.findall(r"^(?:\x1b\[[0-9;]*m)*([\w-]+)(?:\x1b\[[0-9;]*m)* +.*> *(.*)", result.stdout, re.MULTILINE)
     foreign = {name for name, words in said if "of foreign jobs only" in words}
     assert foreign == {"configure", "lint", "publish"}
+    before = {name for name, words in said if words == f"before {name}"}
+    assert before >= {"compile", "dodo-check", *TESTS}, "of all jobs with a script, also of the child's"
     image = artifact(repository, "compile", f"generated/{TESTS[0]}/.env").read_text().splitlines()[-1]
     assert image == "DODO_IMAGE_STEERING=example"
     for name in TESTS:

@@ -161,6 +161,37 @@ def test_all_jobs_but_those_on_rigs_run_as_the_parent_wants(
     assert "image" not in tagged["gate"] and "variables" not in tagged
 
 
+def test_services_and_first_commands_are_for_all_jobs_but_those_on_rigs(
+    plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]
+) -> None:
+    options = JobOptions(services=("docker:dind", {"name": "redis"}), before_script="a\nb", artifacts_access="none")
+    suite = Suite((plan, on_rig("hil-model", "emulated"), on_rig("hil-real", "kiwi")))
+    text = render_pipeline(suite, "generated", [SearchJobs("a", "a", 2)], options).text
+    (tmp_path / "child.yml").write_text(text)
+    accepted(tmp_path / "child.yml")
+    made = yaml.safe_load(text)
+    for name in (plan.slug, "hil-model"):
+        assert made[name]["services"] == ["docker:dind", {"name": "redis"}]
+        assert made[name]["script"][0] == "a\nb", "after the login of all jobs"
+    for name in ("search a", "search a report"):
+        assert (made[name]["services"], made[name]["before_script"]) == (["docker:dind", {"name": "redis"}], ["a\nb"])
+    assert "services" not in made["hil-real"] and len(made["hil-real"]["script"]) == 1
+    assert "services" not in made["gate"] and made["gate"]["before_script"] == [], "whatever a parent forwards"
+    assert {job["artifacts"]["access"] for job in made.values() if "artifacts" in job} == {"none"}
+    plain = render_pipeline(suite, "generated", [SearchJobs("a", "a", 2)]).text
+    assert "services" not in plain and "access" not in plain
+    assert yaml.safe_load(plain)["search a"]["before_script"] == [], "no login: it pulls nothing"
+
+
+def test_without_a_test_there_is_a_job_that_says_so(tmp_path: Path, accepted: Callable[..., None]) -> None:
+    """GitLab refuses a pipeline without jobs, and the parent decides whether it comes to this one."""
+    text = render_pipeline(Suite(()), "generated").text
+    (tmp_path / "child.yml").write_text(text)
+    accepted(tmp_path / "child.yml")
+    made = yaml.safe_load(text)
+    assert (made["no-tests"]["stage"], made["stages"]) == ("test", ["test"])
+
+
 def test_images_that_were_built_are_what_is_tested(plan: Plan) -> None:
     """A variable DODO_RUN_OPTIONS of a project replaces the options of the parent, and not this one."""
 

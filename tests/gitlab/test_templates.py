@@ -235,7 +235,7 @@ def test_jobs_of_both_templates_are_the_same() -> None:
     """A pipeline that includes both has each of them once, whatever the order: GitLab merges jobs of one name."""
     first, second = (yaml.safe_load(template.read_text().split("\n---\n")[1]) for template in (APPLICATION, DEPLOYMENT))
     common = {"dodo-check", "compile", "dodo-pipeline", "dodo-tests", "dodo-report"}
-    shared = {name for name in first.keys() & second.keys() if not name.startswith(".")}
+    shared = {name for name in first.keys() & second.keys() if not name.startswith(".")} - {"variables"}
     assert shared == common
     hidden = {name for name in first if name.startswith(".")}
     assert {name for name in second if name.startswith(".")} == hidden - {".dodo-images-true", ".dodo-images-false"}
@@ -272,6 +272,7 @@ def test_the_first_push_of_a_new_application_runs_its_tests(
 def test_a_template_is_a_guest_in_the_repository_s_pipeline(template: Path) -> None:
     """No workflow, stages or defaults, which would change other jobs; and no job but ``compile`` of a common name."""
     found = included(template)
+    assert found.pop("variables") == {}
     names = found.keys() - ({"compile"} if template != RUN else set())
     assert all(name.startswith(("dodo-", ".dodo")) for name in names), "no workflow, stages, default, variables, ..."
 
@@ -437,6 +438,7 @@ def test_the_page_s_variables_are_those_of_the_templates() -> None:
         "DODO_SEARCH_STORAGE",
         "DODO_SEARCH_OPTIONS",
         "DODO_RUN_OPTIONS",
+        "DODO_REGISTRY",
     }:
         assert f"  {variable}:" in templates, variable
 

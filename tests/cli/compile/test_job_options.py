@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl.cli.compile.job_options import tags
+from dodo_dsl.cli.compile.job_options import services, tags
 from tests.check import examples
 from tests.emit.readers import run
 
@@ -33,6 +33,41 @@ def test_other_lists_are_refused(text: str) -> None:
         tags(text)
 
 
+DIND = {"name": "docker:dind", "alias": "docker", "command": ["--tls=false"], "variables": {"A": 'b "c" => :d'}}
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("", ()),
+        (" []", ()),
+        (' ["redis", "a: b"]', ("redis", "a: b")),
+        (
+            ' [{"name":"docker:dind","alias":"docker","command":["--tls=false"],"variables":{"A":"b \\"c\\" => :d"}}]',
+            (DIND,),
+        ),
+        (
+            ' [{:name=>"docker:dind", :alias=>"docker", :command=>["--tls=false"], '
+            ':variables=>{:A=>"b \\"c\\" => :d"}}]',
+            (DIND,),
+        ),
+        (
+            '[{name: "docker:dind", alias: "docker", command: ["--tls=false"], variables: {A: "b \\"c\\" => :d"}}]',
+            (DIND,),
+        ),
+        ('[{"name" => "a\\#{x}", :pull_policy => nil}, "b"]', ({"name": "a#{x}", "pull_policy": None}, "b")),
+    ],
+)
+def test_services_are_a_list_as_gitlab_writes_it_in_any_version(text: str, found: tuple[object, ...]) -> None:
+    assert services(text) == found
+
+
+@pytest.mark.parametrize("text", ["redis", "[1]", '["a"', "[[]]", '[""]', '[{alias: "a"}]', '["a\\nb"]', '["C:\\\\x"]'])
+def test_other_services_are_refused(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="service"):
+        services(text)
+
+
 @pytest.fixture
 def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -48,6 +83,8 @@ def test_the_pipeline_has_them() -> None:
     assert (made["example"]["tags"], made["example"]["image"]) == (["docker"], "dodo-runner")
     assert made["variables"]["DODO_RUN_OPTIONS"] == "--isolation host"
     assert run("compile", "--check", *wanted)[0] == 0
+    code, out, _ = run("compile", "--services", "docker:dind")
+    assert code == 2, "neither a list nor a job that would run without it"
     code, out, _ = run("compile", "--check", "--tags", "")
     assert code == 1 and '-  tags: ["docker"]\n' in out
 
