@@ -152,3 +152,15 @@ def test_a_failing_application_fails_its_job(repository: Path) -> None:
     assert result.returncode == 1, result.stdout[-4000:] + result.stderr[-2000:]
     (case,) = ElementTree.parse(artifact(repository, "dodo-run", "dodo-report/junit.xml")).iter("testcase")
     assert (case.get("name"), [child.tag for child in case.iter("failure")]) == ("sil-closed-straight", ["failure"])
+
+
+def test_dodo_s_own_pipeline_has_the_component_of_the_checkout(repository: Path) -> None:
+    """As gitlab-ci-local finds it, whose host and project are those of the remote; a tag is released behind it."""
+    shutil.copy(ROOT / ".gitlab-ci.yml", repository)
+    shutil.copytree(ROOT / "templates/run", repository / "templates/run")
+    commit(repository)
+    words = ("CI_PIPELINE_SOURCE=push", "CI_COMMIT_TAG=0.2.0")
+    result = pipeline(repository, "--list-csv", *(word for text in words for word in ("--variable", text)))
+    assert result.returncode == 0, result.stdout + result.stderr
+    lines = [line.split(";") for line in result.stdout.splitlines() if ";" in line]
+    assert [line[0] for line in lines[1:]] == ["smoke", "check", "test", "release"]
