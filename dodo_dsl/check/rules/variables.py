@@ -1,7 +1,11 @@
-"""``application-variable``: a test sets only variables of its application that are not DoDo's, to values that fit."""
+"""What a test sets of its application's variables.
+
+``application-variable``: only those that are not DoDo's, to values that fit. ``application-secret``: no secrets.
+"""
 
 from collections.abc import Iterator
 
+from dodo_dsl.application.access import secret_problems
 from dodo_dsl.application.test_variables import owner, split_by
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic
@@ -17,6 +21,7 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, _RULE, message, "set a variable that the application itself reads")
         elif isinstance(entry.value, Scalar):
             yield from _value(context, name, entry.value)
+            yield from secret_problems.written([entry.value])
 
 
 def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnostic]:
