@@ -94,7 +94,9 @@ def docker_plugin(name: str) -> str:
 def engine() -> str:
     """How to make a Docker engine answer."""
     if host := os.environ.get("DOCKER_HOST"):
-        return f"DOCKER_HOST is {host}: start the engine there, or unset DOCKER_HOST"
+        is_job = os.environ.get("GITLAB_CI") and host.startswith("tcp://")
+        there = "give this job the service that is the engine, and wait for it" if is_job else "start the engine there"
+        return f"DOCKER_HOST is {host}: {there}, or unset DOCKER_HOST"
     if _SOCKET.exists() and not os.access(_SOCKET, os.W_OK):
         return join(_SOCKET)
     if script := _script("start-engine"):

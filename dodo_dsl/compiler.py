@@ -209,22 +209,30 @@ def plan(
     """
     from dodo_dsl.emit.job_options import NO_OPTIONS
     from dodo_dsl.emit.output_folder import pipeline_folder
-    from dodo_dsl.emit.pipeline import pipeline_problems
+    from dodo_dsl.emit.pipeline import artifact_problems, pipeline_problems
     from dodo_dsl.emit.render import render_pipeline
     from dodo_dsl.plan.build import build
 
     if checked.application is None:
         raise NoApplication
     deployment, application, settings = checked.deployment, checked.application, checked.settings
+    options = options or NO_OPTIONS
     compiled, problems = build(
-        checked.tests, checked.manifests, deployment, application, out.resolve(), settings, before_each
+        checked.tests,
+        checked.manifests,
+        deployment,
+        application,
+        out.resolve(),
+        settings,
+        before_each,
+        options.from_repository,
     )
     before_each()
-    options = options or NO_OPTIONS
     child = render_pipeline(compiled.suite, pipeline_folder(out), searches, options)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    for problem in pipeline_problems(compiled.suite, child.text, searches, options):
+    limits = pipeline_problems(compiled.suite, child.text, searches, options)
+    for problem in [*limits, *artifact_problems(compiled, options)]:
         span = replace(problem.span, file=shown.get(problem.span.file, problem.span.file))
         problems.append(replace(problem, span=span))
     return Compilation(compiled, child, tuple(ordered(problems)))

@@ -7,6 +7,7 @@ import random
 import socket
 import subprocess
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,26 +27,30 @@ os.environ["COLUMNS"] = str(WIDE)  # whatever terminal the tests are started in
 REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"
 
-PLACES = {
-    "engine": ("docker", "gitlab", "images", "run/docker"),
-    "realtime": ("cli/rig", "drive", "firmware", "hostile", "run/rigs", "services"),
+WORDS = {
+    "engine": ("mark.engine",),
+    "realtime": ("realtime", "firmware"),
+    "slow": ("slow", "engine", "realtime", "firmware", "proof"),
+    "proof": ("proof",),
 }
-"""Where tests with these marks are, so that `pytest -m engine` loads no others, which takes seconds."""
+"""A file with tests of a mark says one of its words; `pytest -m engine` loads no others, which would take seconds."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-goldens", action="store_true", help="write expected output instead of comparing")
 
 
-def is_at(path: Path, mark: str) -> bool:
-    """Whether a test file or a folder of tests may hold tests with a mark."""
-    place = path.relative_to(Path(__file__).parent)
-    return any(place.is_relative_to(one) or Path(one).is_relative_to(place) for one in PLACES[mark])
+@cache
+def says(path: Path, mark: str) -> bool:
+    """Whether a file of tests may have some with a mark."""
+    text = path.read_text(encoding="utf-8")
+    return any(word in text for word in WORDS[mark])
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    mark = config.getoption("markexpr")
-    return True if mark in PLACES and not is_at(collection_path, mark) else None
+    mark = config.getoption("markexpr").partition(" ")[0]
+    is_known = mark in WORDS and collection_path.match("test_*.py")
+    return True if is_known and not says(collection_path, mark) else None
 
 
 def pytest_collection() -> None:
@@ -73,9 +78,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             )
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
-        for mark, places in PLACES.items():
-            if item.get_closest_marker(mark) and not is_at(item.path, mark):
-                raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', but is not in {', '.join(places)}")
+        for mark in WORDS:
+            if item.get_closest_marker(mark) and not says(item.path, mark):
+                raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', and its file does not say so")
 
 
 @pytest.fixture(autouse=True, scope="session")

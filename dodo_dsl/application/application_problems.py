@@ -5,9 +5,11 @@ from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.access.access_diagnostics import place
 from dodo_dsl.application.compose_paths import is_local
-from dodo_dsl.application.host_access import references
+from dodo_dsl.application.host_access import is_true, references
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain, text
+from dodo_dsl.application.mounted_folders import missing_folders
 from dodo_dsl.application.nested_mounts import nested_mounts
 from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.application.service_problems import Written, problems
@@ -30,7 +32,9 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         found.extend(_missing_folder(service, application))
         found.extend(missing_program(service, application.folder))
     found.extend(nested_mounts(application))
+    found.extend(missing_folders(application))
     found.extend(_cycles(application))
+    found.extend(_never_healthy(application))
     found.extend(_same_variable(application))
     yield from found
     if not has_errors(found):
@@ -73,6 +77,23 @@ def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
         message = f"services depend on one another: {', '.join(cycle[:6])}{', ...' if len(cycle) > 6 else ''}"
         hint = "remove one of the dependencies, so that one service can start first"
         yield Diagnostic(application.services[cycle[0]].span, "application-file", message, hint)
+
+
+def _never_healthy(application: ApplicationSource) -> Iterator[Diagnostic]:
+    """Services that wait for the health of one whose health check is turned off; an image may have one as well."""
+    for service in application.services.values():
+        needed = plain(service.node).get("depends_on")
+        for name, about in needed.items() if isinstance(needed, dict) else ():
+            other = application.services.get(str(name))
+            is_waiting = isinstance(about, dict) and about.get("condition") == "service_healthy"
+            check = plain(other.node).get("healthcheck") if other and is_waiting else None
+            if isinstance(check, dict) and (
+                is_true(check.get("disable") or False) or check.get("test") in ("NONE", ["NONE"])
+            ):
+                message = f"'{service.name}' waits for '{name}' to be healthy, whose health check is turned off"
+                hint = f"give '{name}' a healthcheck, or wait with 'condition: service_started'"
+                span = place(service.node, ("depends_on", str(name), "condition"), service.span)
+                yield Diagnostic(span, "application-file", message, hint)
 
 
 def _never_ready(needs: Mapping[str, set[str]]) -> Iterator[str]:

@@ -60,6 +60,14 @@ class EnvironmentProblem(ValueError):
     """A required variable (``${NAME:?why}``) is not set, or a user has no home folder."""
 
 
+class RequiredVariable(EnvironmentProblem):
+    """The required variable ``name``, and ``why`` its file requires it."""
+
+    def __init__(self, name: str, why: str) -> None:
+        self.name, self.why = name, why or "it is required"
+        super().__init__(f"variable {name} is not set: {self.why}")
+
+
 def interpolate(text: str, known: Mapping[str, str], *, unset: bool = True) -> str:
     """``$NAME``, ``${NAME}``, ``${NAME:-default}``, ``${NAME:?error}``, ``${NAME:+other}`` and ``$$`` as in compose.
 
@@ -86,7 +94,7 @@ def _filled(match: re.Match[str], known: Mapping[str, str], unset: bool) -> str:
     if present:
         return found or ""
     if match["operator"] == "?":
-        raise EnvironmentProblem(f"variable {name} is not set: {word or 'it is required'}")
+        raise RequiredVariable(name, word)
     if match["operator"] == "-":
         return interpolate(word, known, unset=unset)
     if found is None and not unset:

@@ -82,6 +82,18 @@ class ApplicationSource:
     left_out: tuple[str, ...] = ()
 
     @functools.cached_property
+    def demanding(self) -> tuple[tuple[str, str, Scalar], ...]:
+        """The values that may require a variable (``${NAME:?why}``), each with its service, if any, and its key."""
+        own = [(n, key, e.value) for n, s in self.services.items() for key, e in s.node.entries.items()]
+        found = [*own, *(("", key, node) for key, node in self.rest.items())]
+        return tuple(
+            (name, key, part)
+            for name, key, node in found
+            for part in source.walk(node)
+            if isinstance(part, Scalar) and isinstance(part.value, str) and "?" in part.value and "${" in part.value
+        )
+
+    @functools.cached_property
     def paths(self) -> HostPaths:
         """The host's paths as the application may use them."""
         roots = (*repository(self.folder), *self.other_roots)

@@ -17,6 +17,7 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.access.shared_findings import shared_findings
 from dodo_dsl.application.application_problems import application_problems
 from dodo_dsl.application.compose_files import ComposeFiles
+from dodo_dsl.application.discovery import unread
 from dodo_dsl.application.interpolation import names
 from dodo_dsl.application.load import load
 from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
@@ -64,6 +65,7 @@ def read_application(
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
     application = _application(paths[0].resolve(), document, services, files, access, limits)
+    found.extend(unread(paths, Path(access.roots[0]) if access.roots else None))
     found.extend(_shared(document, application))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))

@@ -18,7 +18,6 @@ from dodo_dsl.check.rules import (
     names,
     parameters,
     pools,
-    poses,
     producers,
     rigs,
     services,
@@ -46,7 +45,7 @@ RULES: tuple[Rule, ...] = (
     limits.check,
     goals.check,
     producers.check,
-    poses.check,
+    producers.check_hidden,
     variables.check,
     memories.check,
 )

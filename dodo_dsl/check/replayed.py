@@ -17,6 +17,7 @@ from dodo_dsl.spec.arguments import ResolvedService
 FORMAT = "recording"
 ONLY, WITHOUT = "messages", "without"
 """Parameters of messages that are played alone, and that are left out."""
+IMAGE = "opendlv.proxy.ImageReading"
 _NO_STAMP = -1
 _REQUEST = "Request"
 """How messages are called that ask an actuator for something, as applications do."""
@@ -77,6 +78,13 @@ def may_send(service: ResolvedService, port: Port, ids: frozenset[tuple[str, int
     old = frozenset((one.name, one.id) for one in parser.load(STANDARD_0_9))
     numbers = {number for name, number in ids | old if name == port.name}
     return any(holds(path, number, _NO_STAMP if port.stamp is None else port.stamp) for number in numbers)
+
+
+def without_pictures(service: ResolvedService) -> Path | None:
+    """The recording that a service plays, if that has no pictures; None where it may have some."""
+    path = _recording(service)
+    image = known_ids(())[IMAGE]
+    return None if path is None or holds(path, image, _NO_STAMP) else path
 
 
 def _recording(service: ResolvedService) -> Path | None:

@@ -5,8 +5,6 @@ from collections.abc import Iterable
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 
-TIME_FOR_ANSWERS = "max-delay"
-"""Parameter of evaluators: how long after a frame its answers count, in s."""
 SENDING_LAYERS = ("environment", "action")
 END_OF_INPUT = "dodo.EndOfInput"
 
@@ -31,16 +29,10 @@ def senders(test: ResolvedTest) -> tuple[str, ...]:
     return tuple(sorted(words))
 
 
-def withheld_truth(test: ResolvedTest) -> tuple[str, ...]:
+def truth(test: ResolvedTest) -> tuple[str, ...]:
     """The messages of the test's services by which it judges the application."""
     ports = (end.port for end in test.wiring.consumed if test.wiring.is_truth(end.port))
     return tuple(sorted({str(port) for port in ports}))
-
-
-def truth_delay_s(test: ResolvedTest) -> float:
-    """How long the application's answers count at most."""
-    times = (s.texts.get(TIME_FOR_ANSWERS) for s in test.services if s.use.layer == "evaluation")
-    return max((float(time) for time in times if time), default=0.0)
 
 
 def _guarded(consumed: Port, wiring: Wiring) -> Iterable[Port]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.senders import is_shipped
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
-from dodo_dsl.opendlv.bus.world import POSE, is_of_the_world
+from dodo_dsl.opendlv.bus.address import POSE, is_of_the_world
 
 HIDDEN = "hidden"
 """Value of ``pose``: the application must not declare to take what only a simulation knows."""

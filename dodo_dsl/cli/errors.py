@@ -5,11 +5,18 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from dodo_dsl import advice
 from dodo_dsl.cli.exits import Exit
 
 
 class UsageError(Exception):
     """A command line or a file that it names is wrong; one sentence, exit code 2."""
+
+
+def require_extra(what: str, extra: str) -> None:
+    """Raises UsageError with what to type where a module of an extra of DoDo's cannot be loaded."""
+    if module := advice.missing(extra):
+        raise UsageError(f"{what} needs {module}: {advice.install(extra)}")
 
 
 NO_APPLICATION = "no application; name its compose file with --application or in dodo.yml"

@@ -1,17 +1,21 @@
 """dodo images: build, push and pull images, and say what they are made of."""
 
 import argparse
+import json
 import shlex
 import tempfile
 from pathlib import Path
 from typing import TextIO
 
-from dodo_dsl import atomic
-from dodo_dsl.cli import image_builds, image_pull, own_services, selection
-from dodo_dsl.cli.errors import UsageError
+from dodo_dsl import atomic, compiler
+from dodo_dsl.application.read import read_application
+from dodo_dsl.cli import image_pull, own_services, selection
+from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.exits import Exit
+from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
 from dodo_dsl.images.names import DODO, PLATFORM, Image, choose, known, of_platforms, tagged
+from dodo_dsl.plan.rewrite.checked_builds import checked_builds
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -47,7 +51,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "pull the images that the tests of a rig need, if there is room for them"
     image_pull.add(actions.add_parser("pull", help=text, description=text))
     text = "check the application's builds, and write them as a compose file for 'docker buildx bake'"
-    image_builds.add(actions.add_parser("builds", help=text, description=text))
+    selection.add_application(actions.add_parser("builds", help=text, description=text))
     sbom = _action(actions, "sbom", "write what built images, and the Python that runs DoDo, are made of (CycloneDX)")
     sbom.add_argument("--no-images", action="store_true", help="only the Python that runs DoDo; needs no Docker engine")
     sbom.add_argument("-o", "--output", metavar="DIR", default="build/sbom", help="folder (default: build/sbom)")
@@ -89,7 +93,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.action == "pull":
         return image_pull.pull(options, stdout)
     if options.action == "builds":
-        return image_builds.show(options, stdout, stderr)
+        return _show_builds(options, stdout, stderr)
     deployment = selection.checked_deployment()
     images = _chosen(options, deployment)
     if options.action == "sbom" and options.no_images:
@@ -110,6 +114,24 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         for image in wanted:
             if dockerfile := own.get(image.name):
                 own_services.build(image, dockerfile, stdout)
+    return Exit.OK
+
+
+def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    """Writes the application's checked builds as a compose file; raises UsageError where there is no application."""
+    deployment = selection.checked_deployment()
+    files = selection.existing_files(options.application) or deployment.application
+    if not files:
+        raise UsageError(NO_APPLICATION)
+    source, problems = read_application(files, compiler.access(deployment), deployment.sandbox)
+    stderr.write(format_text(problems))
+    if source is None or has_errors(problems):
+        return Exit.PROBLEMS
+    builds, problems = checked_builds(source)
+    stderr.write(format_text(problems))
+    if has_errors(problems):
+        return Exit.PROBLEMS
+    stdout.write(json.dumps(builds, indent=2) + "\n")
     return Exit.OK
 
 

@@ -6,8 +6,7 @@ import os
 import sys
 from typing import TextIO
 
-from dodo_dsl.cli import extras
-from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.errors import UsageError, require_extra
 from dodo_dsl.cli.exits import Exit
 
 EXAMPLES = """examples:
@@ -24,7 +23,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    extras.require("this", "lsp")
+    require_extra("this", "lsp")
     from dodo_dsl.lsp.listeners import serve
 
     if sys.stdin is None or sys.stdin.isatty():

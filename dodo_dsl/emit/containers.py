@@ -1,13 +1,16 @@
 """A planned service as a container: command, volumes and what it waits for."""
 
 import math
+import posixpath
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dodo_dsl.application.mounted_folders import WAY_OUT
 from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
-from dodo_dsl.plan.model import LAYERS, READY_S, Flag, Plan, PlannedService
+from dodo_dsl.plan.model import LAYERS, READY_S, Application, Flag, Plan, PlannedService
+from dodo_dsl.plan.test_files import SHARED
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
@@ -64,10 +67,45 @@ def containers(plan: Plan, layer: str) -> list[Container]:
     ]
 
 
-def copy_command(volumes: Iterable[str]) -> str:
-    """What the service does that copies files of the repository: links stay links, and nothing follows them."""
-    copies = [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in volumes]
-    return " && ".join([*copies, "touch /run/copied", "exec sleep infinity"])
+_COUNT = """\
+files=0 size=0
+fits() {
+  own=$(find "$1" | head -n %(most)s | wc -l); files=$((files + own))
+  [ $files -le %(files)s ] || fail "$2" "at least $own files" "%(files)s" copied-files
+  own=$(du -sk --apparent-size "$1" | cut -f1); size=$((size + own))
+  [ $size -le %(size)s ] || fail "$2" "$((own * 128 / 125000)) MB" "%(shown)s MB" copies
+}
+fail() {
+  echo "'$1' holds $2, and the copies of a test may hold $3: %(way_out)s"
+  exit 1
+}
+"""
+
+
+def copy_command(application: Application) -> str:
+    """What the service does that copies folders of the repository: links stay links, and nothing follows them.
+
+    It counts before it copies. Variables are for the shell: compose fills in none.
+    """
+    copies, limits = application.copies, application.limits
+    count = _COUNT % {
+        "most": limits.copied_files + 1,
+        "files": limits.copied_files,
+        "size": limits.copies // 1024,
+        "shown": limits.copies // 10**6,
+        "way_out": WAY_OUT.format(key="$4"),
+    }
+    shown = {name: _as_written(source, application.folder) for name, source in copies.items()}
+    words = [f"fits {shlex.quote(f'/from/{name}')} {shlex.quote(source)}" for name, source in shown.items()]
+    words += [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in copies]
+    return f"{count}{' && '.join([*words, 'touch /run/copied', 'exec sleep infinity'])}".replace("$", "$$")
+
+
+def _as_written(source: str, folder: str) -> str:
+    """A path of the compiled test as it is in the application's compose file, relative to its ``folder``."""
+    if source.startswith(("/", "$", "~")):
+        return source
+    return f"./{posixpath.relpath(source, folder)}"
 
 
 def _word(flag: Flag) -> str:
@@ -84,11 +122,23 @@ def _environment(plan: Plan, service: PlannedService) -> tuple[tuple[str, str], 
     return tuple((name, value) for name, value in own.items() if value)
 
 
+def _shared(plan: Plan, service: PlannedService) -> list[str]:
+    """The shared files to which the service's own paths lead."""
+    paths = {*plan.messages, *(flag.value for flag in service.flags if flag.kind == "path")}
+    found = {name for target, name in plan.shared.items() if any(f"{target}/".startswith(f"{p}/") for p in paths)}
+    return sorted(found)
+
+
+def _shared_mount(name: str) -> Mapping[str, Any]:
+    """The place to which the test's link leads in a container."""
+    return {**FILES_MOUNT, "source": f"../{SHARED}/{name}", "target": f"/{SHARED}/{name}"}
+
+
 def _volumes(plan: Plan, service: PlannedService) -> tuple[str | Mapping[str, Any], ...]:
     kinds = {flag.kind for flag in service.flags}
     volumes: list[str | Mapping[str, Any]] = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
     if "path" in kinds or plan.messages:
-        volumes.append(FILES_MOUNT)
+        volumes += [FILES_MOUNT, *(_shared_mount(name) for name in _shared(plan, service))]
     if "report" in kinds:
         volumes.append(f"report:{REPORT}")
     return tuple(volumes)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from dodo_dsl.plan.model import Plan
 
@@ -19,9 +20,13 @@ def _unknown(_plans: Sequence[Plan]) -> Mapping[str, float]:
 class JobOptions:
     """``tags`` of the runners of all jobs that occupy no rig, and their ``image``; empty for the runner's own.
 
+    ``services`` are theirs, too, and ``before_script`` are their first commands; ``artifacts_access`` says who may
+    download what any job keeps, empty for all. Values are those of GitLab's keywords.
+
     ``run_options`` are those of ``dodo run`` in each test, which a variable ``DODO_RUN_OPTIONS`` replaces. ``images``
     are those of the application that the parent has built, as lines ``DODO_IMAGE_<SERVICE>=<image>``. Where
-    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds``.
+    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds``. Jobs have large files ``from_repository``,
+    as they check it out, or else from the artifact of the parent, which may have ``artifact_mb`` MB; 0 for any number.
     """
 
     tags: tuple[str, ...] = DEFAULT_TAGS
@@ -30,6 +35,11 @@ class JobOptions:
     images: tuple[str, ...] = ()
     most_jobs: int = 0
     seconds: Seconds = _unknown
+    services: tuple[str | Mapping[str, Any], ...] = ()
+    before_script: str = ""
+    artifacts_access: str = ""
+    from_repository: bool = False
+    artifact_mb: int = 0
 
     @property
     def backend(self) -> str:

@@ -4,16 +4,17 @@ import difflib
 import errno
 import filecmp
 import json
+import os
 import shutil
 import stat
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.emit.render import File, render_plan
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.build import Compiled
-from dodo_dsl.plan.test_files import FileCopy
+from dodo_dsl.plan.test_files import SHARED, FileCopy, is_shared_name, link
 
 PLAN_FILE = "test.json"
 FILES = "files"
@@ -31,7 +32,9 @@ def write(compiled: Compiled, pipeline: File, out: Path) -> None:
     """
     for plan in compiled.suite.plans:
         _refuse_links(out / plan.slug)
+    _refuse_link(out / SHARED)
     _update(out, [pipeline])
+    _write_shared(out / SHARED, _shared(compiled))
     for plan in compiled.suite.plans:
         folder, files, copies = out / plan.slug, render_plan(plan), compiled.copies[plan.slug]
         if folder.exists():
@@ -41,6 +44,52 @@ def write(compiled: Compiled, pipeline: File, out: Path) -> None:
             _write_new(folder, [(file.path.removeprefix(f"{plan.slug}/"), file.text) for file in files], copies)
     for folder in stale_folders(compiled, out):
         shutil.rmtree(folder)
+    _remove_unshared(out / SHARED, _shared(compiled))
+
+
+def _shared(compiled: Compiled) -> dict[str, FileCopy]:
+    """The files that tests share, by name."""
+    return {copy.shared: copy for copies in compiled.copies.values() for copy in copies if copy.shared}
+
+
+def _write_shared(folder: Path, wanted: Mapping[str, FileCopy]) -> None:
+    """Copies of files, or links to those of the repository; the name tells the content."""
+    for name, copy in wanted.items():
+        if _is_shared_as(folder / name, copy):
+            continue
+        if copy.is_linked:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / name).unlink(missing_ok=True)
+            (folder / name).symlink_to(_repository_link(folder, copy))
+        else:
+            with atomic.replacing(folder / name) as part:
+                shutil.copyfile(copy.source, part)
+    if wanted:
+        _open_to_containers(folder)
+
+
+def _is_shared_as(path: Path, copy: FileCopy) -> bool:
+    if copy.is_linked:
+        return path.is_symlink() and path.readlink() == _repository_link(path.parent, copy)
+    return path.is_file() and not path.is_symlink() and filecmp.cmp(copy.source, path, shallow=False)
+
+
+def _repository_link(folder: Path, copy: FileCopy) -> Path:
+    return Path(os.path.relpath(copy.source, folder.resolve()))
+
+
+def _remove_unshared(folder: Path, wanted: Mapping[str, FileCopy]) -> None:
+    for path in _unshared(folder, wanted):
+        path.unlink()
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def _unshared(folder: Path, wanted: Mapping[str, FileCopy]) -> list[Path]:
+    """What earlier compilations shared and this one does not."""
+    found = sorted(folder.iterdir()) if folder.is_dir() else []
+    files = [path for path in found if path.is_symlink() or path.is_file()]
+    return [path for path in files if is_shared_name(path.name) and path.name not in wanted]
 
 
 def add_images(compiled: Compiled, images: Sequence[str], out: Path) -> None:
@@ -52,8 +101,21 @@ def add_images(compiled: Compiled, images: Sequence[str], out: Path) -> None:
 
 def _refuse_links(folder: Path) -> None:
     for path in (folder, *folder.rglob("*")):
-        if path.is_symlink():
-            raise atomic.NotReplaceable(errno.ELOOP, "a symlink, which no output follows", str(path))
+        if not _is_own_link(path, folder / FILES):
+            _refuse_link(path)
+
+
+def _refuse_link(path: Path) -> None:
+    if path.is_symlink():
+        raise atomic.NotReplaceable(errno.ELOOP, "a symlink, which no output follows", str(path))
+
+
+def _is_own_link(path: Path, files: Path) -> bool:
+    """Whether it is a link to a shared file, as ``dodo compile`` writes them; nothing is written through it."""
+    if not path.is_symlink() or not path.is_relative_to(files) or path == files:
+        return False
+    text = path.readlink()
+    return is_shared_name(text.name) and str(text) == link(path.relative_to(files).as_posix(), text.name)
 
 
 def _update(out: Path, files: Iterable[File]) -> None:
@@ -69,25 +131,51 @@ def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[
         for name, text in files:
             (stage / name).write_text(text, encoding="utf-8")
         for copy in copies:
-            (stage / FILES / copy.target).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(copy.source, stage / FILES / copy.target)
+            target = stage / FILES / copy.target
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if copy.shared:
+                target.symlink_to(copy.link)
+            else:
+                shutil.copyfile(copy.source, target)
         _open_to_containers(stage / FILES)
 
 
 def _write_copies(folder: Path, wanted: Sequence[FileCopy]) -> None:
+    for path in _former_links(folder, wanted):  # before anything else: a folder may come into its place
+        path.unlink()
     for copy in wanted:
-        target = folder / copy.target
-        if not target.is_file() or not filecmp.cmp(copy.source, target, shallow=False):
-            with atomic.replacing(target) as part:
+        if _is_copied(folder, copy):
+            continue
+        if copy.shared:
+            (folder / copy.target).parent.mkdir(parents=True, exist_ok=True)
+            (folder / copy.target).unlink(missing_ok=True)
+            (folder / copy.target).symlink_to(copy.link)
+        else:
+            with atomic.replacing(folder / copy.target) as part:
                 shutil.copyfile(copy.source, part)
     for path in _surplus(folder, wanted):
         path.unlink()
     _open_to_containers(folder)
 
 
+def _former_links(folder: Path, wanted: Sequence[FileCopy]) -> list[Path]:
+    links = {copy.target: copy.link for copy in wanted if copy.shared}
+    found = [path for path in folder.rglob("*") if path.is_symlink()]
+    return [path for path in found if links.get(path.relative_to(folder).as_posix()) != str(path.readlink())]
+
+
+def _is_copied(folder: Path, copy: FileCopy) -> bool:
+    target = folder / copy.target
+    if copy.shared:
+        return target.is_symlink() and str(target.readlink()) == copy.link
+    return target.is_file() and not target.is_symlink() and filecmp.cmp(copy.source, target, shallow=False)
+
+
 def _open_to_containers(folder: Path) -> None:
     """Everybody may read the files, whatever the umask, as users of containers must; the folder above may be closed."""
     for path in (folder, *folder.rglob("*")) if folder.is_dir() else ():
+        if path.is_symlink():
+            continue
         more = 0o555 if path.is_dir() else 0o444
         mode = path.stat().st_mode
         if mode & more != more:
@@ -97,7 +185,7 @@ def _open_to_containers(folder: Path) -> None:
 def _surplus(folder: Path, wanted: Sequence[FileCopy]) -> Iterator[Path]:
     names = {copy.target for copy in wanted}
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.relative_to(folder).as_posix() not in names:
+        if (path.is_file() or path.is_symlink()) and path.relative_to(folder).as_posix() not in names:
             yield path
 
 
@@ -125,6 +213,7 @@ def differences(compiled: Compiled, pipeline: File, out: Path) -> dict[str, str]
         texts = (_text_difference(file, out) for file in render_plan(plan))
         copies = _copy_differences(out / plan.slug / FILES, compiled.copies[plan.slug], out)
         found[plan.slug] = "".join([*texts, *copies])
+    found[SHARED] = "".join(_shared_differences(out / SHARED, _shared(compiled)))
     found.update((folder.name, f"only in {out.name}: {folder.name}\n") for folder in stale_folders(compiled, out))
     return {name: text for name, text in found.items() if text}
 
@@ -138,10 +227,17 @@ def _text_difference(file: File, out: Path) -> str:
     return "".join(difflib.unified_diff(before.splitlines(True), file.text.splitlines(True), *names))
 
 
+def _shared_differences(folder: Path, wanted: Mapping[str, FileCopy]) -> Iterator[str]:
+    for name, copy in wanted.items():
+        if not _is_shared_as(folder / name, copy):
+            yield f"differs: {SHARED}/{name}\n"
+    for path in _unshared(folder, wanted):
+        yield f"no longer needed: {SHARED}/{path.name}\n"
+
+
 def _copy_differences(folder: Path, wanted: Sequence[FileCopy], out: Path) -> Iterator[str]:
     for copy in wanted:
-        target = folder / copy.target
-        if not target.is_file() or not filecmp.cmp(copy.source, target, shallow=False):
-            yield f"differs: {target.relative_to(out)}\n"
+        if not _is_copied(folder, copy):
+            yield f"differs: {(folder / copy.target).relative_to(out)}\n"
     for path in _surplus(folder, wanted):
         yield f"no longer needed: {path.relative_to(out)}\n"

@@ -5,6 +5,7 @@ import shlex
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.emit.batches import packed
@@ -12,8 +13,12 @@ from dodo_dsl.emit.job_options import NO_OPTIONS, JobOptions
 from dodo_dsl.emit.pipeline_job import SPARE_MINUTES, PipelineJob
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.pools import by_test, named, pooled
+from dodo_dsl.plan.test_files import FileCopy
 from dodo_dsl.spec.deployment.rig import EMULATED_RIGS
 from dodo_dsl.spec.model import LEVELS
+
+if TYPE_CHECKING:
+    from dodo_dsl.plan.build import Compiled
 
 CHILD = "child.gitlab-ci.yml"
 RULE = "pipeline-limit"
@@ -22,6 +27,11 @@ MAX_NAME = 255
 MAX_BYTES = 5 << 20
 MAX_JOBS_FREE = 500
 MAX_JOBS_PARSED = 850
+_MOST_NAMED = 3
+_ARTIFACT_HINT = (
+    "let the jobs take them from the repository or Git LFS with --files repository, shorten recordings with "
+    "'dodo rec cut', or have an administrator allow more, and say so with --artifact-limit"
+)
 
 _SEARCH_OPTIONS = '--study "$CI_PIPELINE_ID" --report dodo-search $DODO_SEARCH_OPTIONS'
 
@@ -72,6 +82,8 @@ def pipeline(
         stages.insert(stages.index("hil"), "gate")
     if searches:
         stages.append("search")
+    if not stages:
+        stages.append("test")  # GitLab refuses a pipeline without a job
     jobs = tuple(_job(plans, gate, folder, options) for plans in pooled(suite.plans))
     if options.most_jobs:
         timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
@@ -113,6 +125,8 @@ def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) ->
         folders=tuple(f"{folder}/{one.slug}" for one in plans),
         image="" if real else options.image,
         backend=options.backend,
+        services=() if real else options.services,
+        before_script="" if real else options.before_script,
     )
 
 
@@ -134,6 +148,33 @@ def pipeline_problems(
     made = pipeline(suite, "", searches, options)
     number = len(made.jobs) + made.gate + sum(search.workers + 1 for search in searches)
     return [*_names(suite, {job.name for job in made.jobs}), *_whole(suite, text, number)]
+
+
+def artifact_problems(compiled: "Compiled", options: JobOptions) -> list[Diagnostic]:
+    """A warning where the files of all tests together are larger than the artifact of the parent may be.
+
+    GitLab accepts 100 MB (``max_artifacts_size``) unless an administrator allows more, and gitlab.com 1 GB. It counts
+    what is packed, which recordings of pictures hardly become smaller by. Sources as of ``pipeline_problems``.
+    """
+    if not options.artifact_mb:
+        return []
+    carried: dict[str, tuple[FileCopy, str]] = {}
+    for slug, copies in compiled.copies.items():
+        for copy in copies:
+            if not copy.is_linked:
+                carried.setdefault(copy.shared or f"{slug}/{copy.target}", (copy, slug))
+    sizes = {source: source.stat().st_size for source in {copy.source for copy, _ in carried.values()}}
+    total = sum(sizes[copy.source] for copy, _ in carried.values())
+    if total <= options.artifact_mb << 20:
+        return []
+    largest = sorted(carried.values(), key=lambda one: (-sizes[one[0].source], one))[:_MOST_NAMED]
+    plan = next(plan for plan in compiled.suite.plans if plan.slug == largest[0][1])
+    named = [f"{copy.target} ({sizes[copy.source] / (1 << 20):.0f} MB)" for copy, _ in largest]
+    message = (
+        f"the artifact with the tests has {total / (1 << 20):.0f} MB of files before it is packed, more than "
+        f"{options.artifact_mb} MB; the largest: {', '.join(named)}"
+    )
+    return [Diagnostic(_place(plan), RULE, message, _ARTIFACT_HINT, "warning")]
 
 
 def _names(suite: Suite, jobs: Collection[str]) -> Iterator[Diagnostic]:

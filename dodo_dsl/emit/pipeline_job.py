@@ -1,7 +1,9 @@
 """A job of the child pipeline."""
 
 import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 SPARE_MINUTES = 10
 """Beyond what its tests may take."""
@@ -29,6 +31,8 @@ class PipelineJob:
     pool: tuple[str, ...] = ()
     backend: str = ""
     """What the tests run on unless the options of a pipeline name another; empty for dodo's own choice."""
+    services: tuple[str | Mapping[str, Any], ...] = ()
+    before_script: str = ""
 
     @property
     def script(self) -> str:

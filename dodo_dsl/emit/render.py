@@ -113,7 +113,7 @@ def render_plan(plan: Plan) -> list[File]:
                 sandbox=own_network and layer == LAYERS[0],
                 copies=plan.application.copies if layer == LAYERS[0] else {},
                 files_service=FILES,
-                copy_command=copy_command(plan.application.copies),
+                copy_command=copy_command(plan.application),
             ),
         )
         for layer in LAYERS

@@ -7,19 +7,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dodo_dsl import package_data, source
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.mounted_folders import large_folders
 from dodo_dsl.check import world
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.replayed import WITHOUT
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.check.senders import senders, truth_delay_s, withheld_truth
+from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import addresses, clock_service, recorder_service
 from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.plan.test_files import FileCopy, FilesError, copies
+from dodo_dsl.plan.rewrite.volumes import too_long
+from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment.deployment import Deployment
@@ -48,10 +51,12 @@ def build(
     out: Path,
     settings: Settings,
     before_each: Callable[[], None] = lambda: None,
+    from_repository: bool = False,
 ) -> tuple[Compiled, list[Diagnostic]]:
     """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below.
 
-    ``before_each`` is called before each test.
+    ``before_each`` is called before each test. Large files of the repository are linked instead of copied where they
+    come ``from_repository``.
     """
     ordered = sorted(tests, key=lambda test: test.spec.slug)
     try:
@@ -95,8 +100,42 @@ def build(
         before_each()
         plans.append(builder.plan())
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
-    problems = list(itertools.chain.from_iterable(b.problems for b in builders))
+    files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
+    plans = [_sharing(plan, files[plan.slug]) for plan in plans]
+    of_copies = large_folders(application, [*deployment.registry, *deployment.services])
+    of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
+    problems = [
+        *of_copies,
+        *itertools.islice(of_volumes, 1),
+        *itertools.chain.from_iterable(b.problems for b in builders),
+    ]
     return Compiled(Suite(tuple(plans), deployment.gates), files), problems
+
+
+def _in_repository(deployment: Deployment, out: Path) -> Callable[[Path], bool]:
+    """Whether a job that checks out the repository has a file; raises FilesError where ``out`` cannot link to it."""
+    root = deployment.root.resolve()
+    if not out.is_relative_to(root):
+        raise FilesError(f"--files repository needs an output folder in the repository '{root}', and '{out}' is none")
+    shipped = package_data.registry().resolve()
+    is_own = not shipped.is_relative_to(root) or package_data.root().resolve() == root
+    return lambda path: path.is_relative_to(root) and (is_own or not path.is_relative_to(shipped))
+
+
+def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
+    shared = {copy.target: copy.shared for copy in files if copy.shared}
+    return replace(plan, shared=shared) if shared else plan
+
+
+def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
+    """A volume that the engine cannot make for a test, as its name has to tell tests apart."""
+    name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
+    if not name:
+        return None
+    node, first = application.rest.get("volumes"), next(iter(application.services.values())).span
+    span = node.entries[name].key if isinstance(node, source.Mapping) and name in node.entries else first
+    message = f"the name of the volume '{name}' is too long for the engine together with that of '{plan.slug}'"
+    return Diagnostic(span, "application-file", message, "shorten one of them: they may have 242 characters together")
 
 
 def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:
@@ -221,8 +260,7 @@ class _Builder:
             pool=self._pooled() if spec.pool else None,
             messages=messages,
             senders=senders(self.test),
-            truth=(truth := withheld_truth(self.test)),
-            truth_delay_s=truth_delay_s(self.test) if truth else 0.0,
+            truth=truth(self.test),
             world=world.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in world.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,

@@ -14,6 +14,8 @@ _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0
 """The seconds that every service may take to get ready."""
 LAYERS = (*spec_model.LAYERS, "application")
+STARTED, HEALTHY, COMPLETED = "service_started", "service_healthy", "service_completed_successfully"
+"""The conditions of ``depends_on``."""
 
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
 
@@ -51,7 +53,8 @@ class PlannedService:
 class ApplicationService:
     """A service under test; ``process`` starts it without containers, None when only its image can.
 
-    ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``.
+    ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``. ``after`` are
+    the services for which it waits, each with its condition.
     """
 
     name: str
@@ -63,6 +66,7 @@ class ApplicationService:
     env_files: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
+    after: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -127,11 +131,12 @@ class Plan:
     ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,
     relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
     ``goals`` score a passed test and never change its outcome.
-    ``truth`` are messages by which evaluators judge; in real time they come to the bus ``truth_delay_s`` late.
+    ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
     ``import_paths`` are folders that hold Python packages of the deployment's own services, relative to the compiled
-    test's.
+    test's. ``shared`` are files below ``files/`` that are links, each with the name of its file in the folder of files
+    that tests share.
     """
 
     name: str
@@ -158,11 +163,11 @@ class Plan:
     messages: tuple[str, ...] = ()
     senders: tuple[str, ...] = ()
     truth: tuple[str, ...] = ()
-    truth_delay_s: float = 0.0
     world: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
     import_paths: tuple[str, ...] = ()
+    shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)
 
     @property
@@ -170,9 +175,13 @@ class Plan:
         """Environment variables that give the test's services their clock, their rig, and who may send what."""
         stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
         rig = {"DODO_RIG": self.rig} if self.rig else {}
-        truth = {"DODO_TRUTH": " ".join([f"{self.truth_delay_s:g}", *self.truth])} if self.truth else {}
-        lists = {"DODO_SENDERS": self.senders, "DODO_WORLD": self.world, "DODO_TOLD": self.told}
-        return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}, **truth}
+        lists = {
+            "DODO_SENDERS": self.senders,
+            "DODO_WORLD": self.world,
+            "DODO_TOLD": self.told,
+            "DODO_TRUTH": self.truth,
+        }
+        return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}}
 
     def layer(self, name: str) -> tuple[PlannedService, ...]:
         return tuple(s for s in self.services if s.layer == name)

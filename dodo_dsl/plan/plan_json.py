@@ -9,7 +9,10 @@ import orjson
 
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.plan.model import (
+    COMPLETED,
+    HEALTHY,
     LAYERS,
+    STARTED,
     Application,
     ApplicationService,
     Flag,
@@ -21,6 +24,7 @@ from dodo_dsl.plan.model import (
     Pooled,
     is_device,
 )
+from dodo_dsl.plan.test_files import is_shared_name
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.goals import Goal, is_goal
 from dodo_dsl.spec.instances.matrix import SLUG
@@ -67,7 +71,6 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         application["limits"] = SandboxLimits(**{**application["limits"], "reads": reads})
         application["access"] = _access(application["access"])
         raw["application"] = Application(**application)
-        raw["truth_delay_s"] = float(raw["truth_delay_s"])
         if settings.seed is not None:
             raw["seed"] = settings.seed
         if settings.wall_timeout_s is not None and raw["lockstep"]:
@@ -75,6 +78,7 @@ def from_json(text: str, settings: Settings = Settings()) -> Plan:  # noqa: B008
         raw["lockstep"] = Lockstep(**raw["lockstep"]) if raw["lockstep"] else None
         raw["resources"] = ResourceLimits(**raw["resources"]) if raw["resources"] else None
         raw |= {key: tuple(raw[key]) for key in _LISTS}
+        raw["shared"] = dict(raw["shared"])
         raw["pool"] = Pooled(**raw["pool"]) if raw["pool"] else None
         raw["goals"] = tuple(Goal(**goal) for goal in raw["goals"])
         raw["source_map"] = {key: Place(**place) for key, place in raw["source_map"].items()}
@@ -103,8 +107,8 @@ def _problem(plan: Plan) -> str:
         "lockstep": plan.lockstep is None or _is_lockstep(plan.lockstep),
         "messages": all(_is_inside(path) for path in plan.messages),
         "senders": all(isinstance(word, str) and len(word.split()) == 1 for word in _words(plan)),
+        "shared file": all(_is_inside(path) and is_shared_name(name) for path, name in plan.shared.items()),
         "import path": all(isinstance(path, str) and "\0" not in path for path in plan.import_paths),
-        "truth_delay_s": isinstance(plan.truth_delay_s, int | float) and 0 <= plan.truth_delay_s <= 86_400,
         "goal": all(isinstance(goal.check, str) and is_goal(goal) for goal in plan.goals),
         "service name": all(isinstance(s.name, str) and _NAME.fullmatch(s.name) for s in services),
         "service layer": all(s.layer in LAYERS for s in plan.services),
@@ -121,9 +125,16 @@ def _problem(plan: Plan) -> str:
         "access": _is_access(plan.application.access),
         "resources": plan.resources is None or is_valid(plan.resources),
         "message": all(isinstance(m, str) for s in plan.application.services for m in (*s.inputs, *s.outputs)),
+        "condition": all(_is_after(s.after, plan.application) for s in plan.application.services),
         "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
+
+
+def _is_after(after: dict[str, str], application: Application) -> bool:
+    names = {service.name for service in application.services}
+    conditions = {STARTED, HEALTHY, COMPLETED}
+    return all(name in names and c in conditions for name, c in after.items())
 
 
 def _words(plan: Plan) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.interpolation import dotenv_file, interpolate, own_dotenv
 from dodo_dsl.outcome import NEXT_REPORT
 from dodo_dsl.plan.model import Application
+from dodo_dsl.plan.test_files import SHARED
 from dodo_dsl.state_folder import NoStateFolder, state_path
 from dodo_dsl.template_cache import cache_home
 
@@ -43,6 +44,7 @@ def hidden_folders(application: Application, folder: Path, report: Path) -> list
     paths = application_paths(application, folder)
     found = [paths.folder / path for path in application.hidden]
     found += [path for own in (folder.resolve(), report.resolve()) if (path := _holder(own, paths.folder))]
+    found += [folder.resolve().parent / SHARED] if folder.resolve().parent == paths.folder else []
     found += [root / ".git" for root in paths.roots]
     found += [own for own in _own_folders() if any(own.is_relative_to(root) for root in paths.roots)]
     return [Path(os.path.realpath(path)) for path in found if path.is_dir()]

@@ -28,6 +28,8 @@ from dodo_dsl.run.run_state import Ended, RunState
 from dodo_dsl.run.standing import Standing, standing
 
 READY_PATIENCE_S = READY_S
+WAITS_PATIENCE_S = 3600.0
+"""For one that waits for others: the backend knows better for which, and how long."""
 LAST_TIME_PATIENCE_S = 2.0
 BEGIN_PATIENCE_S = 2.0
 EXPLAIN_PATIENCE_S = 5.0
@@ -131,8 +133,9 @@ class Engine:
             why = f"{type(error).__name__}: {error}"
             self.state.notes.append(f"what the application used was not measured to the end: {why}")
         began, finished = self.state.began, self.state.finished or self._now()
+        in_steps = self.plan.lockstep is not None
         whole = [] if began is None else [(began, 0.0), (finished, finished - began)]
-        self.state.resources = self._use.figures(self.state.progress if self.plan.lockstep else whole)
+        self.state.resources = self._use.figures(self.state.progress if in_steps else whole, in_steps)
         self._is_measured = True
 
     async def _wind_up(self, keep: bool) -> list[str]:
@@ -183,6 +186,7 @@ class Engine:
         begin = self._now()
         patience = dict.fromkeys(waits, READY_PATIENCE_S)
         patience |= {s.name: READY_PATIENCE_S + s.setup_s for s in self.plan.services if s.name in waits}
+        patience |= {s.name: WAITS_PATIENCE_S for s in self.plan.application.services if s.after and s.name in waits}
         while left := waits - self.state.ready:
             late = min(left, key=lambda name: (patience[name], name))
             event = await self._next(begin + patience[late])

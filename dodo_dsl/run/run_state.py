@@ -45,6 +45,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
+from dodo_dsl.run.services import conditions
 
 MOST_NOTES = 100
 MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
@@ -183,13 +184,13 @@ class RunState:
         layer, when = self.layer_of.get(service, "application"), self._when()
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
         if layer == "application":
-            is_done = code == 0 and self.input_ended
+            is_done = code == 0 and (self.input_ended or service in conditions.one_off(self.plan.application.services))
             if code in _KILLED and not out_of_memory and self.memory_kills() > self._killed_before:
                 self.notes.append(MEMORY_KILL)
             if not is_done and not self._all_verdicts_given():
-                self._end_by_exit(
-                    "failed", f"application service '{service}' {ended}, before the test was decided", service
-                )
+                reason = f"application service '{service}' {ended}, before the test was decided"
+                waits = conditions.waits(self.plan.application.services, service) if self.began is None else ""
+                self._end_by_exit("failed", f"{reason}; {waits}" if waits else reason, service)
         elif code != 0:
             self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}", service)
         elif service not in self.ready and self.began is None:

@@ -18,7 +18,6 @@ from services.base.identity.world import World
 from services.base.lateness import Lateness
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 from services.base.stamps import HeardStamps, with_strangers
-from services.base.withheld import WithheldTruth
 
 TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
 REPORT_PERIOD = 1_000_000
@@ -52,7 +51,6 @@ class Loop:
     _paused: float = 0.0
     _report_after: int = 0
     _lateness: Lateness = field(init=False)
-    _truth: WithheldTruth = field(init=False)
     _world: World = field(init=False)
 
     def __post_init__(self) -> None:
@@ -62,7 +60,6 @@ class Loop:
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
         self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)
-        self._truth = WithheldTruth.load(self.session.messages)
         self._world = World.load(self.session.messages)
 
     def run(self, stopped: Callable[[], bool]) -> None:
@@ -76,8 +73,6 @@ class Loop:
             raise UnjudgeableError(with_strangers(str(error), self._stamps.strangers())) from None
         if self.service.finished and self.service.verdict is None:
             print(json.dumps({"dodo": "end-of-input"}), flush=True)
-            for envelope in self._truth.due():
-                self._publish(envelope)
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close(stopped if self._has_begun else lambda: True)
         self._tell_strangers()
@@ -99,8 +94,6 @@ class Loop:
                     self._send(output, now)
                 if not self.clock.relays:
                     self._lateness.add(now, self.clock.now())
-            for envelope in self._truth.due(now):
-                self._publish(envelope)
             if now >= self._report_after:
                 self._report(now)
             if service.finished and not self.clock.has_new_picture:
@@ -179,18 +172,15 @@ class Loop:
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         envelope = output if isinstance(output, Envelope) else self._envelope(output, now)
-        if not self.clock.relays and self._truth.holds(envelope):
-            self._truth.keep(envelope, now)
-        else:
-            self.clock.sent(self._publish(envelope))
+        self.clock.sent(self._publish(envelope))
 
     def _publish(self, envelope: Envelope) -> bytes:
         """Send an envelope, and return its frame: on the bus, or where the application is not."""
-        is_kept = self._world.holds(envelope) or self._truth.holds(envelope)
-        if is_kept and self.clock.relays:
-            return encode_frame(envelope)
-        if is_kept and self.members is not None and self._world:
-            return self.members.send(envelope)
+        if self._world.holds(envelope):
+            if self.clock.relays:
+                return encode_frame(envelope)
+            if self.members is not None:
+                return self.members.send(envelope)
         return self.session.send_envelope(envelope)
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:

@@ -27,7 +27,6 @@ from services.base.manifest import load_manifest
 from services.base.service import Build, Context
 from services.base.usage import help_text
 from services.base.verdict import undeclared_checks
-from services.base.withheld import WithheldTruth
 
 DONE, BROKEN, USAGE = 0, 1, 2
 
@@ -91,8 +90,7 @@ def _serve(
             key = take_key()
             clock = clock or _clock(session, role, key)
             on_rig = bool(os.environ.get("DODO_RIG"))
-            late = 0 if clock.relays else WithheldTruth.load(session.messages).delay
-            service = build(Context(name, flags, session.messages, resources, clock, session, key, late, on_rig))
+            service = build(Context(name, flags, session.messages, resources, clock, session, key, on_rig))
             code = BROKEN
             if world and (service.drive or not os.environ.get("DODO_CLOCK")):
                 session.hear_directly()

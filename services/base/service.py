@@ -78,8 +78,6 @@ class Context:
     """The bus itself; only for a service with ``drive``."""
     key: bytes = field(default=b"", repr=False)
     """The key of the test; empty where there is no runner."""
-    truth_delay: int = 0
-    """How late messages with the truth come, in us: in real time the application answers before it has them."""
     on_rig: bool = False
     """Whether the test runs on a rig, where a service that vanishes may have been unplugged."""
 

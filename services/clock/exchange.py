@@ -15,7 +15,6 @@ from services.base.identity.senders import SenderTable
 from services.base.identity.world import World
 from services.base.lockstep.channel import Channel
 from services.base.lockstep.datagrams import STEP, STEP_DONE, EncodedEnvelope, Reassembly, decode, split
-from services.base.withheld import WithheldTruth
 
 REPEAT_S = 0.2
 _SLICE = 0.05
@@ -66,7 +65,7 @@ class Exchange:
     ) -> None:
         self._session, self._channel, self._take_other = session, channel, take
         self._senders = senders or SenderTable(session.messages)
-        self._world, self._truth = World.load(session.messages), WithheldTruth.load(session.messages)
+        self._world = World.load(session.messages)
         self._step = session.messages.type(STEP)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._number = 0
@@ -111,7 +110,7 @@ class Exchange:
     def repeat_on_bus(self, messages: Iterable[EncodedEnvelope]) -> None:
         """Send messages of services on the bus again, but for those that are not for the application."""
         for each in messages:
-            if not (self._world.holds(each.envelope) or self._truth.holds(each.envelope)):
+            if not self._world.holds(each.envelope):
                 self._session.send_envelope(each.envelope)
 
     def drain(self) -> None:

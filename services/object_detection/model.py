@@ -25,10 +25,8 @@ class DetectionEvaluator(Evaluator):
     for its sample time.
     """
 
-    def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits, truth_delay: int = 0) -> None:
-        """``truth_delay``: how late the truth comes, in us; then a detection counts only before it."""
-        self._truth_delay = 0 if truth else truth_delay
-        super().__init__(rules.max_time, rules.max_delay + self._truth_delay / MICROSECONDS)
+    def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits) -> None:
+        super().__init__(rules.max_time, rules.max_delay)
         self._truth, self._rules, self._limits = truth, rules, limits
         self._score, self._silence = Score(), Silence(rules.start_up)
         self._frames: dict[int, DetectedFrame] = {}
@@ -52,10 +50,6 @@ class DetectionEvaluator(Evaluator):
         if self._is_of_the_future(key):
             self._score.early += isinstance(value, Box)
             return
-        frame = self._frame(key)
-        if frame is not None and self._is_too_late(frame):
-            self._score.late += isinstance(value, Box)
-            return
         self._take(key, number, value, lambda frame: frame.found)
 
     def reveal(self, key: FrameKey, number: int, value: Value) -> None:
@@ -67,13 +61,12 @@ class DetectionEvaluator(Evaluator):
         """There is such a frame; if the application says so, it has answered it."""
         frame = None if by_application and self._is_of_the_future(key) else self._frame(key)
         if frame is not None and by_application:
-            if not self._is_too_late(frame):
-                self._answer(frame)
+            self._answer(frame)
         elif frame is not None:
             frame.has_truth = True
 
     def advance(self, now: int) -> None:
-        patience = self._rules.max_delay * MICROSECONDS + self._truth_delay
+        patience = self._rules.max_delay * MICROSECONDS
         self._settle(lambda frame: now - frame.since >= patience)
 
     def decide(self, span: JudgedTime) -> Verdict:
@@ -112,13 +105,6 @@ class DetectionEvaluator(Evaluator):
         """A frame that comes later must not be used up."""
         return self.arrival is not None and key.time - self.arrival > EARLY
 
-    def _is_too_late(self, frame: DetectedFrame) -> bool:
-        """Whether the application may know the truth of a frame already, where that comes later than the frame."""
-        if not self._truth_delay:
-            return False
-        is_over = self.now is not None and self.now - frame.since > self._rules.max_delay * MICROSECONDS
-        return bool(frame.true) or is_over
-
     def _answer(self, frame: DetectedFrame) -> None:
         if frame.answered is None and self.now is not None:
             frame.answered = self.elapsed(self.now)
@@ -144,14 +130,10 @@ class DetectionEvaluator(Evaluator):
         frame = self._frames.get(key.time)
         if frame is not None or key.time in self._judged or key.time in self._passed_over:
             return frame
-        if self.now is None or self.elapsed(self.now) < self._rules.start or self._is_behind_the_end(key):
+        if self.now is None or self.elapsed(self.now) < self._rules.start:
             self._pass_over(key)
             return None
         return self._frames.setdefault(key.time, DetectedFrame(key, self.now))
-
-    def _is_behind_the_end(self, key: FrameKey) -> bool:
-        """Whether a frame's truth would come too late for the verdict."""
-        return bool(self._truth_delay) and self._ended is not None and key.time > self._ended
 
     def _pass_over(self, key: FrameKey) -> None:
         self._passed_over.add(key.time)

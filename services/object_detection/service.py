@@ -31,7 +31,7 @@ class ObjectDetection(DetectionEvaluator):
         """Raises ValueError for flags that leave something open."""
         flags = context.flags
         truth = _truth(flags)
-        super().__init__(truth, _rules(flags), _limits(flags), context.truth_delay)
+        super().__init__(truth, _rules(flags), _limits(flags))
         self._sender = flags["sender"]
         self.inputs: dict[tuple[str, int | None], Handler] = _handlers(flags["sender"], self.detect)
         if truth is None:

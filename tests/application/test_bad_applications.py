@@ -1,4 +1,4 @@
-"""Each bad application is a pair of files: the compose file, and the text about its problems."""
+"""Each bad application is a pair: a compose file, or a folder with ``docker-compose.yml``, and the text about it."""
 
 from pathlib import Path
 
@@ -9,13 +9,14 @@ from dodo_dsl.diagnostics import format_text, ordered
 from dodo_dsl.terminal import WIDE
 
 FOLDER = Path(__file__).parent / "bad"
-CASES = sorted(p.stem for p in FOLDER.glob("*.yml"))
+CASES = sorted(p.stem for p in FOLDER.iterdir() if p.suffix != ".out")
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_diagnostics(case: str, monkeypatch: pytest.MonkeyPatch, update_goldens: bool) -> None:
     monkeypatch.chdir(FOLDER)
-    source, problems = read_application(Path(f"{case}.yml"))
+    file = Path(f"{case}.yml")
+    source, problems = read_application(file if file.is_file() else Path(case) / "docker-compose.yml")
     text = format_text(ordered(problems), WIDE)
     expected = FOLDER / f"{case}.out"
     if update_goldens:

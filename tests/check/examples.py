@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from dodo_dsl import compiler
+from dodo_dsl.cli.compile import pipeline_file
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.emit.render import File, render_plan
 
@@ -67,8 +68,8 @@ def write(example: str, folder: Path, encoding: str = "utf-8") -> None:
 
 
 def problems(folder: Path) -> list[Diagnostic]:
-    """Every problem that the compiler finds in the folder's tests, planning included."""
-    return compiled(folder)[0]
+    """Every problem that ``dodo compile --check`` finds in the folder's tests and its pipeline, planning included."""
+    return [*compiled(folder)[0], *pipeline_file.problems(folder)]
 
 
 def compiled(folder: Path) -> tuple[list[Diagnostic], list[File]]:

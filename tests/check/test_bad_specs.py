@@ -14,7 +14,7 @@ DEPLOYMENTS = sorted(p.parent.name for p in FOLDER.glob("*/dodo.yml"))
 CASES = [*SPECS, *DEPLOYMENTS]
 
 
-def marked(names: Iterable[str]) -> list[Any]:
+def slow_where_large(names: Iterable[str]) -> list[Any]:
     """Names as parameters; those that need hundreds of instances are slow."""
     return [pytest.param(name, marks=[pytest.mark.slow] if name == "pipeline-limit" else []) for name in names]
 
@@ -30,7 +30,7 @@ def expected(case: str) -> str:
     return (FOLDER / f"{case}.out").read_text()
 
 
-@pytest.mark.parametrize("case", marked(CASES))
+@pytest.mark.parametrize("case", slow_where_large(CASES))
 def test_diagnostics(case: str, monkeypatch: pytest.MonkeyPatch, update_goldens: bool) -> None:
     code, text = said(case, monkeypatch)
     if update_goldens:

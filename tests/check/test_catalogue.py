@@ -8,7 +8,7 @@ import pytest
 
 from dodo_dsl.check import catalogue
 from tests.check import examples
-from tests.check.test_bad_specs import marked
+from tests.check.test_bad_specs import slow_where_large
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "dodo_dsl"
@@ -16,14 +16,14 @@ PAGE = ROOT / "docs" / "reference" / "rules.md"
 RULES = sorted(catalogue.pages())
 
 
-@pytest.mark.parametrize("rule", marked(RULES))
+@pytest.mark.parametrize("rule", slow_where_large(RULES))
 def test_the_bad_example_gives_its_rule(rule: str, tmp_path: Path) -> None:
     page = catalogue.pages()[rule]
     examples.write(page.bad, tmp_path, page.encoding)
     assert rule in {problem.rule for problem in examples.problems(tmp_path)}
 
 
-@pytest.mark.parametrize("rule", marked(RULES))
+@pytest.mark.parametrize("rule", slow_where_large(RULES))
 def test_the_good_example_is_silent(rule: str, tmp_path: Path) -> None:
     examples.write(catalogue.pages()[rule].good, tmp_path)
     assert examples.problems(tmp_path) == []

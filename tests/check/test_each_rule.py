@@ -13,7 +13,7 @@ from dodo_dsl import diagnostics
 from dodo_dsl.check import catalogue
 from dodo_dsl.cli.main import COMMANDS
 from dodo_dsl.diagnostics import Diagnostic
-from tests.check.test_bad_specs import CASES, expected, marked, said
+from tests.check.test_bad_specs import CASES, expected, said, slow_where_large
 
 RULES = sorted(catalogue.pages())
 _RULE = re.compile(r"(?:error|warning)\[([a-z-]+)\]: ")
@@ -33,7 +33,7 @@ def without(rule: str, patch: pytest.MonkeyPatch) -> None:
         patch.setattr(module, "ordered", kept)
 
 
-@pytest.mark.parametrize("rule", marked(RULES))
+@pytest.mark.parametrize("rule", slow_where_large(RULES))
 def test_a_case_fails_without_the_rule(rule: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only the cases that show the rule are run again, as the others do not depend on it."""
     showing = [case for case in CASES if rule in _RULE.findall(expected(case))]

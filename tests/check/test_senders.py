@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.senders import senders, truth_delay_s, withheld_truth
+from dodo_dsl.check.senders import senders, truth
 from tests.check.contexts import resolved
 from tests.run.recorded.made import message, write
 
@@ -43,12 +43,12 @@ def test_what_the_application_declares_is_its_own(tmp_path: Path) -> None:
     assert "opendlv.sim.Command=" not in senders(resolved(APPLICATION, tmp_path))
 
 
-def test_truth_is_of_its_producer_and_withheld(tmp_path: Path) -> None:
+def test_truth_is_of_its_producer(tmp_path: Path) -> None:
     test = resolved(TRUTH, tmp_path)
     boxes = [f"opendlv.logic.perception.Detection{kind}/9" for kind in ("BoundingBox", "Property", "Type")]
     assert {f"{box}=camera" for box in boxes} <= set(senders(test))
-    assert (withheld_truth(test), truth_delay_s(test)) == (tuple(boxes), 1.5)
-    assert withheld_truth(resolved("", tmp_path)) == ()
+    assert truth(test) == tuple(boxes)
+    assert truth(resolved("", tmp_path)) == ()
 
 
 REPLAY = f"""\
@@ -88,5 +88,5 @@ def test_a_recorded_target_is_never_the_producer_of_what_the_application_sends(
     test = resolved(REPLAY.replace("TARGET", target) + application, tmp_path)
     said = [word for word in senders(test) if word.startswith(STEERING)]
     assert said == [guarded] * bool(guarded)
-    assert withheld_truth(test) == tuple(word.partition("=")[0] for word in said)
+    assert truth(test) == tuple(word.partition("=")[0] for word in said)
     assert list(test.left_out["drive"]) == left_out

@@ -3,6 +3,7 @@
 import ast
 import json
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -39,8 +40,10 @@ MAY_HAVE = sum(1 << number for number in (0, 1, 3, 4, 5, 6, 7, 8, 10))
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """What became of the attacks of one run, by name, and the test itself; by the container's user."""
-    return {user: attacked(user, tmp_path_factory.mktemp(user)) for user in CONTAINED}
+    """What became of the attacks of one run, by name, and the test itself; by the container's user, both at once."""
+    with ThreadPoolExecutor() as pool:
+        found = pool.map(lambda user: attacked(user, tmp_path_factory.mktemp(user)), CONTAINED)
+        return dict(zip(CONTAINED, found, strict=True))
 
 
 def attacked(user: str, folder: Path) -> dict[str, Any]:

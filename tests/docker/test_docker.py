@@ -68,16 +68,16 @@ def clean_engine() -> Iterator[None]:
     assert left == set()
 
 
-def compiled(folder: Path) -> Path:
-    """A drive and a recording for lockstep, with a minute for each answer, as this machine may be busy."""
+def compiled(folder: Path, names: tuple[str, ...]) -> Path:
+    """Tests for lockstep, with a minute for each answer, as this machine may be busy."""
     out, own = folder / "generated", folder / "deployment"
-    for name in ("maps", "recordings", "truths", *LOCKSTEP):
+    for name in ("maps", "recordings", "truths", *names):
         shutil.copytree(ROOT / "tests_registry" / name, own / "tests" / name)
     application = ROOT / "examples" / "kiwi" / "docker-compose.yml"
     (own / "dodo.yml").write_text(f"dodo: 1\nregistry: [tests]\napplication: {application}\n")
-    command = [sys.executable, "-m", "dodo_dsl", "compile", *LOCKSTEP, "-o", str(out)]
+    command = [sys.executable, "-m", "dodo_dsl", "compile", *names, "-o", str(out)]
     subprocess.run(command, cwd=own, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True)
-    for name in LOCKSTEP:
+    for name in names:
         plan = json.loads((out / name / "test.json").read_text())
         (clock,) = (service for service in plan["services"] if service["name"] == "dodo-clock")
         clock["flags"].append({"name": "patience", "value": "60", "kind": "text"})
@@ -90,28 +90,31 @@ def compiled(folder: Path) -> Path:
     return out
 
 
-def lockstep(folder: Path, out: Path, backend: str) -> dict[str, dict[str, Any]]:
-    """The results of both at once, each in a run and a report of its own."""
+def lockstep(folder: Path, out: Path, names: tuple[str, ...], backend: str) -> dict[str, dict[str, Any]]:
+    """The results of all at once, each in a run and a report of its own."""
     runs = {
         name: start(folder, "--compiled", str(out / name), "--report", str(folder / backend / name), backend=backend)
-        for name in LOCKSTEP
+        for name in names
     }
     said = {name: run.communicate(timeout=1800)[0] for name, run in runs.items()}
     for name, run in runs.items():
         assert run.returncode == 0, said[name]
-    return {name: results(folder / backend / name)[name] for name in LOCKSTEP}
+    return {name: results(folder / backend / name)[name] for name in names}
 
 
-def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path) -> None:
-    """Two tests at once, beside a flood, traffic on all groups, memory scribbling and a full /tmp in a third."""
+@pytest.mark.parametrize(
+    "names", [DRIVES, pytest.param(LOCKSTEP, marks=pytest.mark.proof)], ids=["a drive", "a recording beside it"]
+)
+def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path, names: tuple[str, ...]) -> None:
+    """Beside a flood, traffic on all groups, memory scribbling and a full /tmp in another test."""
     (tmp_path / "stop").mkdir()
-    out = compiled(tmp_path)
+    out = compiled(tmp_path, names)
     spec, compose = hostile_test(tmp_path)
     words = [str(spec), "--application", str(compose), "--report", str(tmp_path / "hostile")]
     hostile = start(tmp_path, *words)
     try:
         wait_for(hostile, "running")
-        theirs = lockstep(tmp_path, out, "docker")
+        theirs = lockstep(tmp_path, out, names, "docker")
         assert hostile.poll() is None
     finally:
         (tmp_path / "stop" / "now").touch()
@@ -122,7 +125,7 @@ def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path
     for harm in HARMS:
         log = next((tmp_path / "hostile").glob(f"*/logs/application.{harm}.log")).read_text()
         assert log.startswith(f"hostile: {harm}")
-    same(theirs, lockstep(tmp_path, out, "process"))
+    same(theirs, lockstep(tmp_path, out, names, "process"))
     for slug in DRIVES:
         checks = {c["name"]: c for c in theirs[slug]["checks"]}
         assert set(checks) == {"time-to-goal", "to-goal", "wall-margin", "distance", "max-speed", "silence"}
@@ -240,7 +243,7 @@ def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
     """``cd DIR/<slug> && docker compose up``: the verdict stands in the log, whatever lies above."""
     out = tmp_path / "generated"
     (tmp_path / "docker-compose.yml").write_text("services: {stranger: {image: stranger}}\n")
-    subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", "-o", str(out)], cwd=ROOT, check=True)
+    subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", *DRIVES, "-o", str(out)], cwd=ROOT, check=True)
     folder = out / "sil-closed-straight"
     up = ["docker", "compose", "up", "--exit-code-from", "track"]
     result = subprocess.run(up, cwd=folder, capture_output=True, text=True, check=False, timeout=900)

@@ -14,35 +14,10 @@ from tests.docker.compose import IMAGE, Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
 from tests.run.desk import wait_for
+from tests.run.faults import Fault, as_told, faults_on, whole_logs
 from tests.run.helpers import BEGUN, DRIVES, PASS, READY, WAIT
-from tests.run.process.test_faults import FAULTS, NEIGHBOUR
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
-
-HUNGRY = """
-held = []
-time.sleep(1)
-while True:
-    held.append(bytearray(os.urandom(1000)) * 4000)
-"""
-MISSING = "127.0.0.1:9/dodo-no-such-image:1"
-SCRIPTED = {slug: fault for slug, fault in FAULTS.items() if fault is not NEIGHBOUR}
-KINDS = {
-    "missing": ("An image is missing", "error", f"image {MISSING} cannot be pulled: "),
-    "pull": ("The connection breaks in the middle of a pull", "error", "image 127.0.0.1:"),
-    "hungry": (
-        "The application takes more memory than it may",
-        "failed",
-        "application service 'app' ran out of memory after ",
-    ),
-    **{slug: (fault.name, fault.outcome, fault.sentence) for slug, fault in SCRIPTED.items()},
-}
-
-ENDS = {
-    "ends": ("failed", "application service 'app' ended with exit code 0"),
-    "ends-early": ("failed", "application service 'app' ended with exit code 7"),
-    "no-program": ("error", "service 'app' could not be started: "),
-}
 
 
 def told(process: "subprocess.Popen[str]", result: str) -> str:
@@ -56,32 +31,20 @@ def told(process: "subprocess.Popen[str]", result: str) -> str:
     return str(reason)
 
 
-def test_faults_at_once(crate: Crate, book: Book) -> None:
-    jobs = [crate.job(slug, f.judge, f.application, f.environment) for slug, f in FAULTS.items()]
-    jobs.append(crate.job("hungry", application=HUNGRY, mem_limit="64m", memswap_limit="64m"))
-    jobs.append(crate.job("missing", image=MISSING))
-    jobs.append(crate.job("ends", application="sys.exit(0)\n"))
-    jobs.append(crate.job("ends-early", application="sys.exit(7)\n"))
-    jobs.append(crate.job("no-program", entrypoint=["no-such-program"], init=False))
+@pytest.mark.parametrize("faults", faults_on("docker"))
+def test_faults_at_once(faults: dict[str, Fault], crate: Crate, book: Book) -> None:
+    jobs = [crate.job(slug, f.judge, f.application, f.environment, **f.app) for slug, f in faults.items()]
     with BrokenRegistry(is_forgetful=True) as registry:
         jobs.append(crate.job("pull", image=registry.image))
         outcomes = crate.run(*jobs)
     said = [text for _, text in crate.progress.phases]
     assert f"pulling {registry.image}: the connection broke, the engine retries" in said
-    assert outcomes["neighbour"].outcome == "passed", outcomes["neighbour"].reason
-    for slug, (_, outcome, sentence) in KINDS.items():
-        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)
-    for slug, (outcome, sentence) in ENDS.items():
-        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)
-    numbers = crate.log("many-lines").split("\n")[:-1]
-    assert len(numbers) > 10_000
-    assert numbers == [str(n) for n in range(len(numbers))]
-    line = crate.log("long-line")
-    assert (len(line), line[-7:]) == (5_000_007, "\nafter\n")
-    for slug, (name, *_) in KINDS.items():
-        book.record(name, "docker", outcomes[slug].outcome, outcomes[slug].reason)
+    broken = Fault("The connection breaks in the middle of a pull", "error", f"image {registry.image} cannot", {})
+    as_told({**faults, "pull": broken}, outcomes, "docker", book)
+    whole_logs(faults, crate.log)
 
 
+@pytest.mark.proof
 def test_service_that_never_gets_ready(crate: Crate, book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "READY_PATIENCE_S", 2.0)
     (outcome,) = crate.run(crate.job("never-ready", environment=WAIT)).values()
@@ -137,22 +100,19 @@ def test_runners_without_engine_killed_and_unharmed(crate: Crate, book: Book) ->
     book.record("The runner is killed, and run again", "docker", "passed", note)
 
 
-def test_interrupt_does_not_wait_for_a_pull(crate: Crate) -> None:
+def test_interrupts(crate: Crate) -> None:
+    """One does not wait for a pull, and one takes down what has been started."""
     with BrokenRegistry() as registry:
-        run = crate.start(crate.job("interrupted", image=registry.image))
-        wait_for(run, "the connection broke")
-        run.send_signal(signal.SIGINT)
-        assert told(run, "ERROR") == "the run was interrupted"
+        pulls = crate.start(crate.job("pulls", image=registry.image))
+        starts = crate.start(crate.job("starts", environment=WAIT))
+        wait_for(pulls, "the connection broke")
+        pulls.send_signal(signal.SIGINT)
+        assert told(pulls, "ERROR") == "the run was interrupted"
         assert registry.breaks < 6, "the engine's last try"
-    assert run.returncode == 130
-
-
-def test_interrupt_takes_everything_down(crate: Crate) -> None:
-    run = crate.start(crate.job("interrupted", environment=WAIT))
-    wait_for(run, "waiting for environment")
-    run.send_signal(signal.SIGINT)
-    assert told(run, "ERROR") == "the run was interrupted"
-    assert run.returncode == 130
+    wait_for(starts, "waiting for environment")
+    starts.send_signal(signal.SIGINT)
+    assert told(starts, "ERROR") == "the run was interrupted"
+    assert (pulls.returncode, starts.returncode) == (130, 130)
 
 
 def test_kept_project_stays_until_it_is_taken_down(crate: Crate) -> None:

@@ -47,7 +47,7 @@ def repository(tmp_path: Path) -> Path:
         (tmp_path / name / "own").write_text("own")
     (tmp_path / "file").write_text("the file")
     services = {f"swaps-{name}": service(f"{script}; sleep 60", ".:/app") for name, script in SWAPS.items()}
-    mounts = ["./data:/z", "./other:/to-read:ro", "./file:/file"]
+    mounts = ["./data:/z", "./other:/to-read:ro", "./file:/file", "./gone:/g", "./gone-too:/h:ro"]
     services |= {f"looks-{number}": service(LOOK.format(number), *mounts) for number in range(6)}
     (tmp_path / "docker-compose.yml").write_text(json.dumps({"services": services}))
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
@@ -55,10 +55,9 @@ def repository(tmp_path: Path) -> Path:
 
 
 def contents(folder: Path) -> dict[str, str]:
-    """The files of a repository, without what DoDo writes."""
-    every = (path for path in folder.rglob("*") if path.is_file() or path.is_symlink())
-    own = (path for path in every if path.relative_to(folder).parts[0] not in ("dodo-report", "leases"))
-    return {str(path.relative_to(folder)): path.read_text(errors="replace") for path in own}
+    """The files and folders of a repository, without what DoDo writes."""
+    own = (path for path in folder.rglob("*") if path.relative_to(folder).parts[0] not in ("dodo-report", "leases"))
+    return {str(path.relative_to(folder)): path.read_text(errors="replace") if path.is_file() else "" for path in own}
 
 
 def test_files_stay_where_and_what_they_are(repository: Path) -> None:

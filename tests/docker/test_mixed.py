@@ -16,13 +16,11 @@ from dodo_dsl.run.mixed.backends import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.docker.compose import SUBNETS, Crate
-from tests.docker.test_faults import HUNGRY, KINDS
 from tests.faults import Book
 from tests.run.desk import ROOT
-from tests.run.process.test_faults import FAULTS
+from tests.run.faults import Fault, as_told, faults_on
 
 TEST = "sil-closed-straight"
-SCRIPTED = ("neighbour", "killed", "service-killed", "no-verdict")
 
 pytestmark = [
     pytest.mark.engine,
@@ -44,18 +42,15 @@ def separate(job: Job, scripts: Path) -> Job:
     return job
 
 
-def test_faults_beside_processes_of_dodo(crate: Crate, book: Book) -> None:
-    jobs = [crate.job(slug, f.judge, f.application, f.environment) for slug in SCRIPTED for f in [FAULTS[slug]]]
-    jobs.append(crate.job("hungry", application=HUNGRY, mem_limit="64m", memswap_limit="64m"))
+@pytest.mark.parametrize("faults", faults_on("mixed"))
+def test_faults_beside_processes_of_dodo(faults: dict[str, Fault], crate: Crate, book: Book) -> None:
+    """Those that the other backends show, too, are for ``make proof``."""
+    jobs = [crate.job(slug, f.judge, f.application, f.environment, **f.app) for slug, f in faults.items()]
     jobs = [separate(job, crate.bench.folder) for job in jobs]
     runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(len(jobs), lambda job: 1.0), Policy())
     outcomes = {o.slug.removeprefix(f"{crate.mark}-"): o for o in asyncio.run(runner.run(jobs))}
-    assert outcomes["neighbour"].outcome == "passed", outcomes["neighbour"].reason
+    as_told(faults, outcomes, "mixed", book)
     assert "memory video0.argb" in crate.log("neighbour")
-    for slug in {*outcomes} - {"neighbour"}:
-        name, outcome, sentence = KINDS[slug]
-        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(sentence)]) == (outcome, sentence)
-        book.record(name, "mixed", outcomes[slug].outcome, outcomes[slug].reason)
 
 
 def test_default_without_images_of_dodo(tmp_path: Path) -> None:

@@ -1,4 +1,7 @@
-"""Where and how a command is started does not matter on an engine either: the cases in which its paths and users do."""
+"""Where and how a command is started does not matter on an engine either: the cases in which its paths and users do.
+
+Each by itself is for ``make proof``.
+"""
 
 import os
 from dataclasses import replace
@@ -7,28 +10,56 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import __version__
-from tests.drive.test_started_anywhere import OUTSIDE, Case, checkout_of, scratch, started  # noqa: F401
+from tests.drive.test_started_anywhere import OUTSIDE, Case, checkout_of, parameters, scratch, started  # noqa: F401
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
 ODD = "a$HOME:b#c%20 'ü\""
-CASES = (
-    ("docker", Case("subfolder", at="{checkout}/tests")),
-    ("docker", Case("outside", at="{scratch}", words=OUTSIDE, report="checkout/out")),
-    ("docker", Case("umask 077", umask=0o077)),
-    ("docker", Case("odd path", ODD)),
-    ("docker", Case("odd path in ASCII", ODD, environment={"LC_ALL": "C", "PYTHONUTF8": "0"})),
-    ("docker", Case("odd TMPDIR", ODD.replace(":", ""), environment={"TMPDIR": "{checkout}/tests"})),
-    ("docker", Case("no HOME", environment={"HOME": None})),
-    ("mixed", Case("subfolder of a symlink", made="symlink", at="{checkout}/tests")),
-    ("mixed", Case("umask 077", umask=0o077)),
-    ("mixed", Case("odd path", ODD)),
-    ("mixed", Case("TMPDIR in memory", environment={"TMPDIR": "/dev/shm"})),
-    ("mixed", Case("read-only checkout", made="read-only", report="{scratch}/out")),
+WITHOUT_COLON = ODD.replace(":", "")
+DOCKER = (
+    Case("subfolder", at="{checkout}/tests"),
+    Case("outside", at="{scratch}", words=OUTSIDE, report="checkout/out"),
+    Case("umask 077", umask=0o077),
+    Case("odd path", ODD),
+    Case("odd path in ASCII", ODD, environment={"LC_ALL": "C", "PYTHONUTF8": "0"}),
+    Case("odd TMPDIR", WITHOUT_COLON, environment={"TMPDIR": "{checkout}/tests"}),
+    Case("no HOME", environment={"HOME": None}),
 )
+MIXED = (
+    Case("subfolder of a symlink", made="symlink", at="{checkout}/tests"),
+    Case("umask 077", umask=0o077),
+    Case("odd path", ODD),
+    Case("TMPDIR in memory", environment={"TMPDIR": "/dev/shm"}),
+    Case("read-only checkout", made="read-only", report="{scratch}/out"),
+)
+IN_ASCII = Case(
+    "subfolder of an odd path in ASCII without HOME, umask 077",
+    ODD,
+    at="{checkout}/tests",
+    umask=0o077,
+    environment={"LC_ALL": "C", "PYTHONUTF8": "0", "HOME": None},
+)
+FROM_OUTSIDE = Case(
+    "outside, odd TMPDIR",
+    WITHOUT_COLON,
+    at="{scratch}",
+    words=OUTSIDE,
+    report="{checkout}/out",
+    environment={"TMPDIR": "{checkout}/tests"},
+)
+READ_ONLY = Case(
+    "read-only checkout in an odd path, umask 077, TMPDIR in memory",
+    ODD,
+    made="read-only",
+    at="{checkout}/tests",
+    report="{scratch}/out",
+    umask=0o077,
+    environment={"TMPDIR": "/dev/shm"},
+)
+CASES = parameters((IN_ASCII, FROM_OUTSIDE), DOCKER, "docker") + parameters((READ_ONLY,), MIXED, "mixed")
 
 
-@pytest.mark.parametrize(("backend", "case"), CASES, ids=[f"{backend} {case.name}" for backend, case in CASES])
+@pytest.mark.parametrize(("backend", "case"), CASES)
 def test_it_passes(backend: str, case: Case, scratch: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
     """The application is a user whom no file of DoDo's belongs to."""
     config = os.environ.get("DOCKER_CONFIG", str(Path.home() / ".docker"))

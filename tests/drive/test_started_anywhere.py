@@ -1,4 +1,7 @@
-"""Where and how a command is started does not matter: a table of cases, each of which drives a few centimetres."""
+"""Where and how a command is started does not matter: a table of cases, each of which drives a few centimetres.
+
+``make test`` has several conditions in one case; each by itself, which tells what matters, is for ``make proof``.
+"""
 
 import contextlib
 import json
@@ -10,6 +13,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -109,7 +113,86 @@ FOLDERS_OF_USERS = (
     Case("TMPDIR among the tests", environment={"TMPDIR": "{checkout}/tests"}),
     Case("TMPDIR not UTF-8", environment={"TMPDIR": f"{{scratch}}/{NOT_UTF8}"}),
 )
-CASES = (*FOLDERS, *USERS, *LOCALES, *PATHS, *FOLDERS_OF_USERS)
+ONE_BY_ONE = (*FOLDERS, *USERS, *LOCALES, *PATHS, *FOLDERS_OF_USERS)
+ODD = "-a b#c%20d%'\"`$HOME${b}$(c){{d}}{%e:,=\\n\n[b]*?<i>&amp;größe"
+"""All that is odd in ``PATHS``."""
+ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+TOGETHER = (
+    Case("odd path in ASCII without HOME", ODD, environment={**ASCII, "HOME": None}),
+    Case(
+        "odd path of a user without HOME, umask 077, TMPDIR",
+        ODD,
+        umask=0o077,
+        is_user=True,
+        environment={"HOME": None, "TMPDIR": "{scratch}/tmp"},
+    ),
+    Case(
+        "deep subfolder of a symlink, umask 077, memories of POSIX",
+        made="symlink",
+        at="{checkout}/tests/sil-tiny",
+        report="../../dodo-report",
+        umask=0o077,
+        environment={"CLUON_SHAREDMEMORY_POSIX": "1", "HOME": "{scratch}/missing"},
+    ),
+    Case(
+        "outside, report in the application's folder, a user with umask 027",
+        at="{scratch}",
+        words=OUTSIDE,
+        report="checkout/out",
+        umask=0o027,
+        is_user=True,
+        environment={"HOME": "/usr"},
+    ),
+    Case(
+        "read-only checkout of a user, TMPDIR in memory",
+        made="read-only",
+        report="{scratch}/out",
+        is_user=True,
+        environment={"TMPDIR": "/dev/shm"},
+    ),
+    Case(
+        "read-only checkout, HOME and XDG folders",
+        made="read-only",
+        report="{scratch}/a/b",
+        environment={"HOME": "/proc", "XDG_STATE_HOME": "/proc/a", "XDG_CACHE_HOME": "/proc/b"},
+    ),
+    Case(
+        "worktree, relative folders, POSIX in UTF-8",
+        made="worktree",
+        environment={"HOME": "relative", "TMPDIR": ".", "LC_ALL": "POSIX", "PYTHONUTF8": "1"},
+    ),
+    Case(
+        "nothing is UTF-8 but the checkout",
+        report=NOT_UTF8,
+        environment={"HOME": f"{{scratch}}/{NOT_UTF8}", "TMPDIR": f"{{scratch}}/{NOT_UTF8}"},
+    ),
+    Case(
+        "subfolder, TMPDIR among the tests, blanks in XDG folders",
+        at="{checkout}/tests",
+        environment={
+            "TMPDIR": "{checkout}/tests",
+            "XDG_STATE_HOME": "{scratch}/st ate",
+            "XDG_CACHE_HOME": "{scratch}/ca che",
+        },
+    ),
+    Case("not UTF-8 in ASCII", NOT_UTF8, environment=ASCII, code=2, says="is not UTF-8"),
+    Case(
+        "compiled elsewhere from a subfolder of an odd path",
+        ODD,
+        at="{checkout}/tests",
+        words=("compile", "-o", "{report}"),
+        report="{scratch}/generated",
+    ),
+    Case("a new test from a subfolder", at="{checkout}/tests", words=("new", "sil-more")),
+)
+
+
+def parameters(together: tuple[Case, ...], one_by_one: tuple[Case, ...], *before: str) -> list[Any]:
+    """Cases of ``make test``, and those of ``make proof``, with what is ``before`` each."""
+    short = [pytest.param(*before, case, id=" ".join((*before, case.name))) for case in together]
+    long = [" ".join((*before, "only", case.name)) for case in one_by_one]
+    proof = pytest.mark.proof
+    return [*short, *(pytest.param(*before, c, id=i, marks=proof) for c, i in zip(one_by_one, long, strict=True))]
 
 
 @pytest.fixture
@@ -122,7 +205,7 @@ def scratch() -> Iterator[Path]:
     shutil.rmtree(os.fsencode(folder))
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", parameters(TOGETHER, ONE_BY_ONE))
 def test_it_passes(case: Case, scratch: Path) -> None:
     with checkout_of(case, scratch) as checkout:
         started(case, scratch, checkout)

@@ -70,3 +70,10 @@ def test_only_the_service_that_moves_the_rig_may_open_terminals(plan: Plan) -> N
         (("/dev/video0",), ("video",)),
         ((), ()),
     ]
+
+
+def test_a_service_sees_the_shared_files_of_its_own_paths(plan: Plan) -> None:
+    map_, other = f"{'0' * 64}-b.json", f"{'1' * 64}-other.rec"
+    (camera,) = containers(replace(plan, shared={"a/$b.json": map_, "a/$b.json2": other}), "environment")
+    mount = {**FILES_MOUNT, "source": f"../_files/{map_}", "target": f"/_files/{map_}"}
+    assert camera.volumes == ("tmp:/tmp", FILES_MOUNT, mount, "report:/dodo/report")

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.emit.readers import run, tree
+from dodo_dsl.plan import test_files
+from dodo_dsl.plan.test_files import SHARED
+from tests.emit.readers import ROOT, run, tree
 
 CURVE, STRAIGHT = "sil-closed-left-curve", "sil-closed-straight"
 
@@ -83,3 +85,84 @@ def test_files_of_a_test_are_readable_for_users_of_containers(
     files = [test / "files", *(test / "files").rglob("*")]
     assert len(files) > 3
     assert {oct(path.stat().st_mode & 0o077) for path in files} == {"0o55", "0o44"}
+
+
+@pytest.fixture
+def pair(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The output folder of two tests that share the files of one map, all of which count as large."""
+    shutil.copytree(ROOT / "tests_registry" / STRAIGHT, tmp_path / "registry" / STRAIGHT)
+    for name in ("maps", "vehicles"):
+        shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "registry" / name)
+    spec = "dodo: 1\nname: sil-b\nextends: ../sil-closed-straight/sil-closed-straight.dodo.yml\n"
+    (tmp_path / "registry/sil-b").mkdir()
+    (tmp_path / "registry/sil-b/sil-b.dodo.yml").write_text(spec)
+    application = f"application: {ROOT}/examples/kiwi/docker-compose.yml\n"
+    (tmp_path / "dodo.yml").write_text(f"dodo: 1\nregistry: [registry]\n{application}")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(test_files, "LARGE", 1)
+    return tmp_path / "generated"
+
+
+def links(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_symlink()]
+
+
+def test_files_that_tests_share_stand_once(pair: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each path of a test opens the file as before, and a compilation with fewer tests brings the copies back."""
+    assert run("compile")[0] == 0
+    shared = {path.relative_to(pair / "sil-b/files").as_posix(): path.read_bytes() for path in links(pair / "sil-b")}
+    assert "maps/straight/map.json" in shared
+    assert len({path.stat().st_ino for path in links(pair)}) == len(list((pair / SHARED).iterdir())) <= len(shared)
+    first = tree(pair)
+    assert [run("compile", "--check")[:2], run("compile")[0]] == [(0, "2 tests checked: no problems\n"), 0]
+    assert tree(pair) == first
+    assert run("compile", "sil-b")[0] == 0
+    assert (links(pair), (pair / SHARED).exists()) == ([], False)
+    assert {name: (pair / "sil-b/files" / name).read_bytes() for name in shared} == shared
+    alone = tree(pair)
+    assert run("compile")[0] == 0 and tree(pair) == first
+    (next((pair / SHARED).iterdir())).write_text("other")
+    (pair / SHARED / f"{'0' * 64}-old.rec").touch()
+    code, out, _ = run("compile", "--check")
+    assert code == 1 and f"differs: {SHARED}/" in out and f"no longer needed: {SHARED}/000" in out
+    monkeypatch.setattr(test_files, "LARGE", 1 << 20)
+    assert run("compile", "sil-b")[0] == 0 and tree(pair) == alone
+
+
+def test_files_of_the_repository_are_not_copied(pair: Path, tmp_path: Path) -> None:
+    assert run("compile", "--files", "repository", "sil-b")[0] == 0
+    assert [path for path in pair.rglob("*.json") if not path.is_symlink()] == [pair / "sil-b/test.json"]
+    found = {path.resolve().relative_to(tmp_path).parts[0] for path in (pair / SHARED).iterdir()}
+    assert found == {"registry"}
+    before = tree(pair)
+    assert run("compile", "--files", "repository", "sil-b", "--check")[0] == 0
+    assert run("compile", "sil-b", "--check")[0] == 1
+    assert run("compile", "sil-b")[0] == 0 and links(pair) == []
+    assert run("compile", "--files", "repository", "sil-b")[0] == 0 and tree(pair) == before
+    assert tree(tmp_path / "registry")["maps/straight/map.json"] == before["sil-b/files/maps/straight/map.json"]
+    assert run("compile", "--files", "repository")[0] == 0 and links(pair / SHARED)
+    assert run("compile")[0] == 0 and links(pair / SHARED) == []
+    code, _, err = run("compile", "--files", "repository", "sil-b", "--output", str(tmp_path.parent / "elsewhere"))
+    assert code == 2 and "needs an output folder in the repository" in err
+
+
+def test_nothing_is_written_through_links_that_look_like_shared_files(pair: Path, tmp_path: Path) -> None:
+    """A repository may hold its output, with links that lead elsewhere."""
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs/map.json").write_text("untouched")
+    assert run("compile")[0] == 0
+    wanted = tree(pair)
+    for path in (pair / SHARED).iterdir():
+        path.unlink()
+        path.symlink_to(tmp_path / "theirs/map.json")
+    name = f"{'0' * 64}-straight"
+    (pair / SHARED / name).symlink_to(tmp_path / "theirs")
+    shutil.rmtree(pair / "sil-b/files/maps/straight")
+    (pair / "sil-b/files/maps/straight").symlink_to(f"../../../{SHARED}/{name}")
+    assert run("compile")[0] == 0
+    assert tree(pair) == wanted
+    assert tree(tmp_path / "theirs") == {"map.json": b"untouched"}
+    shutil.rmtree(pair / SHARED)
+    (pair / SHARED).symlink_to(tmp_path / "theirs")
+    code, _, err = run("compile")
+    assert code == 2 and "a symlink, which no output follows" in err

@@ -18,6 +18,16 @@ def test_what_is_made_of_the_table_is_up_to_date() -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.skipif(not (ROOT / ".venv").is_dir(), reason="DoDo is not installed in .venv")
+def test_scripts_use_the_python_of_the_checkout(tmp_path: Path) -> None:
+    """Whichever runs them: one without any package, as the system's may be."""
+    bare = [str(ROOT / ".venv" / "bin" / "python"), "-c", "import sys; print(sys._base_executable)"]
+    base = subprocess.run(bare, capture_output=True, text=True, check=True).stdout.strip()
+    words = [base, "-S", SCRIPT, "--check"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=30, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_a_stale_file_is_named(tmp_path: Path) -> None:
     for name in ("firmware/protocol.yml", "scripts/make-protocol"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

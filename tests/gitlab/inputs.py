@@ -1,16 +1,21 @@
 """Templates as GitLab includes them: inputs are checked and put into the parsed YAML, then jobs extend others."""
 
+import functools
+import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from dodo_dsl import package_data
+from dodo_dsl.cli.compile.pipeline_rules import is_made, may_be_there
 from dodo_dsl.cli.new.repository_files import PIPELINES
 
 TEMPLATES = [package_data.templates() / name / "template.yml" for name in PIPELINES]
 TYPES = {"string": str, "array": list, "boolean": bool, "number": (int, float)}
+KEYWORDS = ("default", "variables", "workflow", "include", "spec")
 BLOCK = re.compile(r"\$\[\[\s*inputs\.([\w-]+)\s*\]\]")
 Config = dict[str, Any]
 
@@ -21,13 +26,18 @@ class Refused(Exception):
 
 def specified(template: Path) -> Config:
     """The inputs that a template takes, by name."""
-    header, _ = yaml.safe_load_all(template.read_text())
-    return dict(header["spec"]["inputs"])
+    return dict(_parsed(template)[0]["spec"]["inputs"])
+
+
+@functools.cache
+def _parsed(template: Path) -> tuple[Config, Config]:
+    header, body = yaml.load_all(template.read_text(), Loader=yaml.CSafeLoader)
+    return header, body
 
 
 def included(template: Path, **inputs: Any) -> Config:
     """A template with its inputs, an underscore for each hyphen of their names."""
-    _, config = yaml.safe_load_all(template.read_text())
+    config = _parsed(template)[1]
     specs = specified(template)
     given = {name.replace("_", "-"): value for name, value in inputs.items()}
     if unknown := given.keys() - specs.keys():
@@ -35,7 +45,11 @@ def included(template: Path, **inputs: Any) -> Config:
     values = {name: given.get(name, spec["default"]) for name, spec in specs.items()}
     for name, value in values.items():
         _check(name, specs[name], value)
-    return dict(_interpolated(config, values))
+    made = dict(_interpolated(config, values))
+    for job in made.values():
+        if "needs" in job:  # the one list in which GitLab takes lists
+            job["needs"] = [need for entry in job["needs"] for need in (entry if isinstance(entry, list) else [entry])]
+    return made
 
 
 def _check(name: str, spec: Config, value: Any) -> None:
@@ -43,6 +57,8 @@ def _check(name: str, spec: Config, value: Any) -> None:
         raise Refused(f"{name} is no {spec.get('type', 'string')}")
     if "regex" in spec and not re.search(spec["regex"], value):
         raise Refused(f"{name} does not match")
+    if value not in spec.get("options", [value]):
+        raise Refused(f"{name} is none of {spec['options']}")
 
 
 def _interpolated(node: Any, values: Config) -> Any:
@@ -59,41 +75,58 @@ def _interpolated(node: Any, values: Config) -> Any:
 
 
 def _text(value: Any) -> str:
-    """As Ruby writes it."""
+    """As Ruby writes it within a text."""
+    return value if isinstance(value, str) else _ruby(value)
+
+
+def _ruby(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
-    return "[" + ", ".join(f'"{word}"' for word in value) + "]" if isinstance(value, list) else str(value)
+    if isinstance(value, dict):
+        return "{" + ", ".join(f":{key}=>{_ruby(below)}" for key, below in value.items()) + "}"
+    return "[" + ", ".join(map(_ruby, value)) + "]" if isinstance(value, list) else json.dumps(value)
+
+
+def merged(*configs: Config) -> Config:
+    """Files that are included one after the other, as one."""
+    made: Config = {}
+    for config in configs:
+        made = _merged(made, config)
+    return made
 
 
 def jobs(*configs: Config) -> Config:
     """The jobs of files that are included one after the other, each with what it extends."""
-    merged: Config = {}
-    for config in configs:
-        merged = _merged(merged, config)
-    found = {name: _extended(name, merged) for name in merged if not name.startswith(".")}
-    return {name: job for name, job in found.items() if "script" in job or "trigger" in job}
+    config = merged(*configs)
+    found = {
+        name: _extended(name, config)
+        for name, value in config.items()
+        if isinstance(value, dict) and name not in KEYWORDS and not name.startswith(".")
+    }
+    return {name: job for name, job in found.items() if {"script", "trigger"} & job.keys()}
 
 
-def is_run(job: Config, variables: dict[str, str]) -> bool:
-    """Whether a job's rules add it to a pipeline with these variables."""
-    first = next((rule for rule in job["rules"] if _holds(rule.get("if", '""==""'), variables)), {"when": "never"})
-    return bool(first.get("when") != "never")
+def listed(config: Config, variables: Mapping[str, str]) -> set[str]:
+    """The names of the jobs that GitLab adds to a pipeline with these variables; none where it makes no such pipeline.
+
+    As GitLab does, a job needs what it needs: without one that is not optional there is no pipeline at all.
+    """
+    workflow = config.get("workflow")
+    if not is_made(workflow, variables):
+        return set()
+    found = {
+        name: job
+        for name, job in jobs(config).items()
+        if may_be_there(job, variables, by_workflow="rules" in (workflow or {}))
+    }
+    for name, job in found.items():
+        needed = {n if isinstance(n, str) else n["job"] for n in job.get("needs", []) if not _is_optional(n)}
+        assert needed <= found.keys(), f"{name} needs {needed - found.keys()}"
+    return set(found)
 
 
-def _holds(condition: str, variables: dict[str, str]) -> bool:
-    """Of what the templates use: ``&&``, ``==``, texts in quotation marks, and variables; one alone is not empty."""
-    return all(_agree([_value(side.strip(), variables) for side in part.split("==")]) for part in condition.split("&&"))
-
-
-def _agree(sides: list[str]) -> bool:
-    return len(set(sides)) == 1 and (len(sides) > 1 or bool(sides[0]))
-
-
-def _value(word: str, variables: dict[str, str]) -> str:
-    if word.startswith("$"):
-        return variables.get(word[1:], "")
-    assert re.fullmatch(r'"[^"]*"', word), word
-    return word[1:-1]
+def _is_optional(need: Any) -> bool:
+    return isinstance(need, dict) and bool(need.get("optional"))
 
 
 def _extended(name: str, config: Config) -> Config:

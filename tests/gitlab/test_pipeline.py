@@ -10,9 +10,11 @@ import yaml
 
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.emit.job_options import JobOptions
-from dodo_dsl.emit.pipeline import SearchJobs, pipeline_problems
+from dodo_dsl.emit.pipeline import SearchJobs, artifact_problems, pipeline_problems
 from dodo_dsl.emit.render import render_pipeline
+from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.model import Place, Plan, Pooled, Suite
+from dodo_dsl.plan.test_files import FileCopy
 
 OnRig = Callable[[str, str], Plan]
 
@@ -250,3 +252,42 @@ def test_the_gate_counts_and_needs_stay_few(plan: Plan, on_rig: OnRig) -> None:
     (problem,) = problems(*plans, on_rig("hil", "kiwi"))
     assert "has 501 jobs" in problem.message
     assert len(child(*plans, on_rig("hil", "kiwi"))["hil"]["needs"]) == 2
+
+
+def test_an_artifact_over_the_limit_is_a_warning_that_names_the_largest_files(plan: Plan, tmp_path: Path) -> None:
+    """Shared files count once, and those of the repository not at all."""
+    for name, size in (("small", 1), ("large", 60), ("linked", 900)):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(size << 20)
+    small, large, linked = (FileCopy(name, tmp_path / name) for name in ("small", "large", "linked"))
+    other = replace(plan, slug="other")
+    again = replace(large, target="again")
+
+    def found(limit: int, *copies: FileCopy) -> list[Diagnostic]:
+        every = {plan.slug: (small, replace(linked, shared="0", is_linked=True)), "other": copies}
+        return artifact_problems(Compiled(Suite((plan, other)), every), JobOptions(artifact_mb=limit))
+
+    (problem,) = found(100, large, again)
+    assert (problem.severity, problem.rule, problem.span.file) == ("warning", "pipeline-limit", plan.spec)
+    assert "has 121 MB of files before it is packed, more than 100 MB" in problem.message
+    assert "again (60 MB), large (60 MB), small (1 MB)" in problem.message
+    assert "--files repository" in problem.hint and "--artifact-limit" in problem.hint
+    assert found(121, large, again) == found(0, large, again) == []
+    assert found(100, *(replace(copy, shared="1") for copy in (large, again))) == []
+
+
+def test_jobs_with_files_of_the_repository_check_it_out(
+    plan: Plan, tmp_path: Path, accepted: Callable[..., None]
+) -> None:
+    file = render_pipeline(Suite((plan,)), "generated", (), JobOptions(from_repository=True))
+    job = yaml.safe_load(file.text)[plan.slug]
+    assert job["variables"] == {"GIT_STRATEGY": "fetch", "GIT_LFS_SKIP_SMUDGE": "0"}
+    assert "variables" not in child(plan)[plan.slug]
+    (tmp_path / file.path).write_text(file.text)
+    accepted(tmp_path / file.path)
+
+
+def test_artifacts_of_the_child_expire(plan: Plan) -> None:
+    made = yaml.safe_load(render_pipeline(Suite((plan,)), "generated", [SearchJobs("x", "x", 2)]).text)
+    kept = [job["artifacts"] for job in made.values() if "artifacts" in job]
+    assert len(kept) == 3 and all(artifacts["expire_in"] for artifacts in kept)

@@ -1,16 +1,21 @@
 """All images, built once for all tests from the base image that needs no registry."""
 
+import functools
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from tests.firmware.programs import make
 from tests.images.dockerfile import ROOT
 
-BASE = "dodo-test-base"
+BASE, WITH_PROGRAMS = "dodo-test-base", "dodo-test-programs:images"
+PROGRAMS = {"docker": "usr/local/bin", "bwrap": "usr/bin", "git": "usr/bin"}
+PLUGINS = ("docker-compose", "docker-buildx")
 SOURCE = "https://git.example.org/dodo"
 
 
@@ -49,12 +54,46 @@ def build(base_image: str, *words: str) -> dict[str, str]:
     return {line[1].rpartition("/")[2].rpartition(":")[0]: line[1] for line in lines}
 
 
-@pytest.fixture(scope="session")
-def built(base_image: str) -> dict[str, str]:
-    """All images under the names that compiled tests ask for; the gantry's holds the emulated rig where it can be."""
+@functools.cache
+def with_programs(base_image: str) -> str:
+    """The base image with this machine's own programs that the image `dodo` has, so that its build needs no packages.
+
+    All images stand on it, so that they share their layers with that of `dodo`. It is the base image alone if some of
+    the programs are missing.
+    """
+    copied = {f"{where}/{name}": shutil.which(name) for name, where in PROGRAMS.items()}
+    copied |= {f"usr/local/libexec/docker/cli-plugins/{name}": _plugin(name) for name in PLUGINS}
+    if None in copied.values():
+        return base_image
+    with tempfile.TemporaryDirectory() as name:
+        for target, source in copied.items():
+            place = Path(name, "root", target)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(str(source), place)
+        Path(name, "Dockerfile").write_text(f"FROM {base_image}\nCOPY root /\n")
+        docker("build", "--quiet", "--tag", WITH_PROGRAMS, name)
+    return WITH_PROGRAMS
+
+
+def _plugin(name: str) -> str | None:
+    places = (Path.home() / ".docker" / "cli-plugins", Path("/usr/libexec/docker/cli-plugins"))
+    return next((str(folder / name) for folder in places if (folder / name).is_file()), None)
+
+
+@functools.cache
+def _all_images(base_image: str) -> dict[str, str]:
     if shutil.which("avr-gcc"):
         make("firmware", "emulator")
     return build(base_image)
+
+
+@pytest.fixture(scope="session")
+def built(base_image: str) -> dict[str, str]:
+    """All images under the names that compiled tests ask for; the gantry's holds the emulated rig where it can be.
+
+    They are built once, although this is another fixture in each folder that imports it.
+    """
+    return _all_images(with_programs(base_image))
 
 
 @pytest.fixture

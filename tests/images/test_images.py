@@ -15,8 +15,8 @@ import yaml
 from dodo_dsl import __version__
 from dodo_dsl.images import build_context
 from dodo_dsl.spec.manifest import Manifest, load_manifests
-from tests.images.conftest import build, docker
-from tests.images.dockerfile import ROOT
+from tests.images.conftest import build, docker, with_programs
+from tests.images.dockerfile import ROOT, stages
 from tests.images.layers import layers
 from tests.images.service_folders import folders_of
 
@@ -26,6 +26,8 @@ MANIFESTS, _ = load_manifests()
 HARDENED = ("--read-only", "--cap-drop", "ALL", "--security-opt", "no-new-privileges:true")
 SHARING = 1.15
 """Design section 9: bytes of all images against the largest one's."""
+
+MOST_LAYERS = 3
 
 each_service = pytest.mark.parametrize("manifest", MANIFESTS.values(), ids=lambda m: m.name)
 
@@ -126,7 +128,9 @@ def test_service_starts_from_an_image_that_holds_all_it_needs(
 def test_a_build_takes_another_prefix_and_tag(built: dict[str, str], base_image: str) -> None:
     reference = "dodo-test/base:images"
     try:
-        assert build(base_image, "base", "--prefix", "dodo-test", "--tag", "images") == {"base": reference}
+        assert build(with_programs(base_image), "base", "--prefix", "dodo-test", "--tag", "images") == {
+            "base": reference
+        }
         assert config(reference) == config(built["base"])
     finally:
         docker("image", "rm", "--force", reference)
@@ -200,6 +204,18 @@ def test_camera_shares_memory_with_another_user(built: dict[str, str], volume: s
 
 
 def test_layers_are_shared(built: dict[str, str]) -> None:
+    """A service is some layers of its own on those of the stage that it stands on."""
+    words = ("image", "inspect", "--format", "{{json .RootFS.Layers}}")
+    rows = docker(*words, *built.values()).splitlines()
+    found = dict(zip(built, map(json.loads, rows), strict=True))
+    for name in {*built} - {"base", "geometry", "vision"}:
+        below = found[stages()[name].stands_on]
+        assert found[name][: len(below)] == below, name
+        assert len(found[name]) - len(below) <= MOST_LAYERS, name
+
+
+@pytest.mark.proof
+def test_images_weigh_little_together(built: dict[str, str]) -> None:
     found = layers(sorted(built.values()))
     assert len(found) == len(built)
     together = sum({digest: size for own in found.values() for digest, size in own.items()}.values())

@@ -106,6 +106,7 @@ plans = st.builds(
     ),
     messages=st.lists(_inside, max_size=2).map(tuple),
     import_paths=_words,
+    shared=st.dictionaries(_inside, st.just(f"{'0' * 64}-a.rec"), max_size=2),
     source_map=st.dictionaries(
         _texts, st.builds(Place, _texts, st.integers(1, 1 << 20), st.integers(1, 1 << 20)), max_size=2
     ),

@@ -44,6 +44,8 @@ WRONG: list[tuple[str, Any, str]] = [
     ("messages", ["../x.odvd"], "messages"),
     ("messages", ["/x.odvd"], "messages"),
     ("import_paths", ["a\0b"], "import path"),
+    ("shared", {"a.rec": "../a.rec"}, "shared file"),
+    ("shared", {"../a.rec": f"{'0' * 64}-a.rec"}, "shared file"),
     ("goals", [{"check": "time", "zero": 1, "one": 1, "weight": 1}], "goal"),
     ("goals", [{"check": 3, "zero": 1, "one": 2, "weight": 1}], "goal"),
 ]

@@ -1,5 +1,6 @@
 """Files of the application that a compiled test reads where they are."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -67,3 +68,13 @@ def test_own_state_and_caches_in_the_repository_are_hidden(tmp_path: Path, monke
         monkeypatch.setenv(variable, str(team / name))
     made = Application(".", (ApplicationService("driver"),))
     assert hidden_folders(made, team, tmp_path / "report") == [team / ".state" / "dodo", team / ".cache" / "dodo"]
+
+
+def test_files_that_tests_share_are_hidden_with_the_tests(tmp_path: Path) -> None:
+    """Also where the tests are compiled into the application's own folder."""
+    for name in ("dil-a", "_files", "out/dil-a", "out/_files"):
+        (tmp_path / name).mkdir(parents=True)
+    made = Application(folder="..", services=())
+    elsewhere = tmp_path.parent / "report"
+    assert hidden_folders(made, tmp_path / "dil-a", elsewhere) == [tmp_path / "dil-a", tmp_path / "_files"]
+    assert hidden_folders(replace(made, folder="../.."), tmp_path / "out/dil-a", elsewhere) == [tmp_path / "out"]

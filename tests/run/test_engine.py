@@ -164,7 +164,8 @@ def test_what_is_not_measured() -> None:
 
 def using(used: Callable[[float], Mapping[str, Used] | None], **more: Any) -> ScriptedBackend:
     """A test of 5 s, in lockstep of 20 s test time."""
-    events = [(0.0, Time(0.0, False)), (5.0, Time(20.0, False)), (5.0, PASSED), (5.0, ENDED), (5.0, Time(20.0, True))]
+    times = [(0.25 * n, Time(1.0 * n, False)) for n in range(21)]
+    events = [*times, (5.0, PASSED), (5.0, ENDED), (5.0, Time(20.0, True))]
     return ScriptedBackend(plan(**more), {**READY, "begin": events}, uses=used)
 
 

@@ -13,6 +13,7 @@ from dodo_dsl.application.access.mount_findings import mount_findings
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
 from dodo_dsl.application.access.shared_findings import OWN_VOLUMES, shared_findings
 from dodo_dsl.application.model import FILES
+from dodo_dsl.application.nested_mounts import within_another
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 _SERVICES = "services"
@@ -40,6 +41,7 @@ def compiled_findings(config: Mapping[str, Any], test: CompiledTest) -> Iterator
     others = {name: about for name, about in volumes.items() if name not in OWN_VOLUMES}
     yield from volume_findings(others, test.limits, compiled=True)
     yield from _written(others, test.paths)
+    yield from _nested(config, test)
     around = Surroundings(test.paths, {}, volumes, compiled=True, ports=test.access.ports, limits=test.limits)
     for name, service in config.get(_SERVICES, {}).items():
         if name in test.application:
@@ -59,6 +61,30 @@ def _written(volumes: Mapping[str, Any], paths: HostPaths) -> Iterator[AccessFin
         device = str(options.get("device") or "")
         if device and not host_access.is_read_only(about) and not paths.is_writable(device):
             yield AccessFinding(("volumes", name, "driver_opts", "o"), f"'{device}' is mounted to be written to")
+
+
+def _nested(config: Mapping[str, Any], test: CompiledTest) -> Iterator[AccessFinding]:
+    """Mounts within folders to which a service may write, whatever variables have made of them."""
+    volumes = config.get("volumes") or {}
+    mounts: list[tuple[Steps, str, str]] = []
+    for name, service in config.get(_SERVICES, {}).items():
+        if name not in test.application and name != FILES:
+            continue
+        for item, volume in enumerate(service.get("volumes") or ()):
+            shown = volume if isinstance(volume, dict) else {}
+            found, about = host_access.mount(volume), volumes.get(str(shown.get("source"))) or {}
+            is_bound = shown.get("type") == "volume" and host_access.is_bound(about)
+            source = str(about["driver_opts"].get("device") or "") if is_bound else found.source
+            if is_bound or shown.get("type") == "bind":
+                is_read = found.read_only or (is_bound and host_access.is_read_only(about))
+                mounts.append(((_SERVICES, name, "volumes", item, "source"), source, "" if is_read else name))
+    for key in ("secrets", "configs"):
+        files = {n: each.get("file") for n, each in (config.get(key) or {}).items() if isinstance(each, dict)}
+        mounts += [((key, name, "file"), str(file), "") for name, file in files.items() if file]
+    every = [(source, writer) for _, source, writer in mounts]
+    for steps, source, _ in mounts:
+        if problem := within_another(source, every, test.paths):
+            yield AccessFinding(steps, *problem)
 
 
 def _is_allowed(finding: AccessFinding, access: Access) -> bool:

@@ -1,12 +1,14 @@
 """``application-memory``: the shared memories that the application asks for are made by services of the test."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
 
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.access import filled
-from dodo_dsl.application.model import ComposeService
+from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.slips import flags
 from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.replayed import IMAGE, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Span, closest
 from dodo_dsl.source import Scalar
 
@@ -16,7 +18,8 @@ Asked = dict[str, Span]
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:
     """A service that reads one memory of the test may make others, and so may services that share one."""
-    made = {end.port.name for end in context.wiring.produced if end.port.kind == "memory"}
+    ends = [end for end in context.wiring.produced if end.port.kind == "memory"]
+    made = {end.port.name for end in ends}
     if not made or context.application is None or not context.spec.is_whole or not context.test.is_complete:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
@@ -24,11 +27,30 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.application.services.values():
         yield from _slips(service, known, made)
     asked = {service.name: _asked(service, known) for service in context.application.services.values()}
+    players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
+    shown = {end.port.name for end in ends if end.service not in players}
+    yield from _blank(asked, {end.port.name: players[end.service] for end in ends if end.port.name not in shown})
     for owner, names in asked.items():
         others = {name for other, own in asked.items() if other != owner for name in own}
         if made.isdisjoint(names) and others.isdisjoint(names):
             for name, span in names.items():
                 yield _missing(owner, name, span, made)
+
+
+def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
+    """Memories in which no picture will ever be: their services play recordings without."""
+    for service, names in asked.items():
+        for name in sorted(names.keys() & recordings.keys()):
+            file = recordings[name].name
+            message = f"the application's '{service}' reads pictures from '{name}', and '{file}' has none"
+            hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
+            yield Diagnostic(names[name], "application-memory", message, hint, "warning")
+
+
+def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:
+    """The services of an application that ask for one of these memories."""
+    services = application.services.values()
+    return [each.name for each in services if not set(names).isdisjoint(_asked(each, dict(application.known)))]
 
 
 def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:

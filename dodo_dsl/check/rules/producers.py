@@ -1,13 +1,15 @@
 """Each message or memory that a service consumes has a producer in the test, or is required of the application.
 
 ``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
-message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces).
+message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces),
+``true-pose`` (it consumes what only a simulation knows, and the test hides that).
 """
 
 from collections.abc import Collection, Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
+from dodo_dsl.check.world import HIDDEN, told
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.manifest import Manifest
 
@@ -29,6 +31,17 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
     yield from _unsatisfied_application(wiring)
+
+
+def check_hidden(context: RuleContext) -> Iterator[Diagnostic]:
+    """``true-pose``: the application takes what only a simulation knows, and the test hides that."""
+    if context.spec.pose != HIDDEN:
+        return
+    name = context.spec.name or context.spec.location.stem
+    for end in told(context.wiring):
+        message = f"the application's '{end.service}' takes {end.port}, which only a simulation has: '{name}' hides it"
+        hint = "take it out of x-dodo.in, or write 'pose: declared' in a test of your own"
+        yield Diagnostic(end.span, "true-pose", message, hint)
 
 
 def _is_unknown(end: End, known: Collection[str]) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.compile import fixes, job_options
+from dodo_dsl.cli.compile import fixes, job_options, pipeline_file
 from dodo_dsl.cli.compile.formats import FORMATS, rendered
 from dodo_dsl.cli.display import verbosity
 from dodo_dsl.cli.display.colours import write_diagnostics
@@ -32,6 +32,7 @@ EXAMPLES = """examples:
   dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
   dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
   dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
+  dodo compile --files repository          its jobs take recordings from their checkout, and not from an artifact
 """
 
 
@@ -127,7 +128,7 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
 
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    diagnostics, stale = list(checked.diagnostics), {}
+    diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
     if checked.ok and checked.application is not None and checked.specs:
         made = plan(checked, options.output, _searches(options), job_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])

@@ -135,7 +135,8 @@ def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New]
         declared = tests.checked.application.declared.values() if tests.checked.application else ()
         sent = {name.partition("/")[0] for own in declared if own for name, _ in own.outputs}
         drive = recorded_drive.look(wanted.rec, sent)
-        return recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root)
+        made, note = recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root)
+        return made, note + recorded_drive.unpassable(wanted.rec, drive, tests.checked.application)
     if wanted.extends:
         note = f"copied, because '{wanted.extends}' ships with DoDo and a test extends only tests of its own registry\n"
         return _from_another(wanted.name, wanted.extends, tests, place, note)

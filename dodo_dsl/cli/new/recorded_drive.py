@@ -9,17 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.rules import memories
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
 from dodo_dsl.cli.new.new_file import New, filled
 from dodo_dsl.cli.new.scaffold import spec_files
 from dodo_dsl.cli.rec.message_sets import messages_for
 from dodo_dsl.diagnostics import shown_path
+from dodo_dsl.opendlv.bus.envelope import encode_frame
 from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings import timing
 from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.rec import contents, retiming
+from dodo_dsl.rec import contents
 from dodo_dsl.rec.contents import MessageStream
 from dodo_dsl.rec.frames import IMAGE
 
@@ -39,6 +42,10 @@ DEFAULT_GAP_S = 1
 """Longer gaps are shortened by the player unless it is told otherwise, but not in a target."""
 LARGEST_BYTES = 200 << 20
 _START_UP_S = 10
+_MEMORIES = ("video0.argb", "video0.i420")
+"""In which rec-replay shows pictures by default."""
+_APART = 1_000_000
+"""Microseconds between the delays of two senders from which on one of them sends by another clock."""
 _PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
 
 
@@ -75,14 +82,14 @@ def look(path: Path, sent: Collection[str]) -> Drive:
         played = np.flatnonzero(~np.isin(index["data_type"], list(OWN_IDS)))
         if fault := timing.fault(recording, played):
             raise UsageError(f"'{path}' cannot be played: {fault}; 'dodo rec cut' writes a part without them")
-        received = retiming.receipts(recording, played)
+        received = _receipts(recording, played)
         streams = sorted(contents.streams(recording, messages), key=lambda stream: -stream.count)
         target = _target(path, streams)
         rows = recording.rows(messages=[target.id], sender_stamps=[target.sender_stamp])
         values = _values(path, recording, messages, target, recording.by_time(rows))
         times = np.sort(index["time"][played] if received is None else received[played])
         gap = float(np.diff(times).max(initial=0)) / 1e6
-        retimed = None if received is None else retiming.retimed(recording, received)
+        retimed = None if received is None else _retimed(recording, received)
     names = {stream.name for stream in streams if stream.name}
     return Drive(
         float(times[-1] - times[0]) / 1e6,
@@ -94,6 +101,22 @@ def look(path: Path, sent: Collection[str]) -> Drive:
         tuple(sorted(name for name in names if name.endswith("Request") or name in sent)),
         tuple(s.sender_stamp for s in streams if s.id == target.id and s is not target),
     )
+
+
+def _receipts(recording: Recording, rows: Numbers) -> Numbers | None:
+    """When each message was received, in us, where the sample times of rows come from several drives; else None."""
+    received = np.concatenate([batch.times[1] for batch in recording.batches()])
+    sampled = recording.index["sampled"]
+    known = rows[(received[rows] != 0) & (sampled[rows] != 0)]
+    delays = [np.median((received - sampled)[part]) for part in timing.streams(recording.index, known)]
+    is_apart = len(delays) > 1 and max(delays) - min(delays) > _APART
+    return np.where(received == 0, recording.index["time"], received) if is_apart and received[rows].all() else None
+
+
+def _retimed(recording: Recording, times: Numbers) -> bytes:
+    """The recording with these sample times."""
+    pairs = zip(recording.envelopes(), times.tolist(), strict=True)
+    return b"".join(encode_frame(envelope._replace(sample_time=time)) for envelope, time in pairs)
 
 
 def _target(path: Path, streams: list[MessageStream]) -> MessageStream:
@@ -147,6 +170,16 @@ def files(name: str, path: Path, drive: Drive, registry: Path, root: Path) -> tu
         share_of_distance=SHARE_OF_DISTANCE,
     )
     return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)
+
+
+def unpassable(path: Path, drive: Drive, application: ApplicationSource | None) -> str:
+    """A warning where services of the application read pictures, of which the recording has none."""
+    readers = [] if drive.cameras or application is None else memories.readers(application, _MEMORIES)
+    if not readers:
+        return ""
+    named = " and ".join(f"'{name}'" for name in readers)
+    waits = "waits" if len(readers) == 1 else "wait"
+    return f"warning: {named} of the application {waits} for pictures, and '{path.name}' has none: it cannot pass\n"
 
 
 def _quoted(text: str) -> str:

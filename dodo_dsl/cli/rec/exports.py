@@ -6,7 +6,7 @@ from typing import TextIO
 import numpy as np
 
 from dodo_dsl import atomic
-from dodo_dsl.cli import extras
+from dodo_dsl.cli.errors import require_extra
 from dodo_dsl.cli.rec.job import Job, tell
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.rec import coco, csv_table, labels
@@ -124,7 +124,7 @@ def _video(job: Job) -> None:
 
 
 def _mcap(job: Job) -> None:
-    extras.require("--mcap", "mcap")
+    require_extra("--mcap", "mcap")
     from dodo_dsl.rec.export import mcap_file
 
     output = job.file(".mcap")

@@ -20,6 +20,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.pools import named
 from dodo_dsl.plan.runs import runs
+from dodo_dsl.plan.test_files import file_problem
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.rigs.attendance import is_real
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
@@ -55,8 +56,10 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
 
 
 def load_compiled(folder: Path, settings: Settings) -> Plan:
-    """The Plan of a compiled test, whose clock and isolation are settled."""
+    """The Plan of a compiled test, whose clock and isolation are settled, and whose files are those that it needs."""
     plan = _load_plan(folder, settings)
+    if problem := file_problem(folder.resolve(), plan.shared):
+        raise UsageError(f"{plan.name}: {problem}")
     if settings.clock not in (None, plan.clock):
         raise UsageError(f"this test is compiled for clock {plan.clock}; compile it again for another")
     if settings.isolation == "network" and is_real(plan):

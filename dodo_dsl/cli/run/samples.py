@@ -2,8 +2,7 @@
 
 from dodo_dsl import compiler
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.cli import extras
-from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.errors import UsageError, require_extra
 from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.instances.pools import of_test
 from dodo_dsl.spec.instances.vary import Values
@@ -14,7 +13,7 @@ def sample(checked: compiler.Checked, number: int) -> tuple[compiler.Checked, di
 
     With them the slug of each one's test by its own slug. Raises UsageError where no test has a range.
     """
-    extras.require("--samples", "search")
+    require_extra("--samples", "search")
     if not any(test.spec.ranges for test in checked.tests):
         raise UsageError("--samples is for tests with ranges: none of these has 'vary'")
     origins: dict[str, str] = {}

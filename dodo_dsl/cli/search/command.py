@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TextIO, cast
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.cli import extras, selection
-from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import UsageError, require_extra
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
@@ -93,11 +93,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    extras.require("this", "search")
+    require_extra("this", "search")
     if options.storage is None and options.study is not None:
         raise UsageError("--study names a search in a database: name that with --storage")
     if options.storage is not None:
-        extras.require("--storage", "storage")
+        require_extra("--storage", "storage")
     end_like_interrupt()
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))

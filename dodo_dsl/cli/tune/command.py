@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TextIO, cast
 
 from dodo_dsl import atomic
-from dodo_dsl.cli import extras, selection
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import require_extra
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
@@ -81,7 +82,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    extras.require("this", "search")
+    require_extra("this", "search")
     end_like_interrupt()
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))

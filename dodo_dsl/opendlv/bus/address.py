@@ -1,4 +1,4 @@
-"""Where the bus is: the UDP multicast group and port of each session, as libcluon's OD4Session has them.
+"""Where messages go: the UDP multicast group and port of each session, as for libcluon, and which of them go past it.
 
 Imports the standard library alone, as sandboxes load it and start often.
 """
@@ -9,8 +9,17 @@ Address = tuple[str, int]
 PORT = 12175
 RECEIVE_BUFFER = 26_214_400
 """Bytes that a session's socket may hold; libcluon requests as many."""
+OF_THE_WORLD = ("opendlv.sim.", "dodo.", "cluon.data.")
+"""So begin the names of messages that only a simulation has, and those who control it: no bus of a car carries them."""
+POSE = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
+"""Those that tell where the vehicle truly is, or how it moves."""
 
 
 def group(cid: int) -> Address:
     """The multicast group of a session, with its port."""
     return f"225.0.0.{cid}", PORT
+
+
+def is_of_the_world(name: str) -> bool:
+    """Whether a message goes to a test's services alone, by its name, which a sender stamp may follow."""
+    return name.startswith(OF_THE_WORLD)

@@ -7,10 +7,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from dodo_dsl.application import compose_paths, interpolation, opendlv_flags
+from dodo_dsl.application import compose_paths, host_access, interpolation, opendlv_flags
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, Word, environment, plain, text
 from dodo_dsl.application.test_variables import with_variables
-from dodo_dsl.plan.model import Application, ApplicationService
+from dodo_dsl.plan.model import STARTED, Application, ApplicationService
 from dodo_dsl.plan.rewrite import (
     cid_and_image,
     container_limits,
@@ -79,7 +79,7 @@ def plan_application(
     if "volumes" in rest or copies.sources:
         rest["volumes"] = volumes.own_volumes(rest.get("volumes"), changes, copies.sources, limits, known, paths)
     changes += other_changes.of_top_level(application, rest)
-    planned = tuple(_planned(service, cid) for service in application.services.values())
+    planned = tuple(_planned(service, cid, application) for service in application.services.values())
     carried = variables.carried(application, cid, base, path_variables)
     secrets = {name: _relative(file, folder) for name, file in application.secrets.items()}
     access = replace(
@@ -116,7 +116,7 @@ def _with_values(service: Mapping[str, Any]) -> dict[str, Any]:
     return kept
 
 
-def _planned(service: ComposeService, cid: int) -> ApplicationService:
+def _planned(service: ComposeService, cid: int, application: ApplicationSource) -> ApplicationService:
     """The service as it starts without containers."""
     raw = plain(service.node)
     written = raw.get("command")
@@ -139,7 +139,23 @@ def _planned(service: ComposeService, cid: int) -> ApplicationService:
         env_files=tuple(file.path for file in service.env_files),
         inputs=_names(service.declared.inputs) if service.declared else (),
         outputs=_names(service.declared.outputs) if service.declared else (),
+        after=_after(raw, application),
     )
+
+
+def _after(service: dict[str, Any], application: ApplicationSource) -> dict[str, str]:
+    """The services that start before this one, each with its condition: also those whose namespaces it joins."""
+    needed = [name for _, name in host_access.references(service, dict(application.containers))]
+    about = service.get("depends_on")
+    written = {str(n): _condition(how) for n, how in about.items()} if isinstance(about, dict) else {}
+    every = {**dict.fromkeys(needed, STARTED), **written}
+    return {name: condition for name, condition in every.items() if name in application.services}
+
+
+def _condition(about: Any) -> str:
+    """A condition of ``depends_on``; one of a variable without a value is only that the service has started."""
+    condition = str((about.get("condition") if isinstance(about, dict) else "") or STARTED)
+    return STARTED if "$" in condition else condition
 
 
 def _names(words: Iterable[Word]) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Volumes of a service: ``/tmp``, shared memory and named volumes are the test's own."""
 
-from collections.abc import Collection, Mapping, MutableSequence
+from collections.abc import Collection, Iterable, Mapping, MutableSequence
 from typing import Any
 
 from dodo_dsl.application import host_access
@@ -12,6 +12,11 @@ from dodo_dsl.plan.rewrite.container_limits import put
 from dodo_dsl.plan.rewrite.file_copies import of_volume, own_name, read_only
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+
+_LONGEST = 255
+"""Characters of a volume's name on the engine: it is a folder's."""
+_MARK = "xxxxxx"
+"""In the place of what tells projects of one test apart."""
 
 
 def own_mounts(copy: ServiceCopy) -> None:
@@ -92,6 +97,11 @@ def _to_read(about: Any, paths: HostPaths | None) -> str:
         return ""
     words = (word.strip() for word in host_access.volume_options(about))
     return ",".join([*(word for word in words if word not in ("", "ro", "rw")), "ro"])
+
+
+def too_long(slug: str, volumes: Iterable[str]) -> str:
+    """A volume whose name in the test's project is longer than the engine takes; empty without one."""
+    return next((name for name in volumes if len(f"dodo-{slug}-{_MARK}_{name}") > _LONGEST), "")
 
 
 def own_volumes(

@@ -4,12 +4,15 @@ import contextlib
 import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl import advice, package_data
 from dodo_dsl.run.capabilities.finding import Capability
 from dodo_dsl.run.docker.client import NoEngine, connect
+from dodo_dsl.run.docker.shared_files import problem, provide_image, unseen
 
 FIRMWARE = "DODO_FIRMWARE"
 EMULATOR_PLACES = (package_data.root() / "build" / "firmware", Path("/opt/dodo/firmware"))
@@ -26,7 +29,23 @@ def docker_engine() -> Iterator[Capability]:
         return
     with contextlib.closing(client):
         version = client.version()
-        yield Capability("docker engine", "ok", f"version {version.get('Version')}, API {version.get('ApiVersion')}")
+        where = f" at {host}" if (host := os.environ.get("DOCKER_HOST")) else ""
+        tls = " with TLS" if client.api.base_url.startswith("https:") else ""
+        text = f"version {version.get('Version')}, API {version.get('ApiVersion')}{where}{tls}"
+        yield Capability("docker engine", "ok", text)
+        yield from _files_of(client)
+
+
+def _files_of(client: Any) -> Iterator[Capability]:
+    """Whether the engine sees the folders in which tests are, and in which they are compiled."""
+    provide_image(client)
+    with tempfile.NamedTemporaryFile(prefix="dodo-doctor-") as mark:
+        for place, path in (("this folder", Path.cwd()), ("TMPDIR", Path(mark.name).resolve())):
+            if missing := unseen(client, [path]):
+                text, way = problem(missing)
+                yield Capability("files of tests", "warning", f"{text}; in {place}, --backend docker needs it", way)
+                return
+    yield Capability("files of tests", "ok", "the docker engine sees this folder and TMPDIR")
 
 
 def compose() -> Iterator[Capability]:

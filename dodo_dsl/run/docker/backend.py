@@ -6,20 +6,21 @@ import ipaddress
 import os
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.opendlv.bus.address import Address
-from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
+from dodo_dsl.run.docker import shared_files
 from dodo_dsl.run.docker.bus import announce_begin
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.events import Watch
-from dodo_dsl.run.docker.processes import ContainerProcesses
+from dodo_dsl.run.docker.processes import ELSEWHERE, ContainerProcesses
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.docker.teardown import take_down, writers
 from dodo_dsl.run.load.service_use import Used
@@ -27,6 +28,7 @@ from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
 from dodo_dsl.run.services.announce import hearers, that_hear
+from dodo_dsl.run.services.conditions import LONGEST_S, Conditions, one_off
 from dodo_dsl.run.services.service_output import ServiceOutput
 
 _KILLED = 128 + signal.SIGKILL
@@ -65,6 +67,7 @@ class DockerBackend:
         self.cid = plan.cid
         self.report = report
         self.project = project
+        self._folder = folder
         self._client = client
         self._pulls = pulls
         self._subnets = subnets
@@ -80,6 +83,9 @@ class DockerBackend:
         self._out_of_memory: set[str] = set()
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self._copied, self._copy_problem = asyncio.Event(), ""
+        self._conditions = Conditions(plan.application.services)
+        self._turns: set[asyncio.Task[None]] = set()
+        """The services of the application that wait for others."""
         self.left_behind = False
 
     @property
@@ -88,9 +94,27 @@ class DockerBackend:
 
     async def open(self) -> None:
         await self._compose.read()
+        await self._require_files()
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets, self._key)
         await self._start_watching()
+
+    async def _require_files(self) -> None:
+        """Raises BackendError where the engine does not see what the test mounts; once for all tests of a run."""
+        await self._pulls.once(shared_files.IMAGE, self._provide_empty_image)
+        paths = shared_files.mounted(self._compose.services, self._folder)
+        others = [str(path) for path in paths if not path.is_relative_to(self._folder)]
+        await self._pulls.once(f"files {self._folder.parent} {others}", lambda: self._look_for(paths))
+
+    async def _provide_empty_image(self) -> str:
+        await asyncio.to_thread(shared_files.provide_image, self._client)
+        return ""
+
+    async def _look_for(self, paths: Sequence[Path]) -> str:
+        missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self.project)
+        if missing:
+            raise BackendError(": ".join(shared_files.problem(missing)))
+        return ""
 
     async def _start_watching(self) -> None:
         from docker.errors import DockerException
@@ -100,6 +124,7 @@ class DockerBackend:
             self._processes = ContainerProcesses(self._containers)
             names = {service.name for service in self.plan.application.services}
             self._use = ContainerUse({name: c for name, c in self._containers.items() if name in names})
+            self._require_health()
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
             for name in (SANDBOX, FILES):
                 if name in self._containers:
@@ -111,13 +136,26 @@ class DockerBackend:
         found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self.project}"})
         return {c.labels[SERVICE_LABEL]: c for c in found}
 
+    def _require_health(self) -> None:
+        """Raises BackendError where a service waits for the health of another one that has no health check."""
+        for service in self.plan.application.services:
+            for other, condition in service.after.items():
+                if condition == HEALTHY and other in self._containers and not healthcheck(self._containers[other]):
+                    raise BackendError(
+                        f"service '{service.name}' waits for '{other}' to be healthy (depends_on), but neither the "
+                        f"compose file nor the image of '{other}' has a healthcheck"
+                    )
+
     def _take(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
         if action == "oom":
             self._out_of_memory.add(name)
         elif name == FILES:
             self._take_of_copies(action)
         elif action == "health_status: healthy":
+            self._conditions.healthy(name)
             self._events.put_nowait(Ready(name))
+        elif action == "health_status: unhealthy":
+            self._conditions.unhealthy(name)
         elif action == "die" and name in self._outputs:
             task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
             task.add_done_callback(lambda t: t.exception())
@@ -161,6 +199,7 @@ class DockerBackend:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
         self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
+        self._conditions.ended(name, code)
 
     async def _was_out_of_memory(self, name: str, code: int) -> bool:
         for _ in range(_MEMORY_TURNS):
@@ -189,9 +228,33 @@ class DockerBackend:
             self._outputs[name] = ServiceOutput(
                 self.report / "logs" / f"{layer}.{name}.log", self._line_reader(layer, name, evaluators)
             )
-        await asyncio.gather(*(self._start(name) for name in self._compose.in_order(names)))
-        is_ours = layer != "application"
-        return {name: is_ours or self._compose.has_healthcheck(name) for name in names}
+        waiting = [name for name in names if self._conditions.of(name)]
+        await asyncio.gather(*(self._start(name) for name in names if name not in waiting))
+        self._turns |= {asyncio.ensure_future(self._start_in_turn(name)) for name in waiting}
+        reports = {name for name in names if layer != "application" or self._compose.has_healthcheck(name)}
+        ready = ({*waiting} | reports) - one_off(self.plan.application.services)
+        return {name: name in ready for name in names}
+
+    async def _start_in_turn(self, name: str) -> None:
+        """Starts a service of the application when what it waits for is so."""
+        after = self._conditions.of(name)
+        patience = {other: health_patience_s(self._containers[other]) for other in after if other in self._containers}
+        try:
+            why = await self._conditions.unmet(name, patience)
+        except asyncio.CancelledError:
+            self._outputs[name].release_writer()
+            raise
+        if why:
+            self._not_started(name, why)
+            return
+        await self._start(name)
+        if not self._compose.has_healthcheck(name):
+            self._events.put_nowait(Ready(name))
+
+    def _not_started(self, name: str, why: str) -> None:
+        self._outputs[name].release_writer()
+        self._events.put_nowait(Unstartable(name, why))
+        self._conditions.failed(name)
 
     def _line_reader(self, layer: str, name: str, evaluators: set[str]) -> Callable[[bytes], bool]:
         def on_line(line: bytes) -> bool:
@@ -211,10 +274,9 @@ class DockerBackend:
         try:
             await asyncio.to_thread(container.start)
         except (DockerException, OSError) as error:
-            output.release_writer()
-            why = engine_error(error)
-            self._events.put_nowait(Unstartable(name, why))
+            self._not_started(name, engine_error(error))
             return
+        self._conditions.started(name)
         threading.Thread(target=self._follow, args=(container, output.writer), daemon=True).start()
 
     @staticmethod
@@ -237,6 +299,8 @@ class DockerBackend:
         return await asyncio.to_thread(self._processes.listeners, names, self.cid)
 
     async def begin(self) -> None:
+        if self.is_on_host and await self.application() is None:
+            raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
         for _ in range(_ADDRESS_TURNS):
             if self._addresses.keys() >= {*that_hear(self.plan)}:
                 break
@@ -256,6 +320,9 @@ class DockerBackend:
 
     async def close(self, keep: bool) -> list[str]:
         self._watch.ignores = True
+        for turn in self._turns:
+            turn.cancel()
+        await asyncio.gather(*self._turns, return_exceptions=True)
         kept = []
         if keep and self._containers:
             kept = self._kept()
@@ -286,6 +353,20 @@ class DockerBackend:
     def tail(self, service: str) -> list[str]:
         output = self._outputs.get(service)
         return output.tail() if output else []
+
+
+def healthcheck(container: Any) -> dict[str, Any]:
+    """The health check of a container, from its compose file or its image; empty without one."""
+    check = container.attrs["Config"].get("Healthcheck") or {}
+    return {} if (check.get("Test") or ["NONE"]) == ["NONE"] else check
+
+
+def health_patience_s(container: Any) -> float:
+    """How long a container may take to be healthy, in s: beyond all tries that its health check has."""
+    check = healthcheck(container)
+    interval, timeout = (((check.get(key) or 0) / 1e9) or 30.0 for key in ("Interval", "Timeout"))
+    tries = (check.get("StartPeriod") or 0) / 1e9 + (check.get("Retries") or 3) * (interval + timeout)
+    return min(tries + READY_S, LONGEST_S)
 
 
 def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:

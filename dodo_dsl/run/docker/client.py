@@ -1,5 +1,8 @@
 """The client of a Docker engine, and the texts of the engine's errors."""
 
+import contextlib
+import os
+from pathlib import Path
 from typing import Any
 
 from dodo_dsl import advice
@@ -19,15 +22,40 @@ class NoEngine(BackendError):
 
 def connect() -> Any:
     """A client of the engine; raises NoEngine when none answers."""
-    import docker
+    from docker.constants import DEFAULT_DOCKER_API_VERSION
     from docker.errors import DockerException
 
+    if lack := _lacks_certificate():
+        raise NoEngine(lack)
     try:
-        client = docker.from_env(max_pool_size=_CONNECTIONS)
+        with contextlib.closing(_client(DEFAULT_DOCKER_API_VERSION)) as first:
+            version = first.api.version(api_version=False)["ApiVersion"]
+        client = _client(version)
         client.ping()
     except (DockerException, OSError) as error:
         raise NoEngine(_reason(error)) from error
     return client
+
+
+def _client(version: str) -> Any:
+    """A client that asks nothing yet, and trusts an engine with TLS by DOCKER_CERT_PATH alone.
+
+    Without this, certificates that REQUESTS_CA_BUNDLE or CURL_CA_BUNDLE name would take the place of those.
+    """
+    import docker
+
+    client = docker.from_env(version=version, max_pool_size=_CONNECTIONS)
+    client.api.trust_env = not client.api.base_url.startswith("https:")
+    return client
+
+
+def _lacks_certificate() -> str:
+    """What is missing of the client's own certificate, where the environment asks for TLS."""
+    if not os.environ.get("DOCKER_TLS_VERIFY") or not os.environ.get("DOCKER_HOST", "").startswith("tcp:"):
+        return ""
+    folder = Path(os.environ.get("DOCKER_CERT_PATH") or Path.home() / ".docker")
+    missing = next((name for name in ("ca.pem", "cert.pem", "key.pem") if not (folder / name).is_file()), "")
+    return f"DOCKER_TLS_VERIFY is set, and DOCKER_CERT_PATH, '{folder}', has no {missing}" if missing else ""
 
 
 def _reason(error: Exception) -> str:

@@ -26,7 +26,7 @@ from dodo_dsl.plan.trace import traced
 from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
 from dodo_dsl.run.docker import own_images
 from dodo_dsl.run.docker.builds import is_built, private_images
-from dodo_dsl.run.docker.masks import masks
+from dodo_dsl.run.docker.masks import absent, masks
 from dodo_dsl.run.docker.pulls import PullError, Pulls, Say
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.ports import known_ports
@@ -94,20 +94,6 @@ class Compose:
     def has_healthcheck(self, name: str) -> bool:
         check = self.services.get(name, {}).get("healthcheck")
         return bool(check) and not check.get("disable") and check.get("test") != ["NONE"]
-
-    def in_order(self, names: list[str]) -> list[str]:
-        """The names in the order of their dependencies within the layer."""
-        ordered: list[str] = []
-
-        def add(name: str) -> None:
-            if name in names and name not in ordered:
-                for other in self.services.get(name, {}).get("depends_on") or {}:
-                    add(other)
-                ordered.append(name)
-
-        for name in names:
-            add(name)
-        return ordered
 
     async def provide_images(self, pulls: Pulls) -> None:
         """Pulls and builds the services' images, once for all tests of a run; raises BackendError."""
@@ -180,11 +166,17 @@ class Compose:
         return [f"{layer}.compose.yml" for layer in LAYERS]
 
     def _masks(self) -> dict[str, Any]:
-        """What hides the tests from the application's services."""
+        """What hides the tests from the application's services, and stands for what is not there."""
         hidden = hidden_folders(self.plan.application, self.folder, self.report)
         every = (*(service.name for service in self.plan.application.services), FILES)
         names = [name for name in every if name in self.services]
-        found = {name: masks(self.services[name], self._volumes, hidden) for name in names}
+        found = {
+            name: [
+                *masks(self.services[name], self._volumes, hidden),
+                *absent(self.services[name], self._paths, always=name == FILES),
+            ]
+            for name in names
+        }
         return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}
 
     async def _run(

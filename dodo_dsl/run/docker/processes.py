@@ -10,6 +10,8 @@ from dodo_dsl.run.load.snapshot import PROC, Snapshot
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.services.listeners import listening, members
 
+ELSEWHERE = "the Docker engine runs its containers on another machine or in a virtual one"
+
 
 class ContainerProcesses:
     """``containers`` are those of the engine's client, by service. May be used by one thread at a time."""

@@ -3,7 +3,7 @@
 import bisect
 import itertools
 import statistics
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from dodo_dsl.outcome import ServiceUse
@@ -19,6 +19,8 @@ LEAST_RISE = 1_000_000
 _LEAST_SHARE = 1 / 6
 """Of the rise that each half of it has to have: memory that is taken once, whenever that is, does not grow."""
 _LEAST_POINTS, _MOST_POINTS = 3, 60
+_LEAST_TIMES = 8
+"""Known times of the test within the second half: what was measured between two of them may be of either."""
 _MOST_KEPT = 2000
 
 Point = tuple[float, float]
@@ -65,22 +67,33 @@ class UseMeter(Meter):
             if len(service.points) > _MOST_KEPT:
                 del service.points[1:-1:2]
 
-    def figures(self, progress: Sequence[tuple[float, float]]) -> tuple[ServiceUse, ...]:
-        """What each service used; ``progress`` are times of the clock with those of the test, in ascending order."""
+    def figures(self, progress: Sequence[tuple[float, float]], in_steps: bool = False) -> tuple[ServiceUse, ...]:
+        """What each service used; ``progress`` are times of the clock with those of the test, in ascending order.
+
+        ``in_steps``: between these the test may have stood still, as in lockstep.
+        """
         if not self._times:
             return ()
         passed_s = test_time(progress, self._times[-1]) - test_time(progress, self._times[0])
-        return tuple(_figures(name, self._services[name], progress, passed_s) for name in sorted(self._services))
+        known = {at_s for _, at_s in progress} if in_steps else None
+        return tuple(_figures(name, self._services[name], progress, passed_s, known) for name in sorted(self._services))
 
 
-def _figures(name: str, service: _Service, progress: Sequence[tuple[float, float]], passed_s: float) -> ServiceUse:
+def _figures(
+    name: str,
+    service: _Service,
+    progress: Sequence[tuple[float, float]],
+    passed_s: float,
+    known: Collection[float] | None,
+) -> ServiceUse:
+    points = [(test_time(progress, at_s), size) for at_s, size in service.points]
     ran_s = service.last.processor_s - service.first_processor_s
     return ServiceUse(
         service=name,
         processor_s=ran_s,
         processor_share=ran_s / passed_s if passed_s > 0 else None,
         peak_memory_bytes=service.peak,
-        memory_growth_bytes_per_s=growth([(test_time(progress, at_s), size) for at_s, size in service.points]),
+        memory_growth_bytes_per_s=growth(points, known),
         memory_limit_bytes=service.last.limit or None,
     )
 
@@ -94,14 +107,17 @@ def test_time(progress: Sequence[tuple[float, float]], at_s: float) -> float:
     return before + (behind - before) * (at_s - begin_s) / (end_s - begin_s)
 
 
-def growth(points: Sequence[Point]) -> float | None:
+def growth(points: Sequence[Point], known: Collection[float] | None = None) -> float | None:
     """Bytes a second by which memory grows in the second half of the time, in which programs have warmed up.
 
     It is the median slope of all pairs of points (Theil and Sen), as single points may be anywhere. 0 where memory does
-    not rise by LEAST_RISE, or not in each half of this half. None where there are too few points to tell.
+    not rise by LEAST_RISE, or not in each half of this half. None where there are too few points to tell,
+    or too few times that are ``known``: without these all are.
     """
     found = _second_half(points)
     if len(found) < _LEAST_POINTS:
+        return None
+    if known is not None and sum(found[0][0] <= at_s <= found[-1][0] for at_s in known) < _LEAST_TIMES:
         return None
     slopes = [(b - a) / (end - begin) for (begin, a), (end, b) in itertools.combinations(found, 2)]
     slope, rise = statistics.median(slopes), statistics.median(slopes) * (found[-1][0] - found[0][0])

@@ -6,9 +6,8 @@ from typing import Any
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker.backend import DockerBackend
 from dodo_dsl.run.docker.client import engine_error
-from dodo_dsl.run.docker.processes import is_of
+from dodo_dsl.run.docker.processes import ELSEWHERE, is_of
 from dodo_dsl.run.mixed.compose import ApplicationCompose
-from dodo_dsl.run.mixed.holder import provide_image
 from dodo_dsl.run.protocol import BackendError, Event
 
 
@@ -24,8 +23,6 @@ class ApplicationContainers(DockerBackend):
         return self._events
 
     async def open(self) -> None:
-        if self.plan.isolation == "network" or self.plan.application.copies:
-            await asyncio.to_thread(provide_image, self._client)
         await super().open()
         if SANDBOX in self._containers:
             self.process = await asyncio.to_thread(self._find_process, self._containers[SANDBOX])
@@ -44,8 +41,5 @@ class ApplicationContainers(DockerBackend):
             why = state.get("Error") or f"exit code {state.get('ExitCode')}"
             raise BackendError(f"the container that holds the test's network ended at once: {why}")
         if not is_of(process, container.id):
-            raise BackendError(
-                "the Docker engine runs its containers on another machine or in a virtual one, whose network DoDo's "
-                "processes cannot enter; use --backend docker"
-            )
+            raise BackendError(f"{ELSEWHERE}, whose network DoDo's processes cannot enter; use --backend docker")
         return process

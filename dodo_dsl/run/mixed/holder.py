@@ -1,36 +1,15 @@
 """The container that holds a test's network, IPC namespace and ``/tmp``: a program of this machine, and no image."""
 
-import io
 import os
 import shutil
-import tarfile
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.run.docker.client import engine_error
-from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.docker.shared_files import IMAGE
 
-IMAGE = "dodo-empty:1"
-"""Made on the engine where it is missing; it has no files."""
 _PROGRAM = "sleep"
 _SEEN = ("/bin", "/lib", "/lib64", "/usr")
 """Folders of this machine that hold the program and its libraries."""
-
-
-def provide_image(client: Any) -> None:
-    """Makes the empty image, unless the engine has it; raises BackendError."""
-    from docker.errors import DockerException, ImageNotFound
-
-    try:
-        try:
-            client.api.inspect_image(IMAGE)
-        except ImageNotFound:
-            empty = io.BytesIO()
-            tarfile.open(fileobj=empty, mode="w").close()
-            repository, tag = IMAGE.split(":")
-            client.api.import_image_from_data(empty.getvalue(), repository=repository, tag=tag)
-    except (DockerException, OSError) as error:
-        raise BackendError(f"the Docker engine cannot make an empty image: {engine_error(error)}") from error
 
 
 def holder(slug: str) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
 from dodo_dsl.run.services.announce import begin_frame, hearers
+from dodo_dsl.run.services.conditions import Conditions, one_off
 from dodo_dsl.run.services.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
@@ -68,6 +69,9 @@ class ProcessBackend:
         """Where services of the test hear what the bus must not carry."""
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
+        self._conditions = Conditions(plan.application.services, has_health=False)
+        self._turns: dict[str, asyncio.Task[None]] = {}
+        """The services of the application that wait for the end of others."""
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
         self._sandbox = SandboxClient(
@@ -87,9 +91,13 @@ class ProcessBackend:
     def _take(self, message: dict[str, Any]) -> None:
         if "started" in message:
             self._pids[message["started"]].set_result(message["pid"])
+            self._conditions.started(message["started"])
+            if message["started"] in self._turns:
+                self._events.put_nowait(Ready(message["started"]))
         elif "unstartable" in message:
             self._pids[message["unstartable"]].cancel()
             self._events.put_nowait(Unstartable(message["unstartable"], message["why"]))
+            self._conditions.failed(message["unstartable"])
         elif asked := self._asked.keys() & message.keys():
             for what in asked:
                 self._asked.pop(what).set_result(message[what])
@@ -108,12 +116,14 @@ class ProcessBackend:
             is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
             what = "its sandbox cannot be set up: " if is_of_sandbox else ""
             self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
+            self._conditions.failed(exited)
             return
         if used:
             most = self.plan.application.limits.memory
             text = f"application service '{exited}' used {used / 1e6:,.0f} MB of memory, at most {most / 1e6:,.0f}"
             self._events.put_nowait(Noted(f"{text} (sandbox: memory in dodo.yml)"))
         self._events.put_nowait(Exited(exited, code, out_of_memory=used > 0))
+        self._conditions.ended(exited, code)
 
     async def start(self, layer: str) -> dict[str, bool]:
         commands = []
@@ -122,9 +132,22 @@ class ProcessBackend:
                 commands.append(self._commands.of(service))
             except EnvironmentProblem as error:
                 self._events.put_nowait(Unstartable(service.name, str(error)))
-        for command in commands:
+        by_name = {command.name: command for command in commands}
+        for name in self._conditions.in_order(by_name):
+            if self._conditions.waits_for_ends(name):
+                self._turns[name] = asyncio.ensure_future(self._start_in_turn(by_name[name]))
+            else:
+                self._start(by_name[name])
+        ready = {*self._turns} - one_off(self.plan.application.services)
+        return {name: layer != "application" or name in ready for name in by_name}
+
+    async def _start_in_turn(self, command: Command) -> None:
+        """Starts a service of the application when others have ended."""
+        if why := await self._conditions.unmet(command.name, {}):
+            self._events.put_nowait(Unstartable(command.name, why))
+            self._conditions.failed(command.name)
+        else:
             self._start(command)
-        return {command.name: layer != "application" for command in commands}
 
     def _services(self, layer: str) -> tuple[PlannedService | ApplicationService, ...]:
         return self.plan.application.services if layer == "application" else self.plan.layer(layer)
@@ -208,6 +231,8 @@ class ProcessBackend:
         return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
+        for turn in self._turns.values():
+            turn.cancel()
         if keep and (pid := self._sandbox.pid):
             return self._kept(pid)
         await self._sandbox.close()

@@ -7,7 +7,7 @@ from dodo_dsl.source import Entry, Mapping, Scalar, Sequence
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.quantity import convert
 
-_LEAST = {"memory": "6 MB", "file-size": "1 kB", "disk": "1 MB"}
+_LEAST = {"memory": "6 MB", "file-size": "1 kB", "copies": "1 MB", "disk": "1 MB"}
 """The least sizes; Docker takes no limit of memory below 6 MB."""
 _MOST = "1000000 GB"
 
@@ -37,6 +37,8 @@ def sandbox_limits(entry: Entry | None) -> SandboxLimits:
         _bytes(node.get("file-size"), default.file_size),
         tuple(i.text for i in reads.items if isinstance(i, Scalar)) if isinstance(reads, Sequence) else (),
         float(str(cpus.value)) if isinstance(cpus := node.get("cpus"), Scalar) else None,
+        _bytes(node.get("copies"), default.copies),
+        _count(node.get("copied-files"), default.copied_files),
     )
 
 

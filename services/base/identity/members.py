@@ -5,6 +5,7 @@ From there it sends, and there it gets what the application must not hear.
 
 import json
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from dodo_dsl.opendlv.bus.address import Address
@@ -51,7 +52,7 @@ class Members:
 
     def leave(self) -> None:
         """Nothing more will come from this service."""
-        self._say(leaves=True)
+        self._say(self._others, leaves=True)
 
     def admits(self, envelope: Envelope) -> bool:
         """Whether the message that the session received last counts; tells the runner of one that must not be."""
@@ -105,12 +106,17 @@ class Members:
         self._table.report(producers.reason)
         return False
 
-    def _say(self, asks: bool = False, leaves: bool = False) -> None:
+    def _say(self, to: Sequence[Address] = (), asks: bool = False, leaves: bool = False) -> None:
+        """To these addresses, where the application does not hear it; else on the bus."""
         host, port = self._session.address
         message = self._type(service=self._name, host=host, port=port, asks=asks, leaves=leaves)
         payload = with_proof(self._table.key, self._id, self._session.messages.encode(message))
         now = time.time_ns() // 1000
-        self._session.send_envelope(Envelope(self._id, payload, now, 0, now, 0))
+        envelope = Envelope(self._id, payload, now, 0, now, 0)
+        if to and self._world:
+            self._session.send_directly(envelope, to)
+        else:
+            self._session.send_envelope(envelope)
 
     def _learn(self, envelope: Envelope) -> None:
         """The first address of a service counts, until it leaves: that of the application would come later."""
@@ -124,7 +130,7 @@ class Members:
         if (said.host, said.port) != source:
             return
         if said.asks:
-            self._say()
+            self._say([source])
         if said.service not in self._table.services and not self._is_of_the_world(said.service):
             return
         if self._addresses.setdefault(said.service, source) == source and said.leaves:

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
+from dodo_dsl.opendlv.bus.address import is_of_the_world
 from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.world import is_of_the_world
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 VARIABLE = "DODO_WORLD"
@@ -15,6 +15,8 @@ VARIABLE = "DODO_WORLD"
 ``my-eval?=opendlv.sim.Frame/0,opendlv.sim.Command`` is one that may not say where it listens, with the messages of the
 world that it consumes.
 """
+TRUTH = "DODO_TRUTH"
+"""Environment variable with the messages by which evaluators judge, which the application never gets."""
 TOLD = "DODO_TOLD"
 """Environment variable with the messages of the world that the application declares to take, and so gets."""
 
@@ -27,12 +29,13 @@ class World:
     """The ``services`` of a test; without any, as outside of tests, nothing is kept from the bus.
 
     ``silent`` are those that may not say where they listen, with what they consume. ``told`` are messages of the world
-    that the application gets, ``ids`` all others, ``names`` those of both.
+    that the application gets, ``ids`` all others, ``names`` those of both; ``truth`` is what evaluators judge by.
     """
 
     services: frozenset[str] = frozenset()
     silent: Mapping[str, frozenset[Key]] = field(default_factory=dict)
     told: frozenset[Key] = frozenset()
+    truth: frozenset[Key] = frozenset()
     ids: frozenset[int] = frozenset()
     names: Mapping[int, str] = field(default_factory=dict)
 
@@ -45,15 +48,17 @@ class World:
         entries = [word.partition("?=") for word in words]
         silent = {name: _keys(written.split(","), messages) for name, mark, written in entries if mark}
         names = {messages.id(name): name for name in messages.names() if is_of_the_world(name)}
-        told = _keys(os.environ.get(TOLD, "").split(), messages)
-        return cls(frozenset(name for name, mark, _ in entries if not mark), silent, told, frozenset(names), names)
+        told, truth = (_keys(os.environ.get(variable, "").split(), messages) for variable in (TOLD, TRUTH))
+        services = frozenset(name for name, mark, _ in entries if not mark)
+        return cls(services, silent, told, truth, frozenset(names), names)
 
     def __bool__(self) -> bool:
         return bool(self.services)
 
     def holds(self, envelope: Envelope) -> bool:
         """Whether a message must not come to the bus."""
-        return envelope.data_type in self.ids and self.told.isdisjoint(_keys_of(envelope))
+        keys = _keys_of(envelope)
+        return not self.truth.isdisjoint(keys) or (envelope.data_type in self.ids and self.told.isdisjoint(keys))
 
     def awaited_by(self, envelope: Envelope) -> list[str]:
         """Those of the services that may not say where they listen who consume a message."""

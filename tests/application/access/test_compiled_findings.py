@@ -137,3 +137,32 @@ def test_no_rig_gives_its_port() -> None:
 def test_services_that_the_test_does_not_have() -> None:
     test = CompiledTest([], [], [], True, Access(), HostPaths(FOLDER, (FOLDER,)))
     assert [f.message for f in compiled_findings({"services": {"x": {}}}, test)] == ["the test has no service 'x'"]
+
+
+def bind(source: str, read_only: bool = True) -> dict[str, Any]:
+    return {"type": "bind", "source": source, "target": "/x", "read_only": read_only}
+
+
+@pytest.mark.parametrize(
+    ("volumes", "rest", "places"),
+    [
+        ([bind("/data", False), bind("/data/sub")], {}, ["services.driver.volumes[1].source"]),
+        ([bind("/data", False), bind("/data")], {}, []),
+        ([bind("/data"), bind("/data/sub")], {}, []),
+        ([bind("/data", False)], {"secrets": {"s": {"file": "/data/s"}}}, ["secrets.s.file"]),
+        (
+            [{"type": "volume", "source": "v", "target": "/v"}, bind("/data/sub")],
+            {"volumes": {"v": {"driver_opts": {"type": "none", "o": "bind", "device": "/data"}}}},
+            ["services.driver.volumes[1].source"],
+        ),
+    ],
+)
+def test_mounts_within_others_that_variables_have_made(
+    volumes: list[Any], rest: dict[str, Any], places: list[str]
+) -> None:
+    """Nobody knew them when the test was compiled."""
+    paths = HostPaths(FOLDER, (FOLDER,), (Path("/data"),), literal=True)
+    test = CompiledTest(["driver"], [], [], True, NOTHING, paths)
+    service = {"image": "x", "pids_limit": 512, "mem_limit": "1073741824", "cap_drop": ["NET_RAW"], "volumes": volumes}
+    findings = compiled_findings({"services": {"driver": service}, **rest}, test)
+    assert [shown(finding.steps) for finding in findings if "could put a link" in finding.message] == places

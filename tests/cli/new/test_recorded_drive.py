@@ -65,6 +65,23 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
     assert (empty / "tests/recordings" / file).read_bytes() == SHIPPED.read_bytes()
 
 
+def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: Path) -> None:
+    """Such a test cannot be passed: ``new`` says so, and the check as long as it is so."""
+    compose = empty / "compose.yml"
+    write(empty / "drive.rec", (STEERING, 0, [0.1, 0.2] * 20))
+    warning = "warning: 'car' of the application waits for pictures, and 'drive.rec' has none: it cannot pass\n"
+    assert warning not in dodo("new", "blind", "--rec", "drive.rec")[1]
+    assert dodo("compile", "--check")[1] == "1 test checked: no problems\n"
+    compose.write_text(compose.read_text().replace("--cid=111", "--cid=111 --name=video0.argb"))
+    shutil.copy(SHIPPED, empty / "seen.rec")
+    assert warning not in dodo("new", "seeing", "--rec", "seen.rec")[1]
+    assert warning in dodo("new", "mine", "--rec", "drive.rec")[1]
+    code, out, _ = dodo("compile", "--check")
+    message = "the application's 'car' reads pictures from 'video0.argb', and 'drive.rec' has none"
+    assert (code, out.splitlines()[-1]) == (0, "3 tests checked: 1 warning")
+    assert f"compose.yml:1:39: warning[application-memory]: {message}" in out
+
+
 def test_a_recording_that_is_there_is_not_copied(empty: Path) -> None:
     shutil.copy(SHIPPED, empty / "drive.rec")
     assert dodo("new", "one", "--rec", "drive.rec")[0] == 0

@@ -189,3 +189,12 @@ def test_samples_of_a_test_are_the_same_for_one_seed_and_within_its_ranges(folde
 def test_samples_need_a_range(folder: Path) -> None:
     with pytest.raises(UsageError, match="none of these has 'vary'"):
         prepared(folder, "--samples", "3")
+
+
+def test_a_compiled_test_without_its_shared_files_is_not_run(folder: Path) -> None:
+    prepared(folder)
+    path = folder / "out/example" / PLAN_FILE
+    path.write_text(path.read_text().replace('"shared": {}', f'"shared": {{"a.rec": "{"0" * 64}-a.rec"}}'))
+    with pytest.raises(UsageError, match=r"example: 'a\.rec' is missing: '.*_files' belongs to the compiled tests"):
+        options = parser().parse_args(["run", "--compiled", str(path.parent), "--report", str(folder / "report")])
+        prepare(options, folder / "again", io.StringIO())

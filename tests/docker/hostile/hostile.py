@@ -5,6 +5,7 @@ It ends when there is a file /stop/now, at the latest after ten minutes.
 python3 hostile.py --cid=111 --name=video0.argb --harm=flood|groups|memory|tmp
 """
 
+import contextlib
 import itertools
 import os
 import socket
@@ -71,11 +72,11 @@ def memory() -> None:
 
 def tmp() -> None:
     """Writes into /tmp until it is full, and keeps it so."""
+    junk = os.urandom(1 << 20)
     for number in itertools.count():
-        try:
-            Path(f"/tmp/filler-{number % 1000}").write_bytes(os.urandom(1 << 20))
-        except OSError:
-            time.sleep(0.05)
+        with contextlib.suppress(OSError):
+            Path(f"/tmp/filler-{number % 1000}").write_bytes(junk)
+        time.sleep(0.01 if number < 1000 else 0.1)
 
 
 print(f"hostile: {FLAGS['harm']}", flush=True)

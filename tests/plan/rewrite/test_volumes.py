@@ -7,7 +7,7 @@ import pytest
 
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.plan.rewrite.file_copies import FileCopies, own_name
-from dodo_dsl.plan.rewrite.volumes import own_mounts, own_volumes
+from dodo_dsl.plan.rewrite.volumes import own_mounts, own_volumes, too_long
 from tests.plan.rewrite.copies import copy
 
 TMP = {"type": "volume", "source": "tmp", "target": "/t", "volume": {"nocopy": True}}
@@ -128,3 +128,8 @@ def test_copies_of_long_forms_and_of_volumes(team: Path) -> None:
 def test_volumes_that_nobody_knows_are_only_read() -> None:
     unknown = {"vol": {"driver_opts": {"o": "bind,rw", "type": "none", "device": "${X}"}}}
     assert own_volumes(unknown, [])["vol"]["driver_opts"]["o"] == "bind,ro"
+
+
+def test_names_that_are_too_long_for_the_engine() -> None:
+    names = {"short": {}, "n" * 63: {}}
+    assert (too_long("t" * 179, names), too_long("t" * 180, names)) == ("", "n" * 63)

@@ -70,7 +70,13 @@ SHOTS = {
 
 def drive(work: Path) -> None:
     """The reports whose pages are shown, below a folder."""
-    team, kiwi = work / "team", work / "kiwi"
+    drive_team(work)
+    drive_kiwi(work)
+
+
+def drive_team(work: Path) -> None:
+    """Those of an application that is new."""
+    team = work / "team"
     team.mkdir()
     dodo(team, "new", "--application")
     dodo(team, "new", "sil-curve", "--extends", "sil-closed-left-curve")
@@ -84,6 +90,11 @@ def drive(work: Path) -> None:
     steering.write_text(written)
     dodo(team, "run", *names)
     dodo(team, "report", "dodo-report", "-o", "compared", "--against", "main")
+
+
+def drive_kiwi(work: Path) -> None:
+    """Those of the example."""
+    kiwi = work / "kiwi"
     for name in ("maps", "targets", "sil-perception", "sil-closed-left-curve"):
         shutil.copytree(ROOT / "tests_registry" / name, kiwi / "tests" / name)
     shutil.copytree(ROOT / "examples" / "kiwi", kiwi / "application")

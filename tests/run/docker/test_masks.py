@@ -5,9 +5,10 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.plan.model import Application
 from dodo_dsl.run.application_files import hidden_folders
-from dodo_dsl.run.docker.masks import masks
+from dodo_dsl.run.docker.masks import absent, masks
 
 HIDDEN = [Path("/team/tests"), Path("/team/.git")]
 BOUND = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "/team"}}, "own": {}}
@@ -51,4 +52,23 @@ def test_a_report_elsewhere_needs_no_mask(tmp_path: Path) -> None:
     application = Application("../..", ())
     assert hidden_folders(application, tmp_path / "team" / "generated" / "t", tmp_path / "report") == [
         tmp_path / "team" / "generated"
+    ]
+
+
+def test_what_is_not_there_is_an_empty_folder_and_is_not_made(tmp_path: Path) -> None:
+    """But for what the engine is told not to make, and what dodo.yml lets an application write to."""
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link").symlink_to("nowhere")
+    names = ("gone", "there", "link", "allowed/gone")
+    binds = [{"type": "bind", "source": f"{tmp_path}/{name}", "target": f"/{name}"} for name in names]
+    made = [{**volume, "bind": {"create_host_path": True}} for volume in binds]
+    volumes = [*made, {**binds[0], "target": "/asked", "bind": {}}, {"type": "volume", "source": "v", "target": "/v"}]
+    paths = HostPaths(tmp_path, (tmp_path,), (tmp_path / "allowed",), literal=True)
+    allowed = HostPaths(tmp_path / "x", (tmp_path / "x",), (tmp_path,), literal=True)
+    targets = [[mask["target"] for mask in absent({"volumes": volumes}, seen)] for seen in (paths, allowed)]
+    assert targets == [["/gone", "/allowed/gone"], []]
+    assert [mask["target"] for mask in absent({"volumes": volumes}, paths, always=True)] == [
+        "/gone",
+        "/allowed/gone",
+        "/asked",
     ]

@@ -49,6 +49,15 @@ def test_too_short_to_tell(count: int) -> None:
     assert growth([(float(n), n * 50 * MB) for n in range(count)]) is None
 
 
+@pytest.mark.parametrize(("count", "expected"), [(7, None), (8, pytest.approx(5 * MB))])
+def test_between_two_times_of_a_clock_in_steps_nobody_knows(count: int, expected: float | None) -> None:
+    """As in lockstep, where ten pictures pass in a quarter of a second: a step then stands still for two."""
+    points = [(t, 100 * MB + 5 * MB * t) for t in TIMES]
+    half = TIMES[len(TIMES) // 2 :]
+    known = [0.0, 1.0, *(half[0] + n * (half[-1] - half[0]) / (count - 1) for n in range(count))]
+    assert growth(points, [round(at_s, 6) for at_s in known]) == expected
+
+
 def test_a_few_frames_tell() -> None:
     assert growth([(0.1 * n, n * 50 * MB) for n in range(6)]) == pytest.approx(500 * MB)
     assert growth([(1.0, n * 50 * MB) for n in range(6)]) is None, "no time has passed"

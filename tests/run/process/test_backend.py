@@ -11,6 +11,7 @@ import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run import engine
+from dodo_dsl.run.services import conditions
 from tests.run.desk import processes_with
 from tests.run.helpers import AFTER_START, BEGUN, PASS, READY, STARTED, WAIT, Bench
 
@@ -72,6 +73,42 @@ def test_what_processes_do_decides(host: Bench) -> None:
         assert (outcomes[slug].outcome, outcomes[slug].reason[: len(reason)]) == (expected, reason)
     assert outcomes["application-crashes"].last_lines == ("cone lost",)
     assert host.log(plans[1], "application.app") == "cone lost\n"
+
+
+IN_TURN = {
+    "in-turn": ("pass", "passed", "it drove"),
+    "not-in-turn": (
+        "raise SystemExit(3)",
+        "failed",
+        "application service 'init' ended with exit code 3 during set-up, before the test was decided; 'app' waits "
+        "for it to end with exit code 0",
+    ),
+    "never": (
+        WAIT,
+        "error",
+        "service 'app' could not be started: it waits for 'init' to end with exit code 0 (depends_on), which did not "
+        "within 2 s",
+    ),
+}
+
+
+def test_services_start_when_those_for_which_they_wait_have_ended(host: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(conditions, "LONGEST_S", 2.0)
+    plans = []
+    for slug, (last, _, _) in IN_TURN.items():
+        mark = host.folder / f"{slug}-mark"
+        app = f"assert os.path.exists({str(mark)!r}), 'too early'\n" + STARTED + WAIT
+        plan = host.plan(application=app, judge=READY + AFTER_START + PASS, slug=slug)
+        script = host.script(f"{slug}-init", f"import time; time.sleep(0.5); open({str(mark)!r}, 'w').close(); {last}")
+        (service,) = plan.application.services
+        services = (
+            replace(service, after={"other": "service_healthy", "init": "service_completed_successfully"}),
+            ApplicationService("init", script),
+            ApplicationService("other", host.script(f"{slug}-other", WAIT)),
+        )
+        plans.append(replace(plan, application=replace(plan.application, services=services)))
+    outcomes = {outcome.slug: outcome for outcome in host.run(*plans)}
+    assert {slug: (o.outcome, o.reason) for slug, o in outcomes.items()} == {k: v[1:] for k, v in IN_TURN.items()}
 
 
 def test_missing_program_is_an_error(host: Bench) -> None:

@@ -76,7 +76,7 @@ def test_what_an_application_that_starts_late_must_not_hear_is_not_sent_again(
     cid: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DODO_WORLD", "pose")
-    monkeypatch.setenv("DODO_TRUTH", "0 opendlv.logic.perception.DetectionBoundingBox/0")
+    monkeypatch.setenv("DODO_TRUTH", "opendlv.logic.perception.DetectionBoundingBox/0")
     reading = "opendlv.proxy.DistanceReading"
     names = ("opendlv.sim.Frame", "opendlv.logic.perception.DetectionBoundingBox", reading)
     with Session(cid) as session, Session(cid) as application:

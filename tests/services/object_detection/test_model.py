@@ -414,37 +414,6 @@ def test_a_frame_from_before_the_judge_knows_the_time_does_not_begin_the_test(be
     assert values(verdict)["frames"] == 1
 
 
-def late_truth() -> DetectionEvaluator:
-    """Its truth comes 1 s after the picture, as in real time."""
-    rules = Rules(iou=0.5, labels=[], max_delay=1.0, max_time=60.0)
-    it = DetectionEvaluator(None, rules, DetectionLimits(recall=0.9), SECOND)
-    it.update(BEGIN - SECOND)
-    it.begin(BEGIN)
-    return it
-
-
-def test_what_is_found_counts_until_its_truth_has_come() -> None:
-    it = late_truth()
-    detect(it, 1, YELLOW)
-    at(it, 0.95)
-    reveal(it, 1, YELLOW, BLUE)
-    detect(it, 1, YELLOW, BLUE)
-    reveal(it, 2, YELLOW)
-    detect(it, 2, YELLOW)
-    found = values(decided(it, 4.0, after=2.0))
-    assert (found["true-positives"], found["false-negatives"], found["late"]) == (1, 2, 3)
-
-
-def test_nothing_counts_after_the_time_for_an_answer_where_truth_is_late() -> None:
-    it = late_truth()
-    detect(it, 1, YELLOW)
-    at(it, 1.1)
-    detect(it, 1, YELLOW, BLUE)
-    reveal(it, 1, YELLOW, BLUE)
-    found = values(decided(it, 4.0, after=2.0))
-    assert (found["true-positives"], found["late"]) == (1, 2)
-
-
 def test_pictures_of_the_future_cannot_be_answered() -> None:
     """Else a hard one could be used up before it is shown."""
     it = judge(truth=None)
@@ -457,16 +426,3 @@ def test_pictures_of_the_future_cannot_be_answered() -> None:
     verdict = decided(it)
     assert values(verdict)["recall"] == 1.0
     assert "left out: 1 detection of the future" in verdict.reason
-
-
-def test_the_verdict_waits_for_the_truth_of_the_last_pictures_and_for_no_more() -> None:
-    it = late_truth()
-    it.end_of_input(BEGIN + 5 * SECOND)
-    reveal(it, 7_004.5, YELLOW)
-    at(it, 6.5)
-    assert it.verdict is None
-    reveal(it, 7_005.5, YELLOW)
-    at(it, 7.0)
-    assert it.verdict is not None
-    found = values(it.verdict)
-    assert (found["frames"], found["false-negatives"], found["without-truth"]) == (1, 1, 0)

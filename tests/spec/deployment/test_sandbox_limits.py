@@ -20,8 +20,9 @@ def test_without_it_the_defaults_hold(tmp_path: Path) -> None:
 
 
 def test_all_that_can_be_said(tmp_path: Path) -> None:
-    text = "sandbox: {memory: 4 GB, processes: 20, files: 100, file-size: 1.5 MB, cpus: 2.5, read: [~/models, /srv]}\n"
-    limits = SandboxLimits(4 * 10**9, 20, 100, 1_500_000, ("~/models", "/srv"), 2.5)
+    text = "sandbox: {memory: 4 GB, processes: 20, files: 100, file-size: 1.5 MB, cpus: 2.5, read: [~/models, /srv], "
+    text += "copies: 5 GB, copied-files: 9}\n"
+    limits = SandboxLimits(4 * 10**9, 20, 100, 1_500_000, ("~/models", "/srv"), 2.5, 5 * 10**9, 9)
     assert deployed(tmp_path, text) == (limits, [])
 
 

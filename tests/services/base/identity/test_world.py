@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import RealTimeClock
 from services.base.identity.members import Members
 from services.base.identity.senders import SenderTable
-from services.base.identity.world import TOLD, VARIABLE, World
+from services.base.identity.world import TOLD, TRUTH, VARIABLE, World
 from services.base.loop import Loop
 from services.base.service import Output, Service
 
@@ -30,6 +30,16 @@ class Teller(Service):
     def update(self, now: int) -> list[Output]:
         self.finished = True
         return [Output(MESSAGES.type(name)(), 0) for name in (FRAME, STATE, READING)]
+
+
+class Relaying(RealTimeClock):
+    """Counts what the clock of a test in lockstep would pass on."""
+
+    relays = True
+    count = 0
+
+    def sent(self, _frame: bytes) -> None:
+        self.count += 1
 
 
 @pytest.fixture
@@ -90,6 +100,28 @@ def test_what_it_declares_it_is_told(enter: Join, application: Session, monkeypa
     assert taken(application) == [FRAME, READING]
 
 
+def test_truth_it_is_never_told(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither late nor where it declares that, as it is judged by it."""
+    monkeypatch.setenv(TRUTH, f"{READING}/0")
+    monkeypatch.setenv(TOLD, f"{READING}/0")
+    pose, track = enter("pose"), enter("track")
+    taken(*pose), taken(*track)
+    tell(*pose)
+    assert taken(*track) == [FRAME, STATE, READING, "dodo.EndOfInput"]
+    assert taken(application) == []
+
+
+@pytest.mark.parametrize("truth", ["", f"{READING}/0"])
+def test_in_lockstep_the_clock_gets_everything(cid: int, monkeypatch: pytest.MonkeyPatch, truth: str) -> None:
+    monkeypatch.setenv(VARIABLE, "pose")
+    monkeypatch.setenv(TRUTH, truth)
+    clock = Relaying()
+    with Session(cid) as session, Session(cid) as listener:
+        Loop("pose", Teller(), session, clock, 0).run(lambda: False)
+        assert taken(listener) == ([] if truth else [READING])
+    assert clock.count == 4
+
+
 def test_outside_of_a_test_the_bus_carries_everything(application: Session, cid: int) -> None:
     with Session(cid) as session:
         tell(session, None)
@@ -136,6 +168,30 @@ def test_who_has_left_or_is_unknown_hears_nothing(enter: Join, application: Sess
     taken(*pose)
     pose[1].send(frame())
     assert [taken(*each) for each in (track, stranger, forger)] == [[FRAME], [], []]
+
+
+def test_addresses_are_said_on_the_bus_only_to_whom_nobody_knows(enter: Join, application: Session) -> None:
+    """The application starts when all know one another, and hears nothing of that."""
+    pose = enter("pose")
+    assert taken_whole(application) == ["dodo.Sender"]
+    track = enter("track")
+    assert taken_whole(application) == ["dodo.Sender"]
+    taken(*pose), taken(*track), taken(*pose)
+    pose[1].send(frame())
+    assert taken(*track) == [FRAME]
+    track[1].leave()
+    taken(*pose)
+    pose[1].send(frame())
+    assert taken(*track) == []
+    assert taken_whole(application) == []
+
+
+def taken_whole(session: Session) -> list[str]:
+    """Names of all that comes."""
+    names = []
+    while (envelope := session.receive(0.0)) is not None:
+        names.append(session.messages.name(envelope.data_type) or "")
+    return names
 
 
 def test_who_is_missing_is_asked_for_again(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:

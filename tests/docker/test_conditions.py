@@ -1,0 +1,113 @@
+"""Containers of an application start in the order of their ``depends_on``, on a real engine."""
+
+import asyncio
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.plan.model import ApplicationService
+from dodo_dsl.plan.plan_json import to_json
+from dodo_dsl.run.backends import Backends, Job
+from dodo_dsl.run.docker.containers import Containers
+from dodo_dsl.run.mixed.backends import Mixed
+from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.services import conditions
+from tests.docker.compose import SUBNETS, Crate
+from tests.docker.test_mixed import separate
+from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT
+
+pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
+
+MARKS = "all(os.path.exists('/tmp/' + name) for name in ('init', 'db', 'plain'))"
+APP = f"assert {MARKS}, os.listdir('/tmp')\n" + STARTED + WAIT
+HEALTHY, COMPLETED = "service_healthy", "service_completed_successfully"
+MADE = "sleep 1; touch /tmp/$0; "
+CHECK = {"interval": "200ms", "timeout": "5s", "retries": 3}
+OTHERS: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "init": (COMPLETED, MADE + "exit 0", {}),
+    "db": (
+        HEALTHY,
+        MADE + "sleep 600",
+        {"healthcheck": {**CHECK, "retries": 300, "test": ["CMD", "test", "-f", "/tmp/db"]}},
+    ),
+    "plain": ("service_started", "touch /tmp/$0; sleep 600", {}),
+}
+WAITS = "service 'app' could not be started: it waits for 'db' to be healthy (depends_on), which"
+TABLE: dict[str, tuple[dict[str, Any], str, str]] = {
+    "come-true": ({}, "passed", "it drove"),
+    "init-fails": (
+        {"init": (COMPLETED, "exit 3", {})},
+        "failed",
+        "application service 'init' ended with exit code 3 during set-up, before the test was decided; 'app' waits for "
+        "it to end with exit code 0",
+    ),
+    "unhealthy": (
+        {"db": (HEALTHY, "sleep 600", {"healthcheck": {**CHECK, "test": ["CMD", "false"]}})},
+        "error",
+        WAITS + " is unhealthy",
+    ),
+    "ends-in-time": (
+        {"db": (HEALTHY, "exit 0", OTHERS["db"][2])},
+        "failed",
+        "application service 'db' ended with exit code 0 during set-up, before the test was decided; 'app' waits for "
+        "it to be healthy",
+    ),
+    "without-check": (
+        {"db": (HEALTHY, "sleep 600", {})},
+        "error",
+        "service 'app' waits for 'db' to be healthy (depends_on), but neither the compose file nor the image of 'db' "
+        "has a healthcheck",
+    ),
+    "never-ends": (
+        {"init": (COMPLETED, "sleep 600", {})},
+        "error",
+        "service 'app' could not be started: it waits for 'init' to end with exit code 0 (depends_on), which did not "
+        "within 9 s",
+    ),
+}
+
+
+def waiting(crate: Crate, slug: str, scripts: Path, others: Mapping[str, tuple[str, str, dict[str, Any]]]) -> Job:
+    """A test whose application waits for other services, each with a condition, a script and keys."""
+    job = separate(crate.job(slug, READY + AFTER_START + PASS, APP, timeout_s=30.0), scripts)
+    path = job.folder / "application.compose.yml"
+    content = json.loads(path.read_text())
+    app = content["services"]["app"]
+    shared = {key: app[key] for key in ("image", "volumes", "stop_grace_period", "depends_on", "ipc")}
+    for name, (_, script, keys) in others.items():
+        words = ["sh", "-c", script.replace("$", "$$"), name]
+        content["services"][name] = {**shared, "entrypoint": words, **keys}
+    path.write_text(json.dumps(content))
+    (service,) = job.plan.application.services
+    after = {name: condition for name, (condition, _, _) in others.items()}
+    services = (replace(service, after=after), *(ApplicationService(name) for name in others))
+    plan = replace(job.plan, application=replace(job.plan.application, services=services))
+    path = job.folder / "environment.compose.yml"
+    content = json.loads(path.read_text())
+    content["services"]["sandbox"]["ipc"] = "shareable"
+    path.write_text(json.dumps(content))
+    (job.folder / "test.json").write_text(to_json(plan))
+    return replace(job, plan=plan)
+
+
+BACKENDS = {"docker": Containers(SUBNETS), "mixed": Mixed(Containers(SUBNETS), ())}
+NOT_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container")
+
+
+@pytest.mark.parametrize("backend", ["docker", pytest.param("mixed", marks=NOT_ROOT)])
+def test_conditions(backend: str, crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that cannot come true ends the test, and names who waits for what."""
+    monkeypatch.setattr(conditions, "LONGEST_S", 9.0)
+    chosen = TABLE if backend == "docker" else {name: TABLE[name] for name in ("come-true", "init-fails")}
+    scripts = Path("/scripts") if backend == "docker" else crate.bench.folder
+    jobs = [waiting(crate, slug, scripts, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]
+    backends: Backends = BACKENDS[backend]
+    runner = Runner(crate.progress, backends, schedule(4, lambda job: 1.0), Policy())
+    found = {o.slug.removeprefix(f"{crate.mark}-"): (o.outcome, o.reason) for o in asyncio.run(runner.run(jobs))}
+    assert found == {slug: row[1:] for slug, row in chosen.items()}

@@ -1,0 +1,160 @@
+"""Which of DoDo's jobs and of the team's are in which kind of pipeline: as a table for the documentation, and in files
+as teams write them, for each template, by lists that are kept beside them."""
+
+import functools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from dodo_dsl.cli.compile import pipeline_file
+from dodo_dsl.cli.compile.pipeline_rules import KINDS
+from tests.gitlab.inputs import TEMPLATES, Config, included, jobs, listed, merged, specified
+
+PAGE = Path(__file__).parents[2] / "docs/how-to/gitlab.md"
+BEGIN, END = "<!-- the table is written by tests/gitlab/test_rules.py -->\n\n", "\n\n<!-- end of the table -->"
+FOREIGN = {path.stem: path for path in sorted((Path(__file__).parent / "foreign").glob("*.yml"))}
+WORKFLOW = pipeline_file.read(FOREIGN["workflow"]).config["workflow"]
+COLUMNS: dict[str, tuple[str, Config]] = {
+    "`joined`": ("joined", {}),
+    "`joined`, and a [workflow](#one-pipeline-for-both)": ("joined", {"workflow": WORKFLOW}),
+    "`merge-requests`": ("merge-requests", {}),
+    "`branches`": ("branches", {}),
+    "`tags`": ("tags", {}),
+    "`schedules`": ("schedules", {}),
+}
+
+
+def table() -> str:
+    rows = [("a pipeline of this kind tests", *COLUMNS), ("---",) * (len(COLUMNS) + 1)]
+    for kind in KINDS:
+        rows.append((kind, *("yes" if _tests(kind, *column) else "–" for column in COLUMNS.values())))
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _tests(kind: str, rules: str, around: Config) -> bool:
+    """Whether all of DoDo's jobs are there, or none of them is: the same for each template."""
+    found = set()
+    for template in TEMPLATES:
+        config = merged(included(template, rules=rules), around)
+        there, every = listed(config, KINDS[kind]), jobs(config).keys() - {"dodo-deployment"}
+        assert there in (set(), every), "a part of the jobs would test nothing, and be green"
+        found.add(bool(there))
+    (tests,) = found
+    return tests
+
+
+def test_the_page_has_the_table(update_goldens: bool) -> None:
+    before, _, rest = PAGE.read_text().partition(BEGIN)
+    old, _, after = rest.partition(END)
+    if update_goldens:
+        PAGE.write_text(f"{before}{BEGIN}{table()}{END}{after}")
+    else:
+        assert old == table(), "pytest tests/gitlab/test_rules.py --update-goldens brings it up to date"
+
+
+@pytest.mark.parametrize("source", ["schedule", "trigger", "pipeline", "api", "web"])
+def test_an_open_merge_request_hides_only_pushes(source: str) -> None:
+    """On its branch all other pipelines test, as no pipeline of the merge request does for them."""
+    for template in TEMPLATES:
+        for rules in ("joined", "merge-requests", "branches"):
+            variables = {**KINDS["push to a branch whose merge request is open"], "CI_PIPELINE_SOURCE": source}
+            config = included(template, rules=rules)
+            assert listed(config, variables) == jobs(config).keys() - {"dodo-deployment"}
+
+
+@pytest.mark.parametrize("rules", ["joined", "merge-requests", "branches", "tags", "schedules"])
+def test_a_deployment_is_triggered_where_one_is_named(rules: str) -> None:
+    application = next(template for template in TEMPLATES if template.parent.name == "application")
+    config = included(application, deployment="group/deployment", rules=rules)
+    found = {kind for kind, variables in KINDS.items() if "dodo-deployment" in listed(config, variables)}
+    default = {kind for kind, variables in KINDS.items() if variables.get("CI_COMMIT_BRANCH") == "main"}
+    assert found == {"tags": {"tag"}, "schedules": {"schedule"}}.get(rules, default)
+    for variables in KINDS.values():
+        assert "dodo-deployment" not in listed(included(application, rules=rules), variables)
+        without = included(application, deployment="group/deployment", rules=rules, images=False)
+        assert not {"dodo-deployment", "dodo-images"} & listed(without, variables)
+
+
+def test_rules_of_the_team_s_own_are_those_of_all_jobs() -> None:
+    for template in TEMPLATES[:2]:
+        own: Config = {".dodo-rules": {"rules": [{"if": "$NIGHT"}]}}
+        config = merged(included(template, rules="merge-requests"), own)
+        assert listed(config, KINDS["merge request"]) == set()
+        assert "dodo-tests" in listed(config, {**KINDS["merge request"], "NIGHT": "1"})
+
+
+@functools.cache
+def foreign(name: str) -> tuple[Config, Config]:
+    """A file of a team's as DoDo reads it, and the inputs with which it includes a template."""
+    path = FOREIGN[name]
+    first = path.read_text().splitlines()[0]
+    inputs = yaml.safe_load(first.removeprefix("# inputs: "))
+    return pipeline_file.read(path).config, {key.replace("-", "_"): value for key, value in inputs.items()}
+
+
+def around(template: Path, name: str) -> Config:
+    config, inputs = foreign(name)
+    return merged(included(template, **inputs), config)
+
+
+def lists(name: str) -> Iterator[str]:
+    """A line for each kind of pipeline: the team's jobs, and the templates whose jobs are all beside them."""
+    configs = {template: around(template, name) for template in TEMPLATES}
+    mine = {template: jobs(included(template)).keys() - {"dodo-deployment"} for template in TEMPLATES}
+    for kind, variables in KINDS.items():
+        there = {template: listed(config, variables) for template, config in configs.items()}
+        (team,) = {frozenset(there[template] - mine[template]) for template in TEMPLATES}
+        tested = [template for template in TEMPLATES if there[template] & mine[template]]
+        assert all(mine[template] <= there[template] for template in tested), "a part would test nothing, and be green"
+        yield f"{kind}: {' '.join(sorted(team)) or '-'} + {' '.join(t.parent.name for t in tested) or '-'}"
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_each_kind_of_pipeline_has_its_jobs(name: str, update_goldens: bool) -> None:
+    golden, text = FOREIGN[name].with_suffix(".txt"), "\n".join(lists(name)) + "\n"
+    if update_goldens:
+        golden.write_text(text)
+    assert golden.read_text() == text
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_no_merge_request_has_a_pipeline_of_one_side_alone(name: str, tmp_path: Path) -> None:
+    """With the inputs that the file names; and where they are others, --check says so."""
+    for template in TEMPLATES:
+        config, mine = around(template, name), jobs(included(template)).keys()
+        there = listed(config, KINDS["merge request"])
+        assert bool(there & mine) == bool(there - mine)
+    _, inputs = foreign(name)
+    wanted = inputs.get("rules", "joined")
+    said = {rules: problems(name, tmp_path, {**inputs, "rules": rules}) for rules in ("joined", "merge-requests")}
+    assert said[wanted] == []
+    other = "joined" if wanted == "merge-requests" else "merge-requests"
+    by_workflow = "workflow" in foreign(name)[0]
+    assert [problem.rule for problem in said[other]] == ([] if by_workflow else ["pipeline-jobs"])
+
+
+def problems(name: str, folder: Path, inputs: dict[str, Any]) -> list[Any]:
+    given = {key.replace("_", "-"): value for key, value in inputs.items()}
+    entry = {"local": ".gitlab/dodo/run.gitlab-ci.yml", "inputs": given}
+    text = FOREIGN[name].read_text().replace("include:\n", "")
+    text = text.replace("  - template: Workflows/MergeRequest-Pipelines.gitlab-ci.yml\n", "")
+    (folder / ".gitlab-ci.yml").write_text(f"{yaml.safe_dump({'include': [entry]})}{text}")
+    return pipeline_file.problems(folder)
+
+
+def test_gitlab_accepts_them(tmp_path: Path, accepted: Callable[..., None]) -> None:
+    for name in FOREIGN:
+        for template in TEMPLATES:
+            config = around(template, name)
+            whole = {key: value for key, value in config.items() if key in ("workflow", "stages", "default")}
+            text = yaml.safe_dump({**whole, **jobs(config)})
+            (tmp_path / f"{name}.{template.parent.name}.yml").write_text(text)
+    accepted(*tmp_path.iterdir())
+
+
+def test_each_template_has_the_choice() -> None:
+    options = [specified(template)["rules"]["options"] for template in TEMPLATES]
+    assert {rules for rules, _ in COLUMNS.values()} == set(options[0]) and options.count(options[0]) == len(TEMPLATES)

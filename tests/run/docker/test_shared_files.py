@@ -1,0 +1,72 @@
+"""Which of a test's files the engine does not see, by what it says of a container that never starts."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from docker.errors import APIError, NotFound
+from docker.types import HostConfig
+
+from dodo_dsl.application.model import SANDBOX
+from dodo_dsl.run.docker.shared_files import mounted, problem, unseen
+
+
+class Engine:
+    """Has files below some folders only, and says so in the words of Docker 20.10 to 29."""
+
+    def __init__(self, *folders: Path, error: Exception | None = None) -> None:
+        self.api, self.folders, self.error, self.containers = self, folders, error, list[str]()
+
+    def create_host_config(self, **words: Any) -> HostConfig:
+        return HostConfig("1.41", **words)
+
+    def create_container(self, _image: str, _command: list[str], **words: Any) -> dict[str, str]:
+        if self.error:
+            raise self.error
+        for mount in words["host_config"]["Mounts"]:
+            if not any(Path(mount["Source"]).is_relative_to(folder) for folder in self.folders):
+                said = 'invalid mount config for type "bind": bind source path does not exist: '
+                raise APIError("400", explanation=said + mount["Source"])
+        self.containers.append("c1")
+        return {"Id": "c1"}
+
+    def remove_container(self, name: str, force: bool) -> None:
+        assert force
+        self.containers.remove(name)
+
+
+def test_the_first_path_that_is_missing(tmp_path: Path) -> None:
+    engine = Engine(tmp_path)
+    assert unseen(engine, [tmp_path / "a", tmp_path / "b"]) is None
+    assert engine.containers == []
+    assert unseen(engine, [tmp_path / "a", Path("/team/app"), Path("/team/app/maps")]) == Path("/team/app")
+
+
+@pytest.mark.parametrize("error", [NotFound("no such image"), OSError("gone"), APIError("500", explanation="full")])
+def test_what_says_nothing_of_files_is_no_answer(error: Exception, tmp_path: Path) -> None:
+    assert unseen(Engine(error=error), [tmp_path]) is None
+
+
+def test_what_a_test_mounts(tmp_path: Path) -> None:
+    """The compiled test by the file that is made last; no sources that compose makes, nor what processes would need."""
+    own, repository = tmp_path / "generated" / "t", tmp_path / "maps"
+    for folder in (own / "files", repository):
+        folder.mkdir(parents=True)
+
+    def bind(path: Path) -> dict[str, Any]:
+        return {
+            "volumes": [{"type": "bind", "source": str(path)}, {"type": "volume", "source": "tmp"}, {"type": "tmpfs"}]
+        }
+
+    services = {"camera": bind(own / "files"), "driver": bind(repository), "new": bind(tmp_path / "new"), "a": {}}
+    assert mounted({**services, SANDBOX: bind(Path("/usr"))}, own) == [own / "test.json", repository]
+    assert mounted({"driver": bind(repository)}, own) == [repository]
+
+
+def test_the_way_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    monkeypatch.setenv("DOCKER_HOST", "tcp://docker:2375")
+    said, way = problem(tmp_path / "dodo-run-1" / "t" / "test.json")
+    assert said.startswith("the Docker engine at tcp://docker:2375 does not see '")
+    assert "TMPDIR" in way
+    assert "TMPDIR" not in problem(Path("/team/app"))[1]
