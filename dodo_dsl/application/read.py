@@ -73,7 +73,7 @@ def read_application(
     refused = {problem.span for problem in found}
     withheld = secret_problems.withheld(nodes, files.variables, access.passed, os.environ)
     found.extend(problem for problem in withheld if problem.span not in refused)
-    found.extend(secret_problems.written(nodes))
+    found.extend(secret_problems.written([document]))
     found.extend(secret_problems.in_files(_own_files(application)))
     found.extend(secret_problems.left_out(files.secrets))
     return (None if has_errors(found) else application), found

@@ -11,7 +11,7 @@ from dodo_dsl.application import host_access, opendlv_flags
 from dodo_dsl.application.access import filled
 from dodo_dsl.application.access.access_diagnostics import diagnostic, place
 from dodo_dsl.application.access.service_findings import Surroundings, service_findings
-from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, plain
+from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix
 from dodo_dsl.source import Node
 
@@ -19,6 +19,10 @@ _CONDITIONS = ("service_started", "service_healthy", "service_completed_successf
 
 _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
+_LONGEST_HOST = 64
+"""Bytes of a host's name, and of its domain's (utsname(7))."""
+_LONGEST_TEXT = 131_072
+"""Bytes from which on a program takes no argument and no variable (MAX_ARG_STRLEN, with its end)."""
 _LONGEST = 63
 """A service's name is also one in the test's network (RFC 1035)."""
 
@@ -60,7 +64,7 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _words, _references, _conditions, _volumes, _access, _single):
+    for rule in (_name, _words, _references, _conditions, _volumes, _access, _single, _engine):
         yield from rule(written)
 
 
@@ -168,6 +172,38 @@ def _single(written: Written) -> Iterator[Diagnostic]:
         if isinstance(value, int) and value > 1:
             message = f"'{written.name}' has {value} replicas, but starts once in a test"
             yield Diagnostic(written.place(key), "application-file", message, "", "warning")
+
+
+def _engine(written: Written) -> Iterator[Diagnostic]:
+    """What the kernel or the engine refuses, and compose does not see: long names and texts, images in capitals."""
+    seen = plain(written.filled)
+    for key in ("hostname", "domainname"):
+        value = seen.get(key)
+        if isinstance(value, str) and "$" not in value and len(value.encode()) > _LONGEST_HOST:
+            message = f"'{key}' of '{written.name}' has {len(value.encode())} bytes, and Linux takes {_LONGEST_HOST}"
+            yield _bad(written.place(key), message, "shorten it")
+    image = str(seen.get("image") or "")
+    if "$" not in image and (name := _repository(image)) != name.lower():
+        hint = f"write {image.replace(name, name.lower(), 1)}"
+        yield _bad(written.place("image"), f"the image '{image}' has capitals, which no engine takes in its name", hint)
+    texts = [(key, f"{key}={value}") for key, value in environment(seen.get("environment")).items()]
+    words = seen.get("command")
+    texts += [("command", str(word)) for word in words] if isinstance(words, list) else []
+    for name, text in texts:
+        if len(text.encode()) >= _LONGEST_TEXT:
+            message = (
+                f"'{name}' of '{written.name}' has {len(text.encode()):,} bytes, expected fewer than {_LONGEST_TEXT:,}"
+            )
+            key = "command" if name == "command" else "environment"
+            yield _bad(written.place(key), message, "put it into a file that the service mounts")
+
+
+def _repository(image: str) -> str:
+    """The part of an image's name that is in small letters: without registry, tag and digest."""
+    host, sign, rest = image.partition("@")[0].partition("/")
+    has_host = bool(sign) and ("." in host or ":" in host or host == "localhost")
+    name = rest if has_host else f"{host}{sign}{rest}"
+    return name.partition(":")[0]
 
 
 def _bad(span: Span, message: str, hint: str = "", fix: Fix | None = None) -> Diagnostic:

@@ -2,11 +2,13 @@
 
 import asyncio
 import contextlib
+import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, Self
 
+from dodo_dsl.application.access import secret_variables
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.attempts import Attempts, is_undecided
@@ -99,6 +101,9 @@ class Runner:
         ``finished`` is called for each test as soon as its outcome is final.
         """
         self._finished = finished
+        passed = [name for job in jobs for name in job.plan.application.access.passed]
+        for text in secret_variables.passed_secrets(os.environ, passed):
+            self.progress.note(text)
         await self.backends.prepare([job.plan for job in jobs], self.progress.note)
         self._waiting = self.schedule.ordered(jobs)
         tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}

@@ -10,7 +10,6 @@ volumes: [known:/data, "${V:-known}:/more"]
 volumes: [./data:/data, /data]
 volumes: [{type: volume, source: known, target: /data}]
 volumes: [{type: volume, target: /data}, {type: tmpfs, target: /t}, {type: bind, source: ./data, target: /b}]
-volumes: ["d:/data"]
 restart: always
 restart: "no"
 restart: no
@@ -137,7 +136,14 @@ x-own: "${B"
 
 RIGHT_FOR_UP = ["restart: any", "restart: always:0", "restart: on-failure:+3"]
 """These start, as well as those of ``RIGHT``; those of ``WRONG_FOR_UP`` do not, though compose reads them."""
-WRONG_FOR_UP = ["restart: sometimes", "restart: Always", "restart: always:3", "restart: on-failure:-1"]
+WRONG_FOR_UP = [
+    "restart: sometimes",
+    "restart: Always",
+    "restart: always:3",
+    "restart: on-failure:-1",
+    'volumes: ["d:/data"]',
+    'volumes: [known:/data, "d:/data:ro"]',
+]
 
 
 def compose_file(value: str, image: str = "x") -> str:

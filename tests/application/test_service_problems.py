@@ -21,6 +21,13 @@ FILE = {
     "image: x, entrypoint: (prog)": "'entrypoint' of 'a': parenthesis outside quotes, but compose starts no shell",
     "image: x, depends_on: [c]": "'depends_on' of 'a' names the unknown service 'c'",
     "image: x, volumes_from: [car]": "'car', whose volumes 'a' uses, does not start: it needs profile car",
+    "image: Team/x:A": "the image 'Team/x:A' has capitals, which no engine takes in its name",
+    "image: r.x:5/a/B": "the image 'r.x:5/a/B' has capitals, which no engine takes in its name",
+    f"image: x, hostname: {'h' * 65}": "'hostname' of 'a' has 65 bytes, and Linux takes 64",
+    f"image: x, domainname: {'d' * 65}": "'domainname' of 'a' has 65 bytes, and Linux takes 64",
+    f"image: x, environment: [A={'1' * 131070}]": "'A' of 'a' has 131,072 bytes, expected fewer than 131,072",
+    f"image: x, command: [{'x' * 131072}]": "'command' of 'a' has 131,072 bytes, expected fewer than 131,072",
+    "image: x, volumes: ['v:/d']": "compose takes 'v:' of 'v:/d' for a drive of Windows, and mounts no volume",
     "image: x, scale: 3": "'a' has 3 replicas, but starts once in a test",
     "image: x, deploy: {replicas: 2}": "'a' has 2 replicas, but starts once in a test",
 }
@@ -40,6 +47,17 @@ HARDWARE = {
     "image: x, volumes: ['/dev/bus:/dev/bus']": "'/dev/bus' of 'a'",
     "image: x, cap_add: [sys_time]": "capability 'sys_time' of 'a'",
 }
+
+
+@pytest.mark.parametrize(
+    "service",
+    [
+        *("image: 'R.x:5/a/b:A'", "image: 'a@sha256:ABC'", "image: '$I'", f"image: x, hostname: {'h' * 64}"),
+        f"image: x, environment: [A={'1' * 131069}]",
+    ],
+)
+def test_what_an_engine_takes(service: str) -> None:
+    assert [message for rule, message in found(service) if rule == "application-file"] == []
 
 
 @pytest.mark.parametrize("service", FILE)

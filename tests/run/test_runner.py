@@ -3,11 +3,12 @@
 import asyncio
 import signal
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.application.access.model import Access
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan
 from dodo_dsl.run.backends import Job
@@ -366,3 +367,12 @@ def test_containers_are_needed_by_what_cannot_be_started() -> None:
     started, image = ApplicationService("a", ("python", "a.py")), ApplicationService("b")
     assert default_backend([plan(application=Application(".", (started,)))]) == "process"
     assert default_backend([plan(application=Application(".", (started, image)))]) == "docker"
+
+
+def test_a_secret_that_is_passed_is_told(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DATABASE", "x://a:s3cr3t@b")
+    application = replace(plan("a").application, access=Access(passed=("DATABASE",)))
+    scene.run(replace(plan("a"), application=application), plan("b"))
+    (text,) = [note for note in scene.progress.notes if "DATABASE" in note]
+    assert "'DATABASE', which looks like an address with a password" in text
+    assert "s3cr3t" not in text

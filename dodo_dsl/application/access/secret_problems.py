@@ -37,10 +37,13 @@ def withheld(
 
 
 def written(nodes: Collection[Node]) -> Iterator[Diagnostic]:
-    """Values in the files themselves that look like secrets, and so are in compiled tests."""
+    """Values in the files themselves that look like secrets; each once, though anchors and merges repeat it."""
+    seen: set[Span] = set()
     for node in nodes:
         for part in source.walk(node):
-            if isinstance(part, Scalar) and (kind := secret_variables.secret_kind(part.text)):
+            kind = secret_variables.secret_kind(part.text) if isinstance(part, Scalar) else ""
+            if kind and part.span not in seen:
+                seen.add(part.span)
                 yield _open(replace(part.span, length=0), kind)
 
 

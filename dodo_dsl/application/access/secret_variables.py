@@ -1,7 +1,7 @@
 """Variables that look like secrets: the pipeline's own, tokens, passwords and keys."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from fnmatch import fnmatchcase
 
 PIPELINE = "CI_*"
@@ -31,7 +31,7 @@ NEVER = ("DODO_SEARCH_STORAGE",)
 _SECRET_VALUE = re.compile(
     r"(?P<url>://[^/@:\s]*:(?![$@])[^/@\s]+@)"
     r"|(?P<key>-----BEGIN [A-Z ]*PRIVATE KEY)"
-    r"|(?P<token>\b(?:gl(?:pat|ptt|dt|rt|cbt|soat)-[\w-]{20,}|gh[opsur]_\w{30,}|github_pat_\w{30,}|AKIA[0-9A-Z]{16}\b"
+    r"|(?P<token>\b(?:gl(?:pat|ptt|dt|rt|cbt|soat|oas|ft|imt|agent|ffct)-[\w-]{20,}|gh[opsur]_\w{30,}|github_pat_\w{30,}|A(?:KIA|SIA)[0-9A-Z]{16}\b"
     r"|AIza[\w-]{35}|xox[abeoprs]-[\w-]{10,}|npm_\w{36}|hf_\w{30,}|pypi-[\w-]{50,}|sk-(?:proj-|ant-)?\w{20,}"
     r"|eyJ[\w-]{8,}\.eyJ[\w-]{8,}\.[\w-]{8,}))"
 )
@@ -57,6 +57,14 @@ def secret_kind(value: str) -> str:
     """What a value looks like: an address with a password, a private key, or a token; empty for others."""
     found = _SECRET_VALUE.search(value)
     return _KINDS[found.lastgroup or ""] if found else ""
+
+
+def passed_secrets(variables: Mapping[str, str], passed: Collection[str]) -> Iterator[str]:
+    """Sentences on passed variables whose values look like secrets, which nothing hides once they are passed."""
+    for name in sorted(set(passed)):
+        if kind := secret_kind(variables.get(name, "")):
+            what = f"the application gets '{name}', which looks like {kind}, as dodo.yml passes it"
+            yield f"{what}; what it prints of it is in its log"
 
 
 def _matches(name: str, patterns: Collection[str]) -> bool:

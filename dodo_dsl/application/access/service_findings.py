@@ -150,6 +150,11 @@ def _processors(name: str, service: dict[str, Any]) -> Iterator[AccessFinding]:
             if driver.lower() not in _GRAPHICS and "$" not in driver:
                 message = f"the driver '{driver}' of a device of '{name}' {_CDI}"
                 yield AccessFinding((*way, item, "driver"), message, "use nvidia, or no driver")
+            ids = request.get("device_ids") if isinstance(request, dict) else None
+            for number, word in enumerate(_items(ids)):
+                if "=" in str(word):
+                    message = f"device '{word}' of '{name}' {_CDI}"
+                    yield AccessFinding((*way, item, "device_ids", number), message, "use numbers, or UUIDs of GPUs")
 
 
 def _port(steps: Steps, what: str) -> AccessFinding:

@@ -3,10 +3,12 @@
 ``application-variable``: a test sets only variables that are not DoDo's, to values that fit.
 ``application-required``: no variable that the file requires (``${NAME:?why}``) is certain to be without a value, as
 compose would then refuse the test.
+``application-secret``: no value that a test sets looks like a secret.
 """
 
 from collections.abc import Iterator
 
+from dodo_dsl.application.access import secret_problems
 from dodo_dsl.application.access.compose_keys import SERVICE, removed
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource
@@ -38,6 +40,7 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, _RULE, message, "set a variable that the application itself reads")
         elif isinstance(entry.value, Scalar):
             yield from _value(context, name, entry.value)
+            yield from secret_problems.written([entry.value])
 
 
 def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnostic]:

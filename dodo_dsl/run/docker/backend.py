@@ -33,8 +33,6 @@ from dodo_dsl.run.services.service_output import ServiceOutput
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
-_NOT_STARTED, _INIT = (126, 127), "[FATAL tini"
-"""How the engine's own first process of a container (``init: true``) ends when it cannot start the program."""
 _MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
 """How often, and how long each time, the engine's word is awaited that it was for memory: it may come late."""
 
@@ -200,10 +198,6 @@ class DockerBackend:
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
-        if code in _NOT_STARTED and (why := init_said(self._containers[name], self._outputs[name].tail())):
-            self._events.put_nowait(Unstartable(name, why))
-            self._conditions.failed(name)
-            return
         self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
         self._conditions.ended(name, code)
 
@@ -373,15 +367,6 @@ def health_patience_s(container: Any) -> float:
     interval, timeout = (((check.get(key) or 0) / 1e9) or 30.0 for key in ("Interval", "Timeout"))
     tries = (check.get("StartPeriod") or 0) / 1e9 + (check.get("Retries") or 3) * (interval + timeout)
     return min(tries + READY_S, LONGEST_S)
-
-
-def init_said(container: Any, lines: Sequence[str]) -> str:
-    """Why the engine's own first process of a container could not start the program; empty where it did.
-
-    ``lines`` are the last of the container's: where the program never began, there is only this one.
-    """
-    has_init = bool(container.attrs["HostConfig"].get("Init"))
-    return lines[0] if has_init and len(lines) == 1 and lines[0].startswith(_INIT) else ""
 
 
 def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:

@@ -203,8 +203,8 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     wanted = error.validator_value
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
-    expected = error.schema.get("x-expect") if "boolean" in wanted else ""
-    message = f"{place.name} {found}, expected {expected or ' or '.join(names)}"
+    names = names if error.schema.get("x-expect") != _TYPE_NAMES["boolean"] else [_TYPE_NAMES["boolean"]]
+    message = f"{place.name} {found}, expected {' or '.join(names)}"
     hint, fix = error.schema.get(_HINT) or _of_file(place) or _in_quotes(error, place), None
     if not hint and wanted == "array" and "examples" in error.schema:
         hint = f"write for example {place.name[1:-1]}: {_in_line(error.schema['examples'][0])}"

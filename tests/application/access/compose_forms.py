@@ -1,7 +1,7 @@
 """Every form that compose's schema accepts for each key of the tables, with values that a test may have.
 
-The forms are those of the schema: each branch of ``oneOf``, each type, each value of an ``enum``, each key of a mapping,
-an item of a list, and keys that begin with ``x-``. Numbers and switches are also written as strings.
+The forms are those of the schema: each branch of ``oneOf``, each type, each value of an ``enum``, each key of a
+mapping, an item of a list, and keys that begin with ``x-``. Numbers and switches are also written as strings.
 """
 
 import functools

@@ -1,7 +1,6 @@
 """Every form of every key: kept, rewritten, removed or refused, as the tables say, and as compose sees the copy."""
 
 import json
-import os
 import subprocess
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -34,11 +33,11 @@ ROWS = {
     "secret": compose_keys.SECRET,
     "config": compose_keys.CONFIG,
 }
+PRIVILEGED = tuple(f"list of privileged: {word}" for word in ("true", "string 'true", "string 'TRUE", "string 'yes"))
 REFUSED = {
     "service.build": ("entitlements: ",),
     "service.memswap_limit": ("string '-1'",),  # by compose, too
-    "service.post_start": ("list of privileged: true", *(f"list of privileged: string '{word}" for word in ("true", "TRUE", "yes"))),
-    "service.pre_stop": ("list of privileged: true", *(f"list of privileged: string '{word}" for word in ("true", "TRUE", "yes"))),
+    **dict.fromkeys(("service.post_start", "service.pre_stop"), PRIVILEGED),
     "service.volumes": ("list of type: cluster", "list of type: npipe"),
     "volume.driver_opts": ("",),
 }
@@ -101,8 +100,8 @@ class Case:
 
     def of_copy(self, copy: Mapping[str, Any]) -> Mapping[str, Any]:
         """The mapping of a test's copy that had the key."""
-        holder = copy["services"] if self.table == "service" else copy.get(f"{self.table}s", {})
-        found: Mapping[str, Any] = holder.get(self.service if self.table == "service" else f"{self.table[0]}{self.number}")
+        name = self.service if self.table == "service" else f"{self.table[0]}{self.number}"
+        found: Mapping[str, Any] = copy.get(f"{self.table}s", {}).get(name)
         return found or {}
 
 
@@ -189,7 +188,17 @@ def test_no_key_has_another_case(key: str, repository: Path) -> None:
     assert application is None
     (told,) = [problem for problem in problems if problem.rule == "unknown-key"]
     assert told.hint == f"did you mean '{case.key}'?"
-    assert (repository / "docker-compose.yml").read_text().splitlines()[told.span.line - 1].strip().startswith(upper.key)
+    line = (repository / "docker-compose.yml").read_text().splitlines()[told.span.line - 1]
+    assert line.strip().startswith(upper.key)
+
+
+@pytest.mark.parametrize(("number", "meant"), [(0, "false"), (1, "true")])
+def test_a_number_is_no_switch(number: int, meant: str, repository: Path) -> None:
+    """Compose takes none either."""
+    _, problems = compiled([Case("service", "privileged", Form("number", number), 1)], repository)
+    (told,) = problems
+    assert told.message == "'privileged' is a whole number, expected true or false"
+    assert told.hint == f"write {meant}; compose takes no number here"
 
 
 @pytest.mark.slow

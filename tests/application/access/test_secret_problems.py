@@ -57,6 +57,11 @@ def test_values_that_look_like_secrets(tmp_path: Path) -> None:
     assert token not in format_text([problem])
 
 
+def test_a_value_that_is_repeated_is_told_once() -> None:
+    node = mapping("x-db: &db {DB: 'x://a:s3cr3t@b'}\na: {environment: *db}\nb: {environment: *db}")
+    assert len(list(written([node, node]))) == 1
+
+
 def test_lines_with_secrets_are_not_shown(tmp_path: Path) -> None:
     file = tmp_path / ".env"
     file.write_text("SPEED=1\nexport API_KEY=s3cr3t\nDB=x://a:s3cr3t@b\n")

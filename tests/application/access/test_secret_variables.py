@@ -68,3 +68,11 @@ def test_what_the_engine_s_client_sees() -> None:
     assert secret_variables.of_client(variables) == {"DOCKER_HOST": "unix:///x"}
     remote = {**variables, "DOCKER_HOST": "ssh://host"}
     assert secret_variables.of_client(remote) == {"DOCKER_HOST": "ssh://host", "SSH_AUTH_SOCK": "/s"}
+
+
+def test_passed_variables_whose_values_are_secrets() -> None:
+    """They are named, and never their values; what has a secret's name is no news."""
+    variables = {"A": "glpat-" + "0123456789" * 2, "B": "1", "C_TOKEN": "s3cr3t", "D": "x://a:s3cr3t@b"}
+    (text,) = secret_variables.passed_secrets(variables, ["B", "C_TOKEN", "A", "A", "NONE"])
+    assert text.startswith("the application gets 'A', which looks like a token, as dodo.yml passes it")
+    assert "glpat" not in text

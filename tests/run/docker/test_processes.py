@@ -10,13 +10,10 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import processes
-from dodo_dsl.run.docker.backend import init_said
 from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.processes import ContainerProcesses
 from dodo_dsl.run.load.snapshot import Times
 from tests.run.load.test_thread_times import Proc
-
-FATAL = "[FATAL tini (7)] exec drive failed: No such file or directory"
 
 
 class Container:
@@ -60,16 +57,6 @@ def test_the_first_processes_of_the_application(proc: Proc) -> None:
     found = ContainerProcesses({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc.root)
     assert found.first(["app", "ended"]) == {10: "app"}
     assert (found.first(["app", "far"]), found.first(["mute"])) == (None, None)
-
-
-@pytest.mark.parametrize(
-    ("init", "lines", "is_said"),
-    [(True, [FATAL], True), (False, [FATAL], False), (True, ["it drives", FATAL], False), (True, [], False)],
-)
-def test_only_a_program_that_never_began_could_not_be_started(init: bool, lines: list[str], is_said: bool) -> None:
-    container = Container("c0ffee", 0)
-    container.attrs["HostConfig"] = {"Init": init}
-    assert init_said(container, lines) == (FATAL if is_said else "")
 
 
 def test_one_thread_at_a_time_measures(proc: Proc) -> None:
