@@ -32,7 +32,10 @@ print("swaps", flush=True)
 while True:
     assert swap(-100, b"/app/link", -100, b"/app/exchanged", 2) == 0
 """
-LOOP = "cd /app && echo swaps && while mv {name} gone && ln -s {link} {name} && rm {name} && mv gone {name}; do :; done"
+LOOP = (
+    "cd /app && echo swaps && while mv {name} {name}.gone && ln -s {link} {name} && rm {name} && mv {name}.gone {name};"
+    " do true; done"
+)
 ATTACKS: dict[str, tuple[list[str], list[str]]] = {
     "folder": ([".:/app"], ["sh", "-c", LOOP.format(name="moved", link="{host}")]),
     "file": ([".:/app"], ["sh", "-c", LOOP.format(name="lone", link="{host}/own")]),
