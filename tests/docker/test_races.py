@@ -32,7 +32,10 @@ print("swaps", flush=True)
 while True:
     assert swap(-100, b"/app/link", -100, b"/app/exchanged", 2) == 0
 """
-LOOP = "cd /app && echo swaps && while mv {name} gone && ln -s {link} {name} && rm {name} && mv gone {name}; do :; done"
+LOOP = (
+    "cd /app && echo swaps && while mv {name} {name}.gone && ln -s {link} {name} && rm {name} && mv {name}.gone {name};"
+    " do true; done"
+)
 ATTACKS: dict[str, tuple[list[str], list[str]]] = {
     "folder": ([".:/app"], ["sh", "-c", LOOP.format(name="moved", link="{host}")]),
     "file": ([".:/app"], ["sh", "-c", LOOP.format(name="lone", link="{host}/own")]),
@@ -91,7 +94,7 @@ def repository(folder: Path, attacks: Mapping[str, tuple[list[str], list[str]]],
 
 def looks(team: Path, backend: str, before: Sequence[str]) -> list[str]:
     """What the services of one test saw."""
-    own = {"PYTHONPATH": str(ROOT), "DODO_LEASES": str(team / "leases"), "HOME": str(team / "home")}
+    own = {"PYTHONPATH": str(ROOT), "DODO_LEASES": str(team / "leases")}
     words = ["run", TEST, "--backend", backend, "-q", "--report", str(team / "report")]
     if backend == "mixed" and before:
         words += ["--isolation", "host"]
@@ -106,7 +109,16 @@ def looks(team: Path, backend: str, before: Sequence[str]) -> list[str]:
     return [line.removeprefix("sees ") for line in said.splitlines() if line.startswith("sees ")]
 
 
-def attacked(folder: Path, backend: str, user: str, tries: int) -> None:
+def configured(folder: Path) -> Path:
+    """A folder with root's plug-ins of the docker command, as those of a user."""
+    plugins = folder / "docker" / "cli-plugins"
+    plugins.mkdir(parents=True, exist_ok=True)
+    for path in Path("~/.docker/cli-plugins").expanduser().glob("*"):
+        shutil.copy(path, plugins / path.name)
+    return plugins.parent
+
+
+def attacked(folder: Path, backend: str, user: str, tries: int, monkeypatch: pytest.MonkeyPatch) -> None:
     count = 0
     while count < tries:
         run = folder / f"{backend}-{user}-{count}"
@@ -116,6 +128,7 @@ def attacked(folder: Path, backend: str, user: str, tries: int) -> None:
         if user == "user":
             for path in (folder, run, *run.rglob("*")):
                 os.lchown(path, 12_345, 12_345)
+            monkeypatch.setenv("DOCKER_CONFIG", str(configured(folder)))
             before = words_as_user(run, groups=(Path("/var/run/docker.sock").stat().st_gid,))
         seen = looks(team, backend, before)
         assert len(seen) == LOOKERS * SEEN and set(seen) == {"own"}, seen
@@ -129,8 +142,8 @@ WAYS = [("docker", "root"), ("mixed", "root"), ("docker", "user"), ("mixed", "us
 @pytest.mark.proof
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root becomes another user")
 @pytest.mark.parametrize(("backend", "user"), WAYS)
-def test_no_race_is_won(backend: str, user: str, tmp_path: Path) -> None:
-    attacked(tmp_path, backend, user, TRIES // len(WAYS))
+def test_no_race_is_won(backend: str, user: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    attacked(tmp_path, backend, user, TRIES // len(WAYS), monkeypatch)
 
 
 @pytest.mark.proof

@@ -1,6 +1,7 @@
 """Attacks by compose files are refused, left out, or stopped at run time."""
 
 import asyncio
+import pwd
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,23 @@ def test_what_is_refused(attack: dict[str, Any], tmp_path: Path) -> None:
         assert problem.span.line and problem.span.column
         assert "links" not in attack or "symbolic link" in problem.message
         assert problem.hint or problem.rule == "application-isolation"
+
+
+@pytest.mark.parametrize("home", ["/", ""])
+@pytest.mark.parametrize("mount", ["/etc:/h", "/etc:/h:ro", "~/.ssh:/h:ro", "~:/h", "/tmp/x:/h", "/opt:/h"])
+def test_what_is_no_home(mount: str, home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing of the host is an application's as its user has no home, or all of the host for one."""
+    monkeypatch.delenv("HOME")
+    if home:
+        monkeypatch.setenv("HOME", home)
+    monkeypatch.setattr(pwd, "getpwuid", nobody)
+    application, problems = found({"service": {"volumes": [mount]}}, tmp_path)
+    assert application is None
+    assert [problem.rule for problem in problems] == ["application-isolation"]
+
+
+def nobody(user: int) -> Any:
+    raise KeyError(user)
 
 
 @pytest.mark.parametrize("attack", attacks("left out"))

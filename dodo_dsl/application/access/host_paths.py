@@ -142,7 +142,11 @@ def _below(path: str, places: "Sequence[Path | str]") -> bool:
 
 
 def _expanded(text: str) -> str:
-    return os.path.expanduser(text) if text.startswith("~") else text  # noqa: PTH111  (it never raises)
+    """With the home in the place of ``~``: for a user without one a path that is nobody's."""
+    if not text.startswith("~"):
+        return text
+    path = os.path.expanduser(text)  # noqa: PTH111  (it never raises)
+    return f"/{text}" if path == text else path
 
 
 def real(path: str | Path) -> str:

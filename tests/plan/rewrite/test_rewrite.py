@@ -113,3 +113,24 @@ def test_keys_without_a_value_are_left_out(tmp_path: Path) -> None:
     service = planned(tmp_path, text).compose["services"]["a"]
     assert not {"environment", "env_file", "platform"} & set(service)
     assert service["build"] == {"context": "../../team", "args": {"A": None}}
+
+
+def test_what_starts_before_a_service(tmp_path: Path) -> None:
+    """By the conditions of ``depends_on``, and where it joins another one."""
+    text = """\
+services:
+  a: {image: a, command: --cid=111, depends_on: [b], network_mode: "service:c", links: ["d:x"]}
+  b: {image: a, depends_on: {c: {condition: service_healthy, required: false}, gone: {condition: service_started}}}
+  c: {image: a, depends_on: {d: {condition: service_completed_successfully}}}
+  d: {image: a, depends_on: {e: {condition: "${HOW}"}}}
+  e: {image: a}
+  gone: {image: a, profiles: [view]}
+"""
+    started = "service_started"
+    assert {service.name: service.after for service in planned(tmp_path, text).services} == {
+        "a": {"c": started, "d": started, "b": started},
+        "b": {"c": "service_healthy"},
+        "c": {"d": "service_completed_successfully"},
+        "d": {"e": started},
+        "e": {},
+    }
