@@ -35,10 +35,7 @@ def engine_stub(certificates: Path | None = None) -> Iterator[str]:
     """Its address as in ``DOCKER_HOST``; with ``certificates`` it takes only clients that have these."""
     server = _Server(("127.0.0.1", 0), _Handler)
     if certificates:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(certificates / "cert.pem", certificates / "key.pem")
-        context.load_verify_locations(certificates / "ca.pem")
-        context.verify_mode = ssl.CERT_REQUIRED
+        context = tls_context(certificates)
         server.socket = context.wrap_socket(server.socket, server_side=True, do_handshake_on_connect=False)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
     thread.start()
@@ -48,6 +45,15 @@ def engine_stub(certificates: Path | None = None) -> Iterator[str]:
         server.shutdown()
         thread.join()
         server.server_close()
+
+
+def tls_context(certificates: Path) -> ssl.SSLContext:
+    """TLS of an engine that takes only clients with a certificate of its own authority."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(certificates / "cert.pem", certificates / "key.pem")
+    context.load_verify_locations(certificates / "ca.pem")
+    context.verify_mode = ssl.CERT_REQUIRED
+    return context
 
 
 def make_certificates(folder: Path) -> Path:
