@@ -56,14 +56,14 @@ def tls_context(certificates: Path) -> ssl.SSLContext:
     return context
 
 
-def make_certificates(folder: Path) -> Path:
-    """A folder with ``ca.pem``, ``cert.pem`` and ``key.pem`` for 127.0.0.1, as ``DOCKER_CERT_PATH`` has them."""
+def make_certificates(folder: Path, address: str = "127.0.0.1") -> Path:
+    """A folder with ``ca.pem``, ``cert.pem`` and ``key.pem`` for an address, as ``DOCKER_CERT_PATH`` has them."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "names").write_text("subjectAltName=IP:127.0.0.1,DNS:localhost\n")
+    (folder / "names").write_text(f"subjectAltName=IP:{address}\n")
     key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
     for words in (
         ["req", "-x509", *key, "-keyout", "ca.key", "-out", "ca.pem", "-subj", "/CN=engines", "-days", "3"],
-        ["req", *key, "-keyout", "key.pem", "-out", "own.csr", "-subj", "/CN=127.0.0.1"],
+        ["req", *key, "-keyout", "key.pem", "-out", "own.csr", "-subj", "/CN=engine"],
         ["x509", "-req", "-in", "own.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-out", "cert.pem",
          "-days", "3", "-extfile", "names"],
     ):  # fmt: skip
