@@ -5,7 +5,7 @@ import pytest
 from tests.docker.compose import Crate
 from tests.docker.own_engine import own_engine
 
-pytestmark = [pytest.mark.engine, pytest.mark.proof]
+pytestmark = [pytest.mark.slow, pytest.mark.proof]
 
 
 @pytest.mark.parametrize("tls", [False, True], ids=["plain", "tls"])
