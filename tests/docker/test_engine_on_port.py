@@ -10,7 +10,7 @@ from tests.docker.compose import Crate
 from tests.docker.engine_port import engine_port
 from tests.docker.engine_proxy import engine_socket
 from tests.run.docker.engine_stub import make_certificates
-from tests.run.process.test_faults import FAULTS
+from tests.run.faults import FAULTS
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
