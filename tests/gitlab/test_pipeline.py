@@ -172,10 +172,11 @@ def test_services_and_first_commands_are_for_all_jobs_but_those_on_rigs(
     made = yaml.safe_load(text)
     for name in (plan.slug, "hil-model"):
         assert made[name]["services"] == ["docker:dind", {"name": "redis"}]
-        assert made[name]["script"][0] == "a\nb", "after the login of all jobs"
+        login = made["default"]["before_script"]
+        assert made[name]["before_script"] == ["a\nb", *login], "the engine that they wait for logs in"
     for name in ("search a", "search a report"):
         assert (made[name]["services"], made[name]["before_script"]) == (["docker:dind", {"name": "redis"}], ["a\nb"])
-    assert "services" not in made["hil-real"] and len(made["hil-real"]["script"]) == 1
+    assert not {"services", "before_script"} & made["hil-real"].keys() and len(made["hil-real"]["script"]) == 1
     assert "services" not in made["gate"] and made["gate"]["before_script"] == [], "whatever a parent forwards"
     assert {job["artifacts"]["access"] for job in made.values() if "artifacts" in job} == {"none"}
     plain = render_pipeline(suite, "generated", [SearchJobs("a", "a", 2)]).text

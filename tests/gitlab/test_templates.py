@@ -39,6 +39,7 @@ env > "$calls.environment"
 case "$*" in
 login*) cat > "$calls.token" ;;
 *--print*) echo '{json.dumps(BAKE, indent=2)}' ;;
+*"buildx create"*) echo "$4" ;;
 *--push*) while [ "$1" != --metadata-file ]; do shift; done
           echo '{json.dumps({"x": {"containerimage.digest": DIGEST}}, indent=2)}' > "$2" ;;
 esac
@@ -132,7 +133,9 @@ def test_what_the_child_s_jobs_have_reaches_the_compiler(template: Path, tmp_pat
     child = yaml.safe_load((tmp_path / "generated/child.gitlab-ci.yml").read_text())
     (job,) = [job for job in child.values() if "script" in job]
     assert (job["services"], job["tags"], job["image"]) == (services, ["a b"], "dodo:1")
-    assert (job["script"][0], job["artifacts"]["access"]) == ('pip install "x"\n. ./env $A', "developer")
+    assert job["artifacts"]["access"] == "developer"
+    login = child["default"]["before_script"]
+    assert job["before_script"] == ['pip install "x"\n. ./env $A', *login], "which may wait for the engine of the login"
 
 
 @each
@@ -356,15 +359,19 @@ def run_images(tmp_path: Path, docker: str, compose: str = BUILT, **inputs: Any)
         "CI_REGISTRY": "registry.example.org",
         "CI_REGISTRY_IMAGE": "registry.example.org/team/car",
         "CI_COMMIT_SHA": "c0ffee",
+        "CI_JOB_ID": "7",
+        "CI_PROJECT_DIR": str(tmp_path),
         "DODO_COMPOSE_FILE": "app/docker-compose.yml",
         "DODO_PLATFORMS": jobs(config)["dodo-images"]["variables"]["DODO_PLATFORMS"],
         "DODO_DEPLOYMENT": "team/deployment",
         "DODO_DEPLOYMENT_BRANCH": "main",
     }
     script = "set -e\n" + "\n".join(job["script"])
-    return subprocess.run(
+    result = subprocess.run(
         ["sh", "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
+    subprocess.run(["sh", "-ec", "\n".join(job["after_script"])], cwd=tmp_path, env=environment, check=True)
+    return result
 
 
 def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Callable[..., None]) -> None:
@@ -415,6 +422,15 @@ def test_images_are_built_for_the_platforms_that_are_asked_for(tmp_path: Path) -
     assert run_images(tmp_path, DOCKER, platforms="linux/amd64,linux/arm64").returncode == 0
     calls = (tmp_path / "calls.txt").read_text()
     assert " --push --set lane-finder.platform=linux/amd64,linux/arm64 --metadata-file " in calls
+    _, context, builder, *bakes, gone = calls.splitlines()  # the first one logs in
+    assert (context, builder) == ("context create dodo", "buildx create --name dodo-7 --driver docker-container dodo")
+    assert {call.partition(" bake ")[0] for call in bakes} == {"buildx --builder dodo-7"}
+    assert gone == "buildx rm --force dodo-7"
+
+
+def test_without_platforms_the_engine_builds_by_itself(tmp_path: Path) -> None:
+    assert run_images(tmp_path, DOCKER).returncode == 0
+    assert "dodo-7" not in (tmp_path / "calls.txt").read_text()
 
 
 def test_an_application_without_a_build_has_no_images(tmp_path: Path, accepted: Callable[..., None]) -> None:

@@ -13,6 +13,7 @@ from dodo_dsl import advice, package_data
 from dodo_dsl.run.capabilities.finding import Capability
 from dodo_dsl.run.docker.client import NoEngine, connect
 from dodo_dsl.run.docker.shared_files import problem, provide_image, unseen
+from dodo_dsl.run.protocol import BackendError
 
 FIRMWARE = "DODO_FIRMWARE"
 EMULATOR_PLACES = (package_data.root() / "build" / "firmware", Path("/opt/dodo/firmware"))
@@ -38,7 +39,11 @@ def docker_engine() -> Iterator[Capability]:
 
 def _files_of(client: Any) -> Iterator[Capability]:
     """Whether the engine sees the folders in which tests are, and in which they are compiled."""
-    provide_image(client)
+    try:
+        provide_image(client)
+    except BackendError as error:
+        yield Capability("files of tests", "warning", f"{error}; --backend docker needs it", "repair the engine")
+        return
     with tempfile.NamedTemporaryFile(prefix="dodo-doctor-") as mark:
         for place, path in (("this folder", Path.cwd()), ("TMPDIR", Path(mark.name).resolve())):
             if missing := unseen(client, [path]):

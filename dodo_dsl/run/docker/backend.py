@@ -298,9 +298,13 @@ class DockerBackend:
         names = {s.name for s in self.plan.application.services}
         return await asyncio.to_thread(self._processes.listeners, names, self.cid)
 
-    async def begin(self) -> None:
+    async def require_own_host(self) -> None:
+        """Raises BackendError where the test is on the network of a host that is not this machine."""
         if self.is_on_host and await self.application() is None:
             raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
+
+    async def begin(self) -> None:
+        await self.require_own_host()
         for _ in range(_ADDRESS_TURNS):
             if self._addresses.keys() >= {*that_hear(self.plan)}:
                 break

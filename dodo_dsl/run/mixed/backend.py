@@ -42,6 +42,7 @@ class MixedBackend:
         return await self._containers.listeners()
 
     async def begin(self) -> None:
+        await self._containers.require_own_host()
         await self._processes.begin()
 
     async def load(self) -> Snapshot | None:

@@ -8,6 +8,7 @@ from dodo_dsl.run.capabilities import programs
 from dodo_dsl.run.capabilities.examine import examine, rigs, state_folder
 from dodo_dsl.run.rigs.quarantine import quarantine
 from services.gantry import emulator
+from tests.run.docker.engine_stub import engine_stub
 
 
 @pytest.mark.slow
@@ -19,6 +20,17 @@ def test_what_cannot_be_examined_is_a_finding(tmp_path: Path, monkeypatch: pytes
     found = {finding.name: finding for finding in examine()}
     assert (found["disk"].state, found["disk"].text[:22]) == ("problem", "cannot be examined: [E")
     assert {"multicast", "shared memory", "docker engine", "left behind"} <= set(found)
+
+
+def test_an_engine_on_a_port_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that makes no containers is an engine, too, and no use."""
+    for name in ("DOCKER_TLS_VERIFY", "DOCKER_CERT_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    with engine_stub() as host:
+        monkeypatch.setenv("DOCKER_HOST", host)
+        engine, files = programs.docker_engine()
+    assert (engine.state, engine.text) == ("ok", f"version 99.0, API 1.41 at {host}")
+    assert (files.state, files.text[:42]) == ("warning", "the Docker engine cannot make an empty ima")
 
 
 def test_whether_the_emulated_rig_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

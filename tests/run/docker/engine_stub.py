@@ -35,10 +35,7 @@ def engine_stub(certificates: Path | None = None) -> Iterator[str]:
     """Its address as in ``DOCKER_HOST``; with ``certificates`` it takes only clients that have these."""
     server = _Server(("127.0.0.1", 0), _Handler)
     if certificates:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(certificates / "cert.pem", certificates / "key.pem")
-        context.load_verify_locations(certificates / "ca.pem")
-        context.verify_mode = ssl.CERT_REQUIRED
+        context = tls_context(certificates)
         server.socket = context.wrap_socket(server.socket, server_side=True, do_handshake_on_connect=False)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
     thread.start()
@@ -50,14 +47,23 @@ def engine_stub(certificates: Path | None = None) -> Iterator[str]:
         server.server_close()
 
 
-def make_certificates(folder: Path) -> Path:
-    """A folder with ``ca.pem``, ``cert.pem`` and ``key.pem`` for 127.0.0.1, as ``DOCKER_CERT_PATH`` has them."""
+def tls_context(certificates: Path) -> ssl.SSLContext:
+    """TLS of an engine that takes only clients with a certificate of its own authority."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(certificates / "cert.pem", certificates / "key.pem")
+    context.load_verify_locations(certificates / "ca.pem")
+    context.verify_mode = ssl.CERT_REQUIRED
+    return context
+
+
+def make_certificates(folder: Path, address: str = "127.0.0.1") -> Path:
+    """A folder with ``ca.pem``, ``cert.pem`` and ``key.pem`` for an address, as ``DOCKER_CERT_PATH`` has them."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "names").write_text("subjectAltName=IP:127.0.0.1,DNS:localhost\n")
+    (folder / "names").write_text(f"subjectAltName=IP:{address}\n")
     key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
     for words in (
         ["req", "-x509", *key, "-keyout", "ca.key", "-out", "ca.pem", "-subj", "/CN=engines", "-days", "3"],
-        ["req", *key, "-keyout", "key.pem", "-out", "own.csr", "-subj", "/CN=127.0.0.1"],
+        ["req", *key, "-keyout", "key.pem", "-out", "own.csr", "-subj", "/CN=engine"],
         ["x509", "-req", "-in", "own.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-out", "cert.pem",
          "-days", "3", "-extfile", "names"],
     ):  # fmt: skip

@@ -1,7 +1,9 @@
 """The processes of containers: found by the engine's answers, and only on the machine that runs them."""
 
+import asyncio
 import contextlib
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +12,13 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import processes
+from dodo_dsl.run.docker.backend import DockerBackend
 from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.processes import ContainerProcesses
+from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.load.snapshot import Times
+from dodo_dsl.run.protocol import BackendError
+from tests.run.helpers import Bench
 from tests.run.load.test_thread_times import Proc
 
 
@@ -57,6 +63,23 @@ def test_the_first_processes_of_the_application(proc: Proc) -> None:
     found = ContainerProcesses({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc.root)
     assert found.first(["app", "ended"]) == {10: "app"}
     assert (found.first(["app", "far"]), found.first(["mute"])) == (None, None)
+
+
+@pytest.mark.parametrize(("isolation", "pid"), [("host", 10), ("host", 11), ("network", 11)])
+def test_a_test_on_the_network_of_another_host_does_not_begin(
+    isolation: str, pid: int, proc: Proc, tmp_path: Path
+) -> None:
+    """In the engine's own network of a test it does; there its containers are told through one of them."""
+    plan = replace(Bench(tmp_path).plan(), isolation=isolation)
+
+    async def begin() -> None:
+        backend = DockerBackend(plan, tmp_path, tmp_path, None, Pulls(None), "p", (), print, b"")
+        backend._processes = ContainerProcesses({"app": Container("c0ffee", pid)}, proc.root)
+        await backend.require_own_host()
+
+    refused = pytest.raises(BackendError, match=r"another machine.*use --isolation network")
+    with refused if (isolation, pid) == ("host", 11) else contextlib.nullcontext():
+        asyncio.run(begin())
 
 
 def test_one_thread_at_a_time_measures(proc: Proc) -> None:

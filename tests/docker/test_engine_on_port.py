@@ -1,0 +1,33 @@
+"""Tests in containers of an engine that is reached by a TCP port, as in Docker-in-Docker, with and without TLS."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.run.capabilities import programs
+from tests.docker.compose import Crate
+from tests.docker.engine_port import engine_port
+from tests.docker.engine_proxy import engine_socket
+from tests.run.docker.engine_stub import make_certificates
+from tests.run.faults import FAULTS
+
+pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
+
+
+@pytest.mark.parametrize("tls", [False, True], ids=["plain", "tls"])
+def test_both_sides_of_a_verdict(tls: bool, crate: Crate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if (engine := engine_socket()) is None or not shutil.which("openssl"):
+        pytest.skip("there is no engine with a socket here, or no openssl")
+    certificates = make_certificates(tmp_path / "certs") if tls else None
+    names = ("neighbour", "killed")
+    jobs = [crate.job(name, f.judge, f.application, f.environment) for name in names for f in [FAULTS[name]]]
+    with engine_port(engine, certificates) as variables, monkeypatch.context() as patch:
+        for name, value in variables.items():
+            patch.setenv(name, value)
+        (found, *rest) = programs.docker_engine()
+        assert (found.text.endswith(" with TLS"), variables["DOCKER_HOST"] in found.text) == (tls, True)
+        assert [finding.state for finding in rest] == ["ok"], "the engine is on this machine"
+        outcomes = crate.run(*jobs)
+        assert crate.left() == []
+    assert [outcomes[name].outcome for name in names] == ["passed", "failed"], outcomes
