@@ -99,6 +99,8 @@ class Way:
     """s until braking begins, or the rig stands."""
     module: str = ""
     """The program that it is done to."""
+    short: bool = False
+    """Whether ``make test`` does it; the others end in the same way, and are for ``make proof``."""
 
 
 def killed(name: str, module: str, reason: str) -> Way:
@@ -106,11 +108,11 @@ def killed(name: str, module: str, reason: str) -> Way:
 
 
 def stopped(name: str, module: str, reason: str) -> Way:
-    return Way(name, partial(stop, module=module), reason, module=module)
+    return Way(name, partial(stop, module=module), reason, module=module, short=True)
 
 
 WAYS = (
-    Way("unplug", unplug, "is lost: "),
+    Way("unplug", unplug, "is lost: ", short=True),
     Way("unplug_with_power", unplug_with_power, "is lost: ", begin=AT_ONCE),
     Way("kill_rig", kill_rig, "is lost: "),
     Way("reset", reset, "RESTARTED"),
@@ -119,7 +121,7 @@ WAYS = (
     killed("kill_model", MODEL, "service 'vehicle' of layer action was killed by SIGKILL"),
     stopped("stop_model", MODEL, "no KinematicState of the vehicle has come for 1 s"),
     killed("kill_sandbox", SANDBOX, "the test's sandbox ended unexpectedly"),
-    Way("kill_runner", kill_runner, ""),
+    Way("kill_runner", kill_runner, "", short=True),
     Way("kill_runner", kill_runner, "", isolation="network"),
 )
 
@@ -168,7 +170,13 @@ def nothing_is_left(run: Run) -> bool:
 
 
 @pytest.mark.usefixtures("firmware")
-@pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way.name}-{way.isolation}")
+@pytest.mark.parametrize(
+    "way",
+    [
+        pytest.param(way, id=f"{way.name}-{way.isolation}", marks=[] if way.short else [pytest.mark.proof])
+        for way in WAYS
+    ],
+)
 def test_the_outcome_is_error_and_the_rig_comes_to_rest(tmp_path: Path, way: Way) -> None:
     with Hardware(tmp_path / "port") as rig, running(tmp_path, rig, way.isolation) as run:
         pull_the_plug(run, way)
