@@ -28,16 +28,16 @@ include:
     inputs:
       compose-file: kiwi/docker-compose.yml
       needs: [configure]
-      before-script: echo "before $CI_JOB_NAME"
+      before-script: echo "before $CI_JOB_NAME${OURS:+ with what is ours}"
       variables: [DODO_RUN_OPTIONS, DODO_REGISTRY]
   - local: .gitlab/dodo/deployment.gitlab-ci.yml
     inputs:
       needs: [configure]
-      before-script: echo "before $CI_JOB_NAME"
+      before-script: echo "before $CI_JOB_NAME${OURS:+ with what is ours}"
       variables: [DODO_RUN_OPTIONS, DODO_REGISTRY]
 stages: [prepare, test, release]
 default: {before_script: [echo of foreign jobs only]}
-variables: {DODO_RUN_OPTIONS: "", DODO_REGISTRY: "", GIT_STRATEGY: none}
+variables: {DODO_RUN_OPTIONS: "", DODO_REGISTRY: "", GIT_STRATEGY: none, OURS: "1"}
 configure: {stage: prepare, script: [echo configured]}
 lint: {script: [echo linted]}
 publish: {stage: release, script: [echo published]}
@@ -114,7 +114,7 @@ def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> 
     foreign = {name for name, words in said if "of foreign jobs only" in words}
     assert foreign == {"configure", "lint", "publish"}
     before = {name for name, words in said if words == f"before {name}"}
-    assert before >= {"compile", "dodo-check", *TESTS}, "of all jobs with a script, also of the child's"
+    assert before >= {"compile", "dodo-check", *TESTS}, "all jobs with a script, also of the child, and without OURS"
     image = artifact(repository, "compile", f"generated/{TESTS[0]}/.env").read_text().splitlines()[-1]
     assert image == "DODO_IMAGE_STEERING=example"
     for name in TESTS:
