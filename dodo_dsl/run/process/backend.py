@@ -11,7 +11,7 @@ from typing import Any
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run.application_files import hidden_folders
+from dodo_dsl.run.application_files import application_paths, hidden_folders
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
@@ -184,9 +184,14 @@ class ProcessBackend:
         if command.layer != "application" or not self._is_confined:
             return None
         application = self.plan.application
-        hidden = hidden_folders(application, self._folder, self.report)
+        hidden = [*hidden_folders(application, self._folder, self.report), *self._around()]
         confined = confinement(command.folder, self.isolation, self.cid, application.limits, hidden)
         return replace(confined, masked=command.masked).to_json()
+
+    def _around(self) -> list[Path]:
+        """What lies around the application's folder: its repository, and the folders of this test."""
+        paths = application_paths(self.plan.application, self._folder)
+        return [*paths.roots, self._folder.resolve(), self.report.resolve()]
 
     async def next_event(self) -> Event:
         return await self._events.get()
