@@ -16,8 +16,6 @@ INTERPRETER = tuple(dict.fromkeys((sys.prefix, sys.base_prefix)))
 """The folders of this Python, which starts the application's programs."""
 SYSTEM = ("/usr", "/etc", "/opt", "/sys/devices/system")
 """What every application sees of the machine."""
-_INSTALLED = "lib*/python3*/*-packages/dodo_dsl/_data"
-"""Where an installation has tests with their maps, truths and recordings, an editable one a copy of the checkout's."""
 _OF_TESTS = ("tests_registry", "tests", "templates", "benchmarks", "docs", "generated", "dodo-report", "build", "dist")
 """Folders of a checkout with tests, or with what was made of them."""
 
@@ -71,7 +69,7 @@ def own_data() -> tuple[Path, ...]:
     root = package_data.root()
     optional = [path for path in _entries(Path("/opt")) if path.is_dir()]
     prefixes = [*map(Path, (*INTERPRETER, "/usr", "/usr/local")), *optional]
-    found = [data for prefix in prefixes for data in prefix.glob(_INSTALLED)]
+    found = [data for prefix in prefixes for data in prefix.glob(package_data.INSTALLED)]
     found += [Path(place, "dodo_dsl", "_data") for place in sys.path]
     for checkout in (root, *optional):
         if (checkout / "dodo_dsl").is_dir():
