@@ -170,8 +170,8 @@ class Compose:
         """What hides the tests from the application's services, and stands for what is not there."""
         hidden = hidden_folders(self.plan.application, self.folder, self.report)
         for root in self._paths.roots:
-            found = files_of_tests(root, self._paths.folder, hidden)
-            hidden += [path for path in found if path.is_dir()]  # the engine masks no single file
+            ours = files_of_tests(root, self._paths.folder, hidden)
+            hidden += [path for path in ours if path.is_dir()]  # the engine masks no single file
         every = (*(service.name for service in self.plan.application.services), FILES)
         names = [name for name in every if name in self.services]
         found = {
