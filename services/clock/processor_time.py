@@ -1,14 +1,26 @@
-"""How much of the processor the application took, and how long it waited for it, since its processes began."""
+"""How much of the processor the application took, and how long others kept it waiting, since its processes began.
+
+A wait is excused as far as others than the application used the processors meanwhile. What its children took that have
+ended is in the account of its control groups, where it has some (``GROUP``). Elsewhere nobody may know, as with those
+for which nobody waits (``SIG_IGN`` for ``SIGCHLD``): there, an answer during which processes or threads came and went
+has no excuse.
+"""
 
 import contextlib
+import math
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 _LOOK_AGAIN = 20
-"""Frames after which new processes of the application are looked for again."""
+"""Looks after which new processes of the application are looked for again, and sooner where some began."""
+GROUP = "dodo-"
+"""How the names of control groups begin that hold one service of the application, and nothing else."""
+_TICK_S = 1 / os.sysconf("SC_CLK_TCK")
+_BUSY = (0, 1, 2, 5, 6, 7)
+"""Columns of ``/proc/stat`` (proc_pid_stat(5)) in which a core is not free: user, nice, system, interrupts, stolen."""
 
 
 class Spent(NamedTuple):
@@ -25,11 +37,24 @@ class ThreadSpent(NamedTuple):
     waited_s: float
 
 
+class Account(NamedTuple):
+    """What was used at a moment, in s: by the application with all that ended, None where nobody knows, and by all.
+
+    ``begun`` is the last number of a process or thread that was given, None where those of others have the same ones.
+    """
+
+    application_s: float | None
+    machine_s: float
+    begun: int | None
+
+
 class ProcessorTimes(NamedTuple):
     """What processes have spent up to now, by process id: processor time in s, and the times of each thread."""
 
     ran_s: Mapping[int, float]
     threads: Mapping[int, Mapping[str, ThreadSpent]]
+    account: Account | None = None
+    """None where there was none to be made: then all that is waited is excused."""
 
     def since(self, before: "ProcessorTimes") -> Spent:
         """What was spent since another snapshot. A process waits as long as the one of its threads that ran the most.
@@ -37,15 +62,38 @@ class ProcessorTimes(NamedTuple):
         Others may have nothing to do and be ready all the same, such as those of OpenCV's pool, which look for work
         for a while before they sleep: on a busy machine they wait much longer than the work takes.
         """
-        ran = sum(max(now - before.ran_s.get(pid, now), 0.0) for pid, now in self.ran_s.items())
-        return Spent(ran, sum(self._waits(before)))
+        return Spent(self._ran_s(before), min(sum(self._waits(before)), self._others_s(before)))
 
     def longest_wait(self, before: "ProcessorTimes") -> float:
-        """Seconds that the process waited which waited the longest since another snapshot."""
-        return max(self._waits(before), default=0.0)
+        """Seconds that others kept the process waiting which they kept the longest since another snapshot."""
+        return min(max(self._waits(before), default=0.0), self._others_s(before))
 
     def _waits(self, before: "ProcessorTimes") -> list[float]:
-        return [_wait(threads, before.threads.get(pid, {})) for pid, threads in self.threads.items()]
+        """The part of each process's wait that falls to others, by what they and the application's others took."""
+        ran_s, others_s = self._ran_s(before), self._others_s(before)
+        waits = []
+        for pid, threads in self.threads.items():
+            own = _busiest(threads, before.threads.get(pid, {}))
+            siblings_s = max(ran_s - own.ran_s, 0.0)
+            share = 1.0 if siblings_s == 0 or math.isinf(others_s) else others_s / (others_s + siblings_s)
+            waits.append(own.waited_s * share)
+        return waits
+
+    def _ran_s(self, before: "ProcessorTimes") -> float:
+        ran = sum(max(now - before.ran_s.get(pid, now), 0.0) for pid, now in self.ran_s.items())
+        if self.account and before.account:
+            now, then = self.account.application_s, before.account.application_s
+            return ran if now is None or then is None else max(now - then, ran)
+        return ran
+
+    def _others_s(self, before: "ProcessorTimes") -> float:
+        """What others took at most since another snapshot: the kernel's figure of all is one of whole ticks."""
+        if self.account is None or before.account is None:
+            return math.inf
+        now, then = self.account, before.account
+        if now.application_s is None and (now.begun != then.begun or before.ran_s.keys() - self.ran_s.keys()):
+            return 0.0
+        return max(now.machine_s - then.machine_s - self._ran_s(before), 0.0) + _TICK_S
 
 
 NOTHING = ProcessorTimes({}, {})
@@ -58,20 +106,80 @@ class ApplicationProcesses:
         self._roots, self._proc = frozenset(roots), proc
         self._pids: tuple[int, ...] = ()
         self._looks = 0
+        self._begun: int | None = None
+        self._groups = {root: _group_of(root, proc) for root in self._roots}
+        self._used: dict[int, float] = {}
+        """What the groups said at last: they go with their services."""
 
     def __bool__(self) -> bool:
         return bool(self._roots)
 
     def snapshot(self) -> ProcessorTimes:
         """What they have spent up to now, without those that have ended."""
-        if self._looks % _LOOK_AGAIN == 0:
+        account = self._account()
+        begun = account.begun if account else None
+        if self._looks % _LOOK_AGAIN == 0 or begun != self._begun:
             self._pids = tuple(descendants(self._roots, self._proc))
-        self._looks += 1
+        self._looks, self._begun = self._looks + 1, begun
         ran: dict[int, float] = {}
         for pid in self._pids:
             with contextlib.suppress(OSError):
                 ran[pid] = _process_clock(pid)
-        return ProcessorTimes(ran, {pid: dict(_threads(f"{self._proc}/{pid}/task")) for pid in self._pids})
+        threads = {pid: dict(_threads(f"{self._proc}/{pid}/task")) for pid in self._pids}
+        return ProcessorTimes(ran, threads, account)
+
+    def _account(self) -> Account | None:
+        with contextlib.suppress(OSError, ValueError):
+            machine_s = busy_s((self._proc / "stat").read_text(), os.sched_getaffinity(0))
+            begun = int((self._proc / "loadavg").read_text().split()[-1]) if os.getppid() == 1 else None
+            return Account(self._used_by_groups(), machine_s, begun)
+        return None
+
+    def _used_by_groups(self) -> float | None:
+        """None where a service has no group of its own."""
+        for root, group in self._groups.items():
+            if group is None:
+                return None
+            with contextlib.suppress(OSError, ValueError, StopIteration):
+                self._used[root] = _used_s(group)
+        return sum(self._used.values())
+
+
+def busy_s(text: str, cores: Collection[int]) -> float:
+    """Seconds for which any process ran on these cores, by the text of ``/proc/stat``."""
+    ticks = 0
+    for line in text.splitlines():
+        name, *numbers = line.split()
+        if name[:3] == "cpu" and name[3:].isdecimal() and int(name[3:]) in cores:
+            ticks += sum(int(numbers[column]) for column in _BUSY if column < len(numbers))
+    return ticks * _TICK_S
+
+
+def _group_of(pid: int, proc: Path) -> Path | None:
+    """The file by which a service's own control group tells its processor time (cgroups(7), version 1 or 2)."""
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        mounts = [line.split() for line in (proc / "self" / "mountinfo").read_text().splitlines()]
+        for line in (proc / str(pid) / "cgroup").read_text().splitlines():
+            _, controllers, path = line.split(":", 2)
+            if not Path(path).name.startswith(GROUP) or (controllers and "cpuacct" not in controllers.split(",")):
+                continue
+            for mount in mounts:
+                kind, options = mount[mount.index("-") + 1], mount[-1].split(",")
+                is_it = "cpuacct" in options if controllers else kind == "cgroup2"
+                if is_it and Path(path).is_relative_to(mount[3]):
+                    folder = Path(mount[4]) / Path(path).relative_to(mount[3])
+                    file = folder / ("cpuacct.usage" if controllers else "cpu.stat")
+                    if file.is_file():
+                        return file
+    return None
+
+
+def _used_s(group: Path) -> float:
+    """Seconds, by ``cpuacct.usage`` in ns or ``cpu.stat`` with a row in us."""
+    text = group.read_text()
+    if " " not in text:
+        return int(text) / 1e9
+    return next(int(row.split()[1]) for row in text.splitlines() if row.startswith("usage_usec ")) / 1e6
 
 
 def own_wait_s(schedstat: Path = Path("/proc/thread-self/schedstat")) -> float:
@@ -127,10 +235,13 @@ def _threads(tasks: str) -> Iterator[tuple[str, ThreadSpent]]:
                 yield thread, ThreadSpent(int(ran) / 1e9, int(waited) / 1e9)
 
 
-def _wait(now: Mapping[str, ThreadSpent], before: Mapping[str, ThreadSpent]) -> float:
-    """How long the thread waited that ran the most in between; nothing where none ran."""
-    spent = [(times.ran_s - then.ran_s, times.waited_s - then.waited_s) for times, then in _both(now, before)]
-    return max(max(spent, default=(0.0, 0.0))[1], 0.0)
+def _busiest(now: Mapping[str, ThreadSpent], before: Mapping[str, ThreadSpent]) -> ThreadSpent:
+    """What the thread ran and waited that ran the most in between; nothing where none ran."""
+    spent = [
+        ThreadSpent(times.ran_s - then.ran_s, times.waited_s - then.waited_s) for times, then in _both(now, before)
+    ]
+    ran_s, waited_s = max(spent, default=(0.0, 0.0))
+    return ThreadSpent(max(ran_s, 0.0), max(waited_s, 0.0))
 
 
 def _both(

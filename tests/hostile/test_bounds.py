@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.run.process.confined import process_group
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.resource_limits import ResourceLimits
 from tests.run.desk import gone, processes_with
 from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
 
@@ -20,6 +22,17 @@ if os.fork() == 0:
     os._exit(0)
 os.wait()
 """
+
+
+HIDES = """
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+for number in range(30):
+    if os.fork() == 0:
+        while time.process_time() < 0.05: pass
+        os._exit(0)
+    time.sleep(0.05)
+"""
+"""1.5 s of processor time in children for which nobody waits, so that it is added to nobody's."""
 
 
 @pytest.fixture
@@ -68,3 +81,15 @@ def test_it_has_time_to_end(bench: Bench) -> None:
     plan = bench.plan(judge=READY + AFTER_START + PASS, application=handler + STARTED + WAIT)
     bench.run(plan)
     assert "landed" in bench.log(plan, "application.app")
+
+
+def test_children_for_which_nobody_waits_are_in_the_account(bench: Bench) -> None:
+    group = process_group.make(1)
+    if group is None:
+        pytest.skip("this user may make no control group")
+    group.remove()
+    plan = bench.plan(judge=READY + AFTER_START + PASS, application="import signal\n" + HIDES + STARTED + WAIT)
+    (outcome,) = bench.run(replace(plan, resources=ResourceLimits(max_processor_time_s=0.9)))
+    (use,) = outcome.resources
+    assert use.processor_s > 0.9
+    assert outcome.outcome == "failed" and outcome.reason.endswith(" s of processor time, at most 0.9 s")

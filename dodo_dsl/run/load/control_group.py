@@ -1,5 +1,6 @@
 """What the processes of a container have used, as the kernel counts it for their control groups (versions 1 and 2)."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 from dodo_dsl.run.load.service_use import Used
 
 _NANOSECONDS, _MICROSECONDS = 1e-9, 1e-6
+_MOST = 4096
 _OF_1 = ("total_rss", "total_shmem")
 _OF_2 = ("anon", "shmem")
 """Anonymous and shared memory in ``memory.stat``; copies of files do not count, which the kernel drops when it must."""
@@ -30,6 +32,16 @@ class ControlGroup:
             return None
         ticks = numbers(text).get("usage_usec") if " " in text else int(text)
         return None if memory is None or ticks is None else Used(ticks * self.tick_s, memory)
+
+
+def processor_s(descriptor: int) -> float | None:
+    """Seconds by an open ``cpuacct.usage`` or ``cpu.stat``; None where the kernel does not tell."""
+    try:
+        text = os.pread(descriptor, _MOST, 0).decode()
+        ticks = numbers(text).get("usage_usec") if " " in text else int(text)
+    except (OSError, ValueError):
+        return None
+    return None if ticks is None else ticks * (_MICROSECONDS if " " in text else _NANOSECONDS)
 
 
 def of_process(pid: int, proc: Path = Path("/proc")) -> ControlGroup | None:

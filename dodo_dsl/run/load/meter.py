@@ -102,7 +102,12 @@ def _spent(before: Snapshot, after: Snapshot) -> dict[str, Times]:
 
 
 def _is_crowded(before: Snapshot, after: Snapshot, application: Callable[[str], bool]) -> bool:
-    """Whether the machine was full between two snapshots, and others than the application took most of it."""
+    """Whether the machine was full between two snapshots, and others than the application took most of it.
+
+    Not where it may have been the application by processes that came and went, and that nobody counts.
+    """
+    if before.changes != after.changes:
+        return False
     available_s, busy_s = after.cores * (after.at_s - before.at_s), after.busy_s - before.busy_s
     own_s = sum(times.ran_s for name, times in _spent(before, after).items() if application(name))
     return available_s > 0 and busy_s >= FULL * available_s and busy_s - own_s >= OTHERS * busy_s

@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,13 +27,29 @@ class Snapshot:
     """Sums since some time in the past; ``at_s`` by a clock that never goes back.
 
     ``services`` are the test's, by name; processes that belong to none of them have the name ``''``.
-    ``busy_s`` is how long the ``cores`` that the test may use were busy, with any process.
+    ``busy_s`` is how long the ``cores`` that the test may use were busy, with any process. ``changes`` is another one
+    when processes or threads began or processes ended, whose time may be in no service's account.
     """
 
     at_s: float
     cores: int
     busy_s: float
     services: Mapping[str, Times]
+    changes: int = 0
+
+
+def with_ended(taken: Snapshot, took_s: Mapping[str, float | None], ended: int, proc: Path = PROC) -> Snapshot:
+    """With the time of the application's processes that ended, ``took_s`` by service, None where nobody counts it.
+
+    ``ended`` is how many processes have ended that were seen.
+    """
+    services = {
+        name: times._replace(ran_s=max(times.ran_s, took_s.get(name) or 0.0)) for name, times in taken.services.items()
+    }
+    if None not in took_s.values():
+        return replace(taken, services=services)
+    begun = int((proc / "loadavg").read_text().split()[-1]) if os.getpid() == 1 else 0
+    return replace(taken, services=services, changes=ended + begun)
 
 
 def take(times: ThreadTimes, services: Mapping[int, str], proc: Path = PROC) -> Snapshot | None:
@@ -46,7 +62,8 @@ def take(times: ThreadTimes, services: Mapping[int, str], proc: Path = PROC) -> 
         return None
     if found is None or busy is None:
         return None
-    return Snapshot(time.monotonic(), len(cores), busy, {name: Times(*sums) for name, sums in found.items()})
+    spent = {name: Times(*sums) for name, sums in found.items()}
+    return Snapshot(time.monotonic(), len(cores), busy, spent)
 
 
 def busy_s(text: str, cores: Iterable[int]) -> float | None:

@@ -37,6 +37,8 @@ class ThreadTimes:
         self._sums: dict[str, _Nanoseconds] = {}
         self._owners: dict[tuple[int, int], str] = {}
         """The service of each process that was seen, by process and start: its parents may have ended since."""
+        self.ended = 0
+        """Processes that were seen and have ended since."""
 
     def add_up(self, services: Mapping[int, str]) -> dict[str, tuple[float, float]] | None:
         """Seconds on a processor, and ready without one, by service; None where the kernel does not measure them.
@@ -44,12 +46,13 @@ class ThreadTimes:
         ``services`` are process ids and names. What their processes have started belongs to them, too. A name ``''``
         is for what descends from a process and belongs to none of the others; the process itself does not count.
         """
-        processes = self._processes()
+        processes, before = self._processes(), self._owners
         self._owners = {
             (pid, process.start): owner
             for pid, process in processes.items()
             if (owner := self._owner(pid, processes, services)) is not None
         }
+        self.ended += len(before.keys() - self._owners.keys())
         found: dict[_Key, _Nanoseconds] = {}
         for (pid, start), owner in self._owners.items():
             if owner == services.get(pid) == "":

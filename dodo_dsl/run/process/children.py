@@ -55,6 +55,7 @@ class Children:
         self._umask = umask
         self._running: dict[str, Child] = {}
         self._used: dict[str, int] = {}
+        self._took_s: dict[str, float | None] = {}
         self.names: dict[int, str] = {}
         """All that were ever started, by process id."""
 
@@ -100,6 +101,11 @@ class Children:
         """Starts a program of the application; raises as ``start``, and NoSeccomp."""
         return self._add(name, ConfinedProcess(words, environment, output, confined, places, self._umask))
 
+    def took_s(self) -> dict[str, float | None]:
+        """Processor time in s of each of the application's programs, also of all that ended; None where not counted."""
+        confined = {n: c.used_s() for n, c in self._running.items() if isinstance(c, ConfinedProcess)}
+        return {**self._took_s, **confined}
+
     @property
     def are_watched(self) -> bool:
         """Whether any has a limit of memory."""
@@ -131,6 +137,8 @@ class Children:
                 else:
                     child = self._running.pop(name)
                     self._on_end(child.pid, name)
+                    if isinstance(child, ConfinedProcess):
+                        self._took_s[name] = child.used_s()
                     code = child.wait()
                     failed = isinstance(child, ConfinedProcess) and child.failed
                     self._on_exit(name, ChildExit(code, self._used.pop(name, 0), failed))

@@ -167,13 +167,19 @@ class Sandbox:
 
     def _do_load(self, _descriptors: list[int]) -> None:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
-        taken = snapshot.take(self.times, {**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
-        self.send(load=snapshot.to_json(taken))
+        names, took = {**self.children.names, os.getpid(): ""}, self.children.took_s()
+        taken = snapshot.take(self.times, names) if _has_own_proc() else None
+        self.send(load=snapshot.to_json(taken and snapshot.with_ended(taken, took, self.times.ended)))
 
     def _do_use(self, _descriptors: list[int], names: list[str]) -> None:
         """Reports what some services have used so far."""
         services = {pid: name for pid, name in self.children.names.items() if name in names}
-        self.send(use={name: used[:2] for name, used in self.use.take(services).items()} if _has_own_proc() else None)
+        took = self.children.took_s()
+        found = {
+            name: (max(used.processor_s, took.get(name) or 0.0), used.memory)
+            for name, used in (self.use.take(services).items() if _has_own_proc() else ())
+        }
+        self.send(use=found if _has_own_proc() else None)
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
         found = listening(self.children.names) if _has_own_proc() else None

@@ -2,12 +2,13 @@
 
 import asyncio
 import contextlib
+from dataclasses import replace
 
 import pytest
 
 from dodo_dsl.outcome import MachineLoad, Wait
 from dodo_dsl.run.load.meter import LAST_PATIENCE_S, PERIOD_S, LoadMeter, add_up
-from dodo_dsl.run.load.snapshot import Snapshot, Times
+from dodo_dsl.run.load.snapshot import Snapshot, Times, with_ended
 from tests.run.scripted import load, run
 
 
@@ -38,6 +39,21 @@ def test_a_wait_that_nobody_else_caused(others: float, app: tuple[float, float])
     assert found.application is not None
     assert found.application.waited_s == pytest.approx(10 * app[1])
     assert (found.application.displaced_s, found.crowded_s) == (0.0, 0.0)
+
+
+def test_processes_that_came_and_went_may_have_been_the_others() -> None:
+    """Where nobody counts what they took, nothing is put down to others."""
+    at = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))
+    found = add_up([replace(at(100.0 + n), changes=min(n, 4)) for n in range(11)], lambda name: name == "app")
+    assert found is not None and found.application is not None
+    assert (found.crowded_s, found.application.displaced_s) == (6.0, pytest.approx(1.8))
+
+
+def test_what_ended_is_the_applications() -> None:
+    taken = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))(10.0)
+    found = with_ended(taken, {"app": 9.0}, 3)
+    assert (found.services["app"].ran_s, found.services["camera"], found.changes) == (9.0, taken.services["camera"], 0)
+    assert with_ended(taken, {"app": None}, 3) == replace(taken, changes=3)
 
 
 def after(first: Snapshot, more: Snapshot) -> Snapshot:

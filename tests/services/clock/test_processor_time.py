@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from services.clock.processor_time import (
+    Account,
     ApplicationProcesses,
     ProcessorTimes,
     Spent,
@@ -18,6 +19,7 @@ from services.clock.processor_time import (
     own_wait_s,
 )
 
+TICK = 1 / os.sysconf("SC_CLK_TCK")
 BURN = """
 import subprocess, sys, threading, time
 def burn():
@@ -93,6 +95,60 @@ def test_what_ended_in_between_takes_nothing_back() -> None:
     before = ProcessorTimes({7: 1.0, 8: 1.0}, {7: {"7": ThreadSpent(1.0, 0.5)}})
     after = ProcessorTimes({7: 1.25}, {7: {}})
     assert after.since(before) == Spent(0.25, 0.0)
+
+
+def taken(ran_s: dict[int, float], waited_s: float, account: Account) -> ProcessorTimes:
+    threads = {pid: {str(pid): ThreadSpent(ran, waited_s)} for pid, ran in ran_s.items()}
+    return ProcessorTimes(ran_s, threads, account)
+
+
+def waits(ran_s: dict[int, float], waited_s: float, application_s: float | None, machine_s: float, begun: int) -> Spent:
+    """What counts as wait when the machine's processors were used for this time."""
+    before = taken(dict.fromkeys(ran_s, 0.0), 0.0, Account(None if application_s is None else 0.0, 0.0, 7))
+    return taken(ran_s, waited_s, Account(application_s, machine_s, begun)).since(before)
+
+
+def test_processes_of_the_application_that_compete_are_its_own_fault() -> None:
+    """Each waits while others of it run: what is excused is what others took, to one tick of the kernel."""
+    hogs = dict.fromkeys(range(24), 0.01)
+    assert waits(hogs, 0.2, None, 0.24, 7).waited_s <= TICK
+    assert waits({1: 0.01}, 0.2, None, 0.4, 7).waited_s == 0.2, "alone it waits for others only"
+    assert waits({1: 0.01}, 0.2, None, 0.05, 7).waited_s == pytest.approx(0.04 + TICK)
+
+
+def test_children_that_ended_are_no_others() -> None:
+    """By the account of the application's control group; without one, whatever began may have been any of them."""
+    assert waits({1: 0.01}, 0.2, 0.4, 0.4, 99) == Spent(0.4, pytest.approx(0.2 * TICK / (TICK + 0.39), abs=TICK))
+    assert waits({1: 0.01}, 0.2, None, 0.4, 99) == Spent(0.01, 0.0)
+    before = taken({1: 0.0, 2: 0.0}, 0.0, Account(None, 0.0, 7))
+    assert taken({1: 0.01}, 0.2, Account(None, 0.4, 7)).since(before).waited_s == 0.0, "one that ended"
+
+
+@pytest.mark.parametrize(
+    ("version", "line", "file", "text"),
+    [
+        (1, "5:cpu,cpuacct:/docker/dodo-1", "cpuacct.usage", "2500000000\n"),
+        (2, "0::/docker/dodo-1", "cpu.stat", "usage_usec 2500000\nuser_usec 1\n"),
+    ],
+)
+def test_the_account_is_that_of_the_services_own_group(
+    tmp_path: Path, version: int, line: str, file: str, text: str
+) -> None:
+    write(tmp_path, 7, {7: (1.0, 0.5)})
+    kind, options = ("cgroup", "rw,cpu,cpuacct") if version == 1 else ("cgroup2", "rw")
+    (tmp_path / "self").mkdir()
+    (tmp_path / "self" / "mountinfo").write_text(f"31 30 0:27 /docker {tmp_path}/tree rw - {kind} none {options}\n")
+    (tmp_path / "tree" / "dodo-1").mkdir(parents=True)
+    (tmp_path / "tree" / "dodo-1" / file).write_text(text)
+    (tmp_path / "stat").write_text("cpu 9 9\n" + "".join(f"cpu{core} 100 0 0 900 0 0 0 0\n" for core in range(4096)))
+    (tmp_path / "loadavg").write_text("1 1 1 1/2 42\n")
+    (tmp_path / "7" / "cgroup").write_text(f"8:pids:/docker/dodo-1\n{line}\n")
+    found = ApplicationProcesses([7], tmp_path).snapshot().account
+    assert found is not None
+    assert (found.application_s, found.machine_s) == (2.5, pytest.approx(100 * TICK * len(os.sched_getaffinity(0))))
+    (tmp_path / "7" / "cgroup").write_text(line.replace("dodo-1", "others") + "\n")
+    shared = ApplicationProcesses([7], tmp_path).snapshot().account
+    assert shared is not None and shared.application_s is None, "a group with others in it"
 
 
 def test_contention_is_the_total_of_some_in_seconds(tmp_path: Path) -> None:

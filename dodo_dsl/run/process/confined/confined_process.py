@@ -69,6 +69,10 @@ class ConfinedProcess:
         self.failed = False
         """Whether the program never began; known after ``wait``."""
 
+    def used_s(self) -> float | None:
+        """Processor time in s, also of all that ended; None where it has no control group that counts it."""
+        return self._group.used_s() if self._group else None
+
     def wait(self) -> int:
         """The program's exit code, below 0 for the signal that ended it."""
         code = self._process.wait()
