@@ -1,18 +1,29 @@
 """Memory of processes, as ``/proc`` tells it: without cgroups, which not every machine hands out.
 
-Programs and files that are only read do not count. Files in memory that only a descriptor holds (memfd_create(2)) count
-as shared memory that is mapped does; the larger of both.
+Programs and files that are only read do not count. Files in memory that only a descriptor holds (memfd_create(2)), and
+System V memories that processes are attached to, count as shared memory that is mapped does; the larger of both. System
+V memories to which no process is attached count beside these.
 """
 
 import contextlib
-from collections.abc import Iterable
+import os
+from collections.abc import Collection, Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 PROC = Path("/proc")
 _RESIDENT = (b"RssAnon:", b"RssShmem:")
 _PROPORTIONAL = (b"Pss_Anon:", b"Pss_Shmem:")
 _MEMFD = "/memfd:"
 _BLOCK = 512
+
+
+class Segment(NamedTuple):
+    """A System V memory; ``creator`` is the process that made it, 0 for one of another namespace."""
+
+    creator: int
+    size: int
+    is_attached: bool
 
 
 def resident(pid: int, proc: Path = PROC) -> tuple[int, int]:
@@ -36,6 +47,30 @@ def held(pids: Iterable[int], proc: Path = PROC) -> int:
                         about = entry.stat()
                         sizes[about.st_dev, about.st_ino] = about.st_blocks * _BLOCK
     return sum(sizes.values())
+
+
+def segments(proc: Path = PROC) -> list[Segment]:
+    """The System V memories of this process's IPC namespace, with bytes in memory and swap (proc_pid_sysvipc(5))."""
+    with contextlib.suppress(OSError):
+        with open(f"{proc}/sysvipc/shm", "rb", buffering=0) as file:  # noqa: PTH123
+            names, *rows = [line.split() for line in file.readall().splitlines()]
+        creator, attached, resident_, swapped = (names.index(name) for name in (b"cpid", b"nattch", b"rss", b"swap"))
+        return [Segment(int(r[creator]), int(r[resident_]) + int(r[swapped]), int(r[attached]) > 0) for r in rows]
+    return []
+
+
+def of_service(found: Iterable[Segment], pids: Collection[int], proc: Path = PROC) -> tuple[int, int]:
+    """Bytes of System V memories of a service: those with processes attached, and others.
+
+    They are of the service whose process created them. Where the creator has ended, they are of every service, if this
+    process is the first of its namespaces: elsewhere they may be of anybody.
+    """
+    attached = detached = 0
+    for creator, size, is_attached in found:
+        is_orphan = creator > 0 and os.getpid() == 1 and not os.path.exists(f"{proc}/{creator}")  # noqa: PTH110
+        if creator in pids or is_orphan:
+            attached, detached = attached + size * is_attached, detached + size * (not is_attached)
+    return attached, detached
 
 
 def _rows(path: str, rows: tuple[bytes, bytes]) -> tuple[int, int]:

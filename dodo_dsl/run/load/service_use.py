@@ -56,6 +56,7 @@ class ServiceUse:
         self._look_at_s = float("-inf")
         self._pids: dict[str, list[int]] = {}
         self._held: dict[str, int] = {}
+        self._detached: dict[str, int] = {}
         self._sharing: dict[str, _Sharing] = {}
         self._ticks: dict[str, int] = defaultdict(int)
         """What the processes said at last, and what is to be added, as some ended for which nobody waited."""
@@ -92,7 +93,10 @@ class ServiceUse:
             if ancestor in services:
                 found[services[ancestor]].append((depth, pid))
         self._pids = {name: [pid for _, pid in sorted(pids)] for name, pids in found.items()}
-        self._held = {name: process_memory.held(pids, self._proc) for name, pids in self._pids.items()}
+        memories = process_memory.segments(self._proc)
+        for name, pids in self._pids.items():
+            attached, self._detached[name] = process_memory.of_service(memories, pids, self._proc)
+            self._held[name] = process_memory.held(pids, self._proc) + attached
         self._look_at_s = time.monotonic() + _patience_s(began)
 
     def _add_children(self, name: str) -> None:
@@ -129,15 +133,15 @@ class ServiceUse:
         """Bytes of all processes; one that began since it was told what they share counts when it is told again."""
         sizes = {pid: process_memory.resident(pid, self._proc) for pid in pids}
         large = {pid for pid, size in sizes.items() if sum(size) > _SMALL}
-        part = 1.0
+        part, detached = 1.0, self._detached.get(name, 0)
         if len(large) > 1:
             sharing = self._shared(name, large, sizes, now)
             known = {pid: size for pid, size in sizes.items() if pid not in large - sharing.among}
             if not known:
-                return max(map(sum, sizes.values()))
+                return max(map(sum, sizes.values())) + detached
             part, sizes = sharing.part, known
         anonymous, shared = (sum(parts) for parts in zip(*sizes.values(), strict=True))
-        return int((anonymous + max(shared, self._held.get(name, 0))) * part)
+        return int((anonymous + max(shared, self._held.get(name, 0))) * part) + detached
 
     def _shared(self, name: str, large: Set[int], sizes: Mapping[int, tuple[int, int]], now: float) -> _Sharing:
         """Which part of their memory counts, as the kernel told it at last."""

@@ -161,3 +161,12 @@ def test_a_process_that_begins_after_the_first_look_counts_at_once(monkeypatch: 
         assert process.stdout.readline() == "held\n"
         assert use.take({process.pid: "app"})["app"].memory > 50_000_000
         process.stdin.close()
+
+
+def test_system_v_memories_count_beside_what_is_mapped(tmp_path: Path) -> None:
+    put(tmp_path, 10, 1, megabytes=3)
+    (tmp_path / "sysvipc").mkdir()
+    rows = ((10, 0, 50), (10, 1, 7), (1, 0, 900))
+    text = "".join(f"{pid} {users} {size * MB} {MB}\n" for pid, users, size in rows)
+    (tmp_path / "sysvipc" / "shm").write_text(f"cpid nattch rss swap\n{text}")
+    assert ServiceUse(tmp_path).take({10: "app"})["app"].memory == 62 * MB

@@ -20,11 +20,12 @@ def above(limits: Mapping[int, int], parents: Mapping[int, int], proc: Path = pr
             ancestor = parents[ancestor]
         if ancestor in groups:
             groups[ancestor].append(pid)
-    found = {}
+    found, memories = {}, process_memory.segments(proc)
     for root, pids in groups.items():
-        held = process_memory.held(pids, proc)
-        if _used(process_memory.resident, proc, pids, held) > limits[root]:
-            size = _used(process_memory.proportional, proc, pids, held)
+        attached, detached = process_memory.of_service(memories, pids, proc)
+        held = process_memory.held(pids, proc) + attached
+        if _used(process_memory.resident, proc, pids, held) + detached > limits[root]:
+            size = _used(process_memory.proportional, proc, pids, held) + detached
             if size > limits[root]:
                 found[root] = size
     return found

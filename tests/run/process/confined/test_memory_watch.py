@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+import pytest
+
 from dodo_dsl.run.process.confined.memory_watch import above
 
 PARENTS = {10: 1, 11: 10, 12: 11, 20: 1, 30: 2}
@@ -45,3 +47,28 @@ def test_what_only_a_descriptor_holds_counts_once() -> None:
     finally:
         os.close(first)
         os.close(second)
+
+
+def shm(proc: Path, *rows: tuple[int, int, int]) -> None:
+    """System V memories by creator, number of attached processes and bytes."""
+    (proc / "sysvipc").mkdir()
+    text = "key shmid perms size cpid lpid nattch uid gid cuid cgid atime dtime ctime rss swap\n"
+    text += "".join(f"0 1 600 999 {pid} 1 {users} 0 0 0 0 0 0 0 {size} 0\n" for pid, users, size in rows)
+    (proc / "sysvipc" / "shm").write_text(text)
+
+
+def test_system_v_memories_count_with_the_service_that_made_them(tmp_path: Path) -> None:
+    """Also those to which no process is attached; not those of DoDo's services or of other namespaces."""
+    sizes = {10: 100, 20: 100}
+    shm(proc(tmp_path, sizes, sizes), (12, 0, 500 * 1024), (10, 1, 200 * 1024), (30, 0, 7000), (0, 0, 7000))
+    found = above({10: 1, 20: 1}, PARENTS, tmp_path)
+    assert found == {10: 800 * 1024, 20: 100 * 1024}
+
+
+def test_those_of_a_creator_that_has_ended_count_in_own_namespaces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shm(proc(tmp_path, {10: 100}, {10: 100}), (77, 0, 500 * 1024))
+    assert above({10: 1}, PARENTS, tmp_path) == {10: 100 * 1024}
+    monkeypatch.setattr(os, "getpid", lambda: 1)
+    assert above({10: 1}, PARENTS, tmp_path) == {10: 600 * 1024}
