@@ -96,9 +96,12 @@ class SteppedApplication:
             self.waited_first += spent
         else:
             self.waited += spent
-            taken = time.monotonic() - self._shown - (own_wait_s() - self._own_wait)
-            ran = self.processes.snapshot().since(self._before) if self.processes else None
-            self.response.add(max(taken, 0.0), ran, self.answers.is_copied)
+            taken, own, ran = time.monotonic() - self._shown, own_wait_s() - self._own_wait, None
+            if self.processes:
+                now = self.processes.snapshot()
+                own = now.by_others(self._before, own)
+                ran = now.since(self._before, own)
+            self.response.add(max(taken - own, 0.0), ran, self.answers.is_copied)
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services."""
@@ -128,7 +131,8 @@ class SteppedApplication:
     def _starved(self) -> float:
         own = own_wait_s() - self._own_before
         if self.processes:
-            return max(self.processes.snapshot().longest_wait(self._before), own)
+            now = self.processes.snapshot()
+            return max(now.longest_wait(self._before), now.by_others(self._before, own))
         return max(min(contention_s() - self._contention_before, MOST_CONTENTION_S), own)
 
     def _repeat_first(self, again: float) -> float:

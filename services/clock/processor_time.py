@@ -56,13 +56,20 @@ class ProcessorTimes(NamedTuple):
     account: Account | None = None
     """None where there was none to be made: then all that is waited is excused."""
 
-    def since(self, before: "ProcessorTimes") -> Spent:
+    def since(self, before: "ProcessorTimes", excused_s: float = 0.0) -> Spent:
         """What was spent since another snapshot. A process waits as long as the one of its threads that ran the most.
+
+        ``excused_s`` of what others took is an excuse for something else already.
 
         Others may have nothing to do and be ready all the same, such as those of OpenCV's pool, which look for work
         for a while before they sleep: on a busy machine they wait much longer than the work takes.
         """
-        return Spent(self._ran_s(before), min(sum(self._waits(before)), self._others_s(before)))
+        most_s = max(self._others_s(before) - excused_s, 0.0)
+        return Spent(self._ran_s(before), min(sum(self._waits(before)), most_s))
+
+    def by_others(self, before: "ProcessorTimes", waited_s: float) -> float:
+        """The part of a wait of the clock's own that falls to others than the application."""
+        return min(waited_s * self._share(before, self._ran_s(before)), self._others_s(before))
 
     def longest_wait(self, before: "ProcessorTimes") -> float:
         """Seconds that others kept the process waiting which they kept the longest since another snapshot."""
@@ -70,14 +77,17 @@ class ProcessorTimes(NamedTuple):
 
     def _waits(self, before: "ProcessorTimes") -> list[float]:
         """The part of each process's wait that falls to others, by what they and the application's others took."""
-        ran_s, others_s = self._ran_s(before), self._others_s(before)
+        ran_s = self._ran_s(before)
         waits = []
         for pid, threads in self.threads.items():
             own = _busiest(threads, before.threads.get(pid, {}))
-            siblings_s = max(ran_s - own.ran_s, 0.0)
-            share = 1.0 if siblings_s == 0 or math.isinf(others_s) else others_s / (others_s + siblings_s)
-            waits.append(own.waited_s * share)
+            waits.append(own.waited_s * self._share(before, max(ran_s - own.ran_s, 0.0)))
         return waits
+
+    def _share(self, before: "ProcessorTimes", application_s: float) -> float:
+        """That of others in what they and ``application_s`` took of the processors."""
+        others_s = self._others_s(before)
+        return 1.0 if application_s == 0 or math.isinf(others_s) else others_s / (others_s + application_s)
 
     def _ran_s(self, before: "ProcessorTimes") -> float:
         ran = sum(max(now - before.ran_s.get(pid, now), 0.0) for pid, now in self.ran_s.items())

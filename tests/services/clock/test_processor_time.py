@@ -116,6 +116,16 @@ def test_processes_of_the_application_that_compete_are_its_own_fault() -> None:
     assert waits({1: 0.01}, 0.2, None, 0.05, 7).waited_s == pytest.approx(0.04 + TICK)
 
 
+def test_the_clocks_own_wait_is_excused_as_far_as_others_took_the_processors() -> None:
+    """Else an application makes the clock wait for its children, and wakes it with messages."""
+    before = taken({1: 0.0}, 0.0, Account(0.0, 0.0, 7))
+    now = taken({1: 0.01}, 0.2, Account(0.3, 0.4 - TICK, 99))
+    assert now.by_others(before, 0.08) == pytest.approx(0.02)
+    assert now.by_others(before, 9.0) == pytest.approx(0.1)
+    assert now.since(before, 0.1).waited_s == pytest.approx(0.0)
+    assert ProcessorTimes({}, {}).by_others(ProcessorTimes({}, {}), 9.0) == 9.0
+
+
 def test_children_that_ended_are_no_others() -> None:
     """By the account of the application's control group; without one, whatever began may have been any of them."""
     assert waits({1: 0.01}, 0.2, 0.4, 0.4, 99) == Spent(0.4, pytest.approx(0.2 * TICK / (TICK + 0.39), abs=TICK))
