@@ -105,7 +105,8 @@ def _as_written(source: str, folder: str) -> str:
     """A path of the compiled test as it is in the application's compose file, relative to its ``folder``."""
     if source.startswith(("/", "$", "~")):
         return source
-    return f"./{posixpath.relpath(source, folder)}"
+    relative = posixpath.relpath(source, folder)
+    return relative if relative == "." else f"./{relative}"
 
 
 def _word(flag: Flag) -> str:

@@ -24,7 +24,7 @@ def engine_port(engine: Path, certificates: Path | None = None) -> Iterator[dict
                 client, _ = listener.accept()
             except OSError:
                 return
-            ends.append(client)
+            ends.append(client.dup())  # TLS takes the socket itself
             threads.append(threading.Thread(target=_pass_on, args=(client, engine, context)))
             threads[-1].start()
 
@@ -39,6 +39,7 @@ def engine_port(engine: Path, certificates: Path | None = None) -> Iterator[dict
             for end in [listener, *ends]:
                 with contextlib.suppress(OSError):
                     end.shutdown(socket.SHUT_RDWR)
+                end.close()
             for thread in [accepting, *threads]:
                 thread.join()
 

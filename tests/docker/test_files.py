@@ -60,11 +60,12 @@ def contents(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): path.read_text(errors="replace") if path.is_file() else "" for path in own}
 
 
-def test_files_stay_where_and_what_they_are(repository: Path) -> None:
+@pytest.mark.parametrize("backend", ["docker", pytest.param("mixed", marks=pytest.mark.proof)])
+def test_files_stay_where_and_what_they_are(repository: Path, backend: str) -> None:
     """No service sees what another one puts in a folder's place; what they write goes with the test."""
     before = contents(repository)
     environment = {"PYTHONPATH": str(ROOT), "DODO_LEASES": str(repository / "leases"), "DATABASE_URL": "x://a:s3cr3t@b"}
-    words = ["run", TEST, "--backend", "docker", "-q"]
+    words = ["run", TEST, "--backend", backend, "-q"]
     subprocess.run(
         [sys.executable, "-m", "dodo_dsl", *words], cwd=repository, env={**os.environ, **environment}, check=False
     )

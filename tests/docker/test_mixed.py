@@ -54,12 +54,15 @@ def test_faults_beside_processes_of_dodo(faults: dict[str, Fault], crate: Crate,
 
 
 def test_default_without_images_of_dodo(tmp_path: Path) -> None:
-    """A drive in lockstep in a deployment whose images are nowhere, and whose application is only an image."""
+    """A drive in lockstep in a deployment whose images are nowhere, and whose application is only an image.
+
+    It writes into a copy of its folder.
+    """
     for name in (TEST, "maps"):
         shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name)
     shutil.copytree(ROOT / "examples" / "kiwi", tmp_path / "kiwi")
     compose = tmp_path / "kiwi" / "docker-compose.yml"
-    lines = compose.read_text().splitlines()
+    lines = compose.read_text().replace("- /tmp:/tmp", "- /tmp:/tmp\n      - .:/own").splitlines()
     compose.write_text("\n".join(line for line in lines if "x-dodo-process" not in line))
     (tmp_path / "dodo.yml").write_text(
         "dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\nimages: {prefix: 127.0.0.1:9/none}\n"

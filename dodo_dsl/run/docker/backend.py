@@ -40,6 +40,8 @@ _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
 _ADDRESS_TURNS, _ADDRESS_TURN_S = 40, 0.05
 """How often, and how long each time, the addresses of services are awaited: they come by their logs."""
+_HOST_TURNS, _HOST_TURN_S = 20, 0.05
+"""How often, and how long each time, a container's process is looked for on this machine."""
 
 
 class DockerBackend:
@@ -299,9 +301,15 @@ class DockerBackend:
         return await asyncio.to_thread(self._processes.listeners, names, self.cid)
 
     async def require_own_host(self) -> None:
-        """Raises BackendError where the test is on the network of a host that is not this machine."""
-        if self.is_on_host and await self.application() is None:
-            raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
+        """Raises BackendError where the test is on the network of a host that is not this machine.
+
+        The engine shows a service that has just ended as a process that is not here, so it is asked again.
+        """
+        for _ in range(_HOST_TURNS):
+            if not self.is_on_host or await self.application() is not None:
+                return
+            await asyncio.sleep(_HOST_TURN_S)
+        raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
 
     async def begin(self) -> None:
         await self.require_own_host()

@@ -34,8 +34,8 @@ class ApplicationCompose(Compose):
             own["volumes"] = {_TMP: {"driver_opts": options}}
             self.services[SANDBOX] = own["services"][SANDBOX]
         if FILES in config["services"]:
-            own.setdefault("services", {})[FILES] = copier(config["services"][FILES])
-            self.services[FILES] = own["services"][FILES]
+            self.services[FILES] = copier(config["services"][FILES])
+            own.setdefault("services", {})[FILES] = compose_paths.escaped_values(self.services[FILES])
         self._replacing = replacing(self.services, names, own)
 
     def _files(self, folder: Path) -> list[str]:

@@ -82,6 +82,22 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
         asyncio.run(begin())
 
 
+def test_a_service_that_ends_as_the_test_begins_is_not_elsewhere(proc: Proc, tmp_path: Path) -> None:
+    class Ending(Container):
+        def reload(self) -> None:
+            self.attrs = {"State": {"Pid": pids.pop()}}
+
+    async def begin() -> None:
+        plan = replace(Bench(tmp_path).plan(), isolation="host")
+        backend = DockerBackend(plan, tmp_path, tmp_path, None, Pulls(None), "p", (), print, b"")
+        backend._processes = ContainerProcesses({"app": Ending("c0ffee", 11)}, proc.root)
+        await backend.require_own_host()
+
+    pids = [0, 11]
+    asyncio.run(begin())
+    assert not pids
+
+
 def test_one_thread_at_a_time_measures(proc: Proc) -> None:
     """Another may have been given up, and still be at it."""
     both, met = threading.Barrier(2), []
