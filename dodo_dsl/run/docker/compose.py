@@ -25,6 +25,7 @@ from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
 from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
 from dodo_dsl.run.docker import own_images
+from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
 from dodo_dsl.run.docker.builds import is_built, private_images
 from dodo_dsl.run.docker.masks import absent, masks
 from dodo_dsl.run.docker.pulls import PullError, Pulls, Say
@@ -48,6 +49,7 @@ class Compose:
         self.project = project
         self.services: dict[str, Any] = {}
         self._volumes: dict[str, Any] = {}
+        self._secrets: dict[str, Any] = {}
         self._images: dict[str, str] = {}
         self._say = say
         self._paths = replace(application_paths(plan.application, folder), tmp=plan.isolation == "host")
@@ -69,6 +71,7 @@ class Compose:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         config = compose_paths.unescaped(json.loads(out))
         self._refuse(compiled_findings(config, self._test))
+        self._secrets = config.get("secrets") or {}
         self._take(config)
 
     def _take(self, config: dict[str, Any]) -> None:
@@ -129,11 +132,29 @@ class Compose:
         """Builds images; compose labels them with the project, so named images are built in one common project."""
         self._say(f"building {', '.join(names)}")
         log = self.report / "logs" / "build.log"
-        code, _, problem = await self._run("build", *names, log=log, project=project)
+        self.report.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".build-", dir=self.report) as folder:
+            try:
+                file = await asyncio.to_thread(self._builds, Path(folder))
+            except (HiddenContext, OSError, shutil.Error) as error:
+                raise BackendError(f"the application's images cannot be built: {error}") from error
+            code, _, problem = await self._run("build", *names, log=log, project=project, files=str(file))
         if code:
             where = f"{log.parent.name}/{log.name} of the test in the report"
             raise BackendError(f"the application's images cannot be built: {problem}; see {where}")
         return ""
+
+    def _builds(self, folder: Path) -> Path:
+        """Writes a compose file with the application's builds alone, which get nothing that it never sees."""
+        hidden = hidden_folders(self.plan.application, self.folder, self.report)
+        services = own_contexts({n: s for n, s in self.services.items() if is_built(s)}, hidden, folder)
+        for name, service in services.items():
+            if image := self._images.get(image_variable(name)):
+                service["image"] = image
+        file = folder / "builds.compose.json"
+        content = compose_paths.escaped_values({"services": services, "secrets": self._secrets})
+        file.write_text(json.dumps(content), encoding="utf-8")
+        return file
 
     async def create(self, subnets: Iterable[str], key: bytes) -> None:
         """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError.
