@@ -6,6 +6,8 @@ An installed wheel has them in ``dodo_dsl/_data``, a checkout beside the package
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
+INSTALLED = "lib*/python3*/*-packages/dodo_dsl/_data"
+"""What ``root`` is of an installed wheel, below the folder of a Python. An editable install has a copy there, too."""
 
 
 def root() -> Path:

@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from dodo_dsl import advice
 from dodo_dsl.cli.exits import Exit
 
 
@@ -15,6 +14,8 @@ class UsageError(Exception):
 
 def require_extra(what: str, extra: str) -> None:
     """Raises UsageError with what to type where a module of an extra of DoDo's cannot be loaded."""
+    from dodo_dsl import advice
+
     if module := advice.missing(extra):
         raise UsageError(f"{what} needs {module}: {advice.install(extra)}")
 

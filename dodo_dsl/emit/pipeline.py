@@ -29,8 +29,8 @@ MAX_JOBS_FREE = 500
 MAX_JOBS_PARSED = 850
 _MOST_NAMED = 3
 _ARTIFACT_HINT = (
-    "let the jobs take them from the repository or Git LFS with --files repository, shorten recordings with "
-    "'dodo rec cut', or have an administrator allow more, and say so with --artifact-limit"
+    "let the jobs take them from the repository or Git LFS with --files repository, or shorten recordings with "
+    "'dodo rec cut'; where GitLab's administrator allows more, give its limit with --artifact-limit"
 )
 
 _SEARCH_OPTIONS = '--study "$CI_PIPELINE_ID" --report dodo-search $DODO_SEARCH_OPTIONS'

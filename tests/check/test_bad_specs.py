@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.cli.compile import pipeline_file
 from tests.emit.readers import run
 
 FOLDER = Path(__file__).parent / "bad"
@@ -20,7 +21,8 @@ def slow_where_large(names: Iterable[str]) -> list[Any]:
 
 
 def said(case: str, patch: pytest.MonkeyPatch) -> tuple[int, str]:
-    """The exit code and the output, in the folder of the case."""
+    """The exit code and the output, in the folder of the case, which is its repository's."""
+    patch.setattr(pipeline_file, "_top", lambda root: root)
     patch.chdir(FOLDER / case if case in DEPLOYMENTS else FOLDER)
     code, out, err = run("compile", "--check", *([f"{case}.dodo.yml"] if case in SPECS else []))
     return code, out + err

@@ -121,6 +121,7 @@ READ_ONLY = {
     "modprobe": "/proc/sys/kernel/modprobe", "overcommit": "/proc/sys/vm/overcommit_memory",
     "forwarding": "/proc/sys/net/ipv4/ip_forward", "processor": "/sys/devices/system/cpu/cpu1/online", "home": "/home",
     "interpreter": sys.executable, "its-library": os.__file__, "optional": "/opt",
+    "run": "/run", "temporary": "/var/tmp", "devices": "/dev",
 }  # fmt: skip
 
 
@@ -134,6 +135,41 @@ def _write(path: str) -> object:
 
 
 _define_places()
+
+
+@attack
+def finds_files_of_tests() -> object:
+    """By what they are called, wherever they are: specs, maps, recordings, results and compiled tests."""
+    found = []
+    for folder, folders, files in os.walk("/"):
+        folders[:] = [] if folder in ("/proc", "/sys") else [name for name in folders if name != "__pycache__"]
+        found += [os.path.join(folder, name) for name in files if _is_of_tests(name)]
+    return [path for path in found if _is_readable(path)]
+
+
+def _is_of_tests(name: str) -> bool:
+    return name.endswith((".dodo.yml", ".rec")) or name in ("map.json", "results.json", "test.json")
+
+
+def _is_readable(path: str) -> bool:
+    """As DoDo's: other programs have files of these names, too."""
+    try:
+        begin = Path(path).read_bytes()[:100] if Path(path).is_file() else b""
+    except OSError:
+        return False
+    return any(mark in begin for mark in (b"dodo", b'"model"', b"\x0d\xa4"))
+
+
+@attack
+def lease_on_a_file_of_the_machine() -> object:
+    """Who opens it then has to wait."""
+    with open(Path(sys.prefix, "pyvenv.cfg")) as file:
+        return fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_RDLCK) == 0
+
+
+@attack
+def memory_at_known_addresses() -> object:
+    return [hex(kind) for kind in (0x40000, 0x400008, 0x7FFFFFFF, 0xFFFDFFFF) if _libc.personality(kind) != -1]
 
 
 @attack

@@ -30,6 +30,10 @@ def main(argv: list[str]) -> int:
     (own / ".git").mkdir()
     (own / ".git" / "packed").write_text("truths of all versions")
     (own / "data.txt").write_text("as it was")
+    (own / "mixed").mkdir()
+    for name, text in {"drive.rec": "dodo", "a.dodo.yml": "dodo: 1", "results.json": '{"dodo": "results"}'}.items():
+        (own / "mixed" / name).write_text(text)
+        (own / name).write_text(text)
     program = Path(shutil.copy(attacks.__file__, own / "attacks.py"))
     (app,) = plan.application.services
     places |= {"tests-in-its-folder": str(own / "tests" / "truth.json"), "results": str(folder / "report")}

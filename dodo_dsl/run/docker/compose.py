@@ -29,6 +29,7 @@ from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
 from dodo_dsl.run.docker.builds import is_built, private_images
 from dodo_dsl.run.docker.masks import absent, masks
 from dodo_dsl.run.docker.pulls import PullError, Pulls, Say
+from dodo_dsl.run.files_of_tests import files_of_tests
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.ports import known_ports
 
@@ -189,6 +190,9 @@ class Compose:
     def _masks(self) -> dict[str, Any]:
         """What hides the tests from the application's services, and stands for what is not there."""
         hidden = hidden_folders(self.plan.application, self.folder, self.report)
+        for root in self._paths.roots:
+            ours = files_of_tests(root, self._paths.folder, hidden)
+            hidden += [path for path in ours if path.is_dir()]  # the engine masks no single file
         every = (*(service.name for service in self.plan.application.services), FILES)
         names = [name for name in every if name in self.services]
         found = {

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -11,7 +12,8 @@ from typing import Any
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run.application_files import hidden_folders
+from dodo_dsl.run.application_files import application_paths, hidden_folders
+from dodo_dsl.run.files_of_tests import files_of_tests
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
@@ -184,9 +186,17 @@ class ProcessBackend:
         if command.layer != "application" or not self._is_confined:
             return None
         application = self.plan.application
-        hidden = hidden_folders(application, self._folder, self.report)
+        hidden = [] if self.is_on_host else self._hidden
         confined = confinement(command.folder, self.isolation, self.cid, application.limits, hidden)
         return replace(confined, masked=command.masked).to_json()
+
+    @functools.cached_property
+    def _hidden(self) -> list[Path]:
+        """Files of tests, and what lies around the application's folder: its repository, the folders of this test."""
+        paths = application_paths(self.plan.application, self._folder)
+        known = hidden_folders(self.plan.application, self._folder, self.report)
+        found = files_of_tests(paths.folder, paths.folder, known)
+        return [*known, *found, *paths.roots, self._folder.resolve(), self.report.resolve()]
 
     async def next_event(self) -> Event:
         return await self._events.get()

@@ -124,8 +124,9 @@ def test_variables_file_of_an_unknown_user_is_an_error_of_its_test_alone(host: B
     app = replace(app, env_files=("~no-such-user-at-all/own.env",))
     broken = replace(broken, application=replace(broken.application, services=(app,)))
     first, second = host.run(broken, host.plan(slug="beside"))
-    told = "service 'app' could not be started: there is no home folder for '~no-such-user-at-all/own.env'"
-    assert (first.outcome, first.reason, second.outcome) == ("error", told, "passed")
+    told = "env_file of 'app': '~no-such-user-at-all/own.env' is outside the repository"
+    assert (first.outcome, second.outcome) == ("error", "passed")
+    assert first.reason == f"service 'app' could not be started: {told}"
 
 
 JOINS = """

@@ -5,13 +5,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dodo_dsl.run.process.confined.confinement import Confinement
+from dodo_dsl.run.process.confined.confinement import SYSTEM, Confinement
 
 PROGRAM = "bwrap"
 HOME = "/home/application"
-_SYSTEM = ("/usr", "/etc", "/opt", "/sys/devices/system")
 _MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 """On Debian since 12 these are links into /usr."""
+_EMPTY = ("/run", "/var/tmp")
+"""Folders that programs may look into, and that nobody may write to."""
 _KEPT = ("CAP_SETUID", "CAP_SETGID", "CAP_SETPCAP")
 """What ``setpriv`` needs to give up root and then itself gives up."""
 
@@ -62,7 +63,7 @@ def _as_user(user: int) -> list[str]:
 
 def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
     """The file system: the system's programs, what may be read, and the application's folder; all else is absent."""
-    seen = [word for path in _SYSTEM for word in ("--ro-bind-try", path, path)]
+    seen = [word for path in SYSTEM for word in ("--ro-bind-try", path, path)]
     for path in _MERGED:
         if Path(path).is_symlink():
             seen += ["--symlink", str(Path(path).readlink()), path]
@@ -70,16 +71,28 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
             seen += ["--ro-bind-try", path, path]
     seen += ["--proc", "/proc", "--dev", "/dev"]
     seen += [word for path, source in mounts.shared.items() for word in ("--bind", str(source), path)]
-    seen += ["--tmpfs", "/run", "--tmpfs", "/var/tmp"]
+    seen += [word for path in _EMPTY for word in ("--perms", "0755", "--dir", path)]
     read = (*_shown(confined, program), *confined.reads)
+    hidden = _outermost(filter(os.path.exists, confined.hidden), (*read, confined.folder))
+    around = [path for path in hidden if Path(confined.folder).is_relative_to(path)]
+    covered = [path for path in around if not any(Path(path).is_relative_to(one) for one in read)]
+    seen += [word for path in covered for word in ("--perms", "0755", "--tmpfs", path)]
     seen += [*_folders(_parents((HOME, confined.folder, *read))), *_read_only(read, mounts)]
     seen += ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
     seen += ["--bind", str(mounts.home), HOME]
-    for path in _outermost(filter(os.path.isdir, confined.hidden)):
-        inside = [one for one in read if Path(one).is_relative_to(path)]
-        parents = [one for one in _parents(inside) if Path(one).is_relative_to(path) and one != path]
-        seen += ["--tmpfs", path, *_folders(parents), *_read_only(inside, mounts), "--remount-ro", path]
-    return [*seen, "--remount-ro", "/"]
+    for path in hidden:
+        if path not in around:
+            seen += _mask(path, read, mounts)
+    return [*seen, *(word for path in (*covered, "/dev", "/") for word in ("--remount-ro", path))]
+
+
+def _mask(path: str, read: Sequence[str], mounts: Mounts) -> list[str]:
+    """Nothing in the place of a file or folder, but what may be read in it."""
+    if not Path(path).is_dir():
+        return ["--ro-bind", os.devnull, path]
+    inside = [one for one in read if Path(one).is_relative_to(path)]
+    parents = [one for one in _parents(inside) if Path(one).is_relative_to(path) and one != path]
+    return ["--tmpfs", path, *_folders(parents), *_read_only(inside, mounts), "--remount-ro", path]
 
 
 def _folders(paths: Iterable[str]) -> list[str]:
@@ -90,11 +103,13 @@ def _read_only(paths: Iterable[str], mounts: Mounts) -> list[str]:
     return [word for path in paths for word in ("--ro-bind-try", str(mounts.reads.get(path, path)), path)]
 
 
-def _outermost(paths: Iterable[str]) -> list[str]:
-    """Paths without those that lie in another one: nothing can be mounted in what is hidden already."""
+def _outermost(paths: Iterable[str], shown: Iterable[str]) -> list[str]:
+    """Paths without those that lie in another one and in nothing ``shown`` there: they are hidden already."""
     found: list[str] = []
-    for path in sorted(set(paths)):  # what holds others comes before them
-        if not any(Path(path).is_relative_to(other) for other in found):
+    for path in sorted(set(paths), key=lambda one: Path(one).parts):  # what holds others comes before them
+        holds = [one for one in shown if one != path and Path(path).is_relative_to(one)]
+        outer = [other for other in found if Path(path).is_relative_to(other)]
+        if all(any(Path(one).is_relative_to(other) for one in holds) for other in outer):
             found.append(path)
     return found
 
@@ -106,6 +121,6 @@ def _parents(paths: Iterable[str]) -> list[str]:
 
 def _shown(confined: Confinement, program: str) -> Sequence[str]:
     """The program's own file, where it lies in nothing that is shown."""
-    shown = [Path(path) for path in (*_SYSTEM, *_MERGED, *confined.reads, confined.folder)]
+    shown = [Path(path) for path in (*SYSTEM, *_MERGED, *confined.reads, confined.folder)]
     paths = dict.fromkeys((program, os.path.realpath(program)))
     return [path for path in paths if not any(Path(path).is_relative_to(folder) for folder in shown)]

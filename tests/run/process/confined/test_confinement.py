@@ -2,8 +2,13 @@
 
 import itertools
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
+from dodo_dsl import package_data
+from dodo_dsl.run.process.confined import confinement as module
 from dodo_dsl.run.process.confined.bubblewrap import Mounts, words
 from dodo_dsl.run.process.confined.confinement import Confinement, confinement
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -20,7 +25,63 @@ def test_paths_are_relative_to_its_folder_and_the_interpreter_is_there(tmp_path:
 def test_what_is_hidden_lies_in_its_folder(tmp_path: Path) -> None:
     hidden = (tmp_path / "tests", tmp_path / ".git", tmp_path, tmp_path.parent / "elsewhere")
     found = confinement(tmp_path, "network", 130, SandboxLimits(), hidden)
-    assert found.hidden == (str(tmp_path / "tests"), str(tmp_path / ".git"))
+    assert found.hidden[:2] == (str(tmp_path / "tests"), str(tmp_path / ".git"))
+    assert not {str(tmp_path), str(tmp_path.parent / "elsewhere")} & set(found.hidden)
+
+
+@pytest.fixture
+def python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder of a Python that runs DoDo; what others have is not looked for."""
+    prefix = tmp_path / "venv"
+    monkeypatch.setattr(module, "INTERPRETER", (str(prefix),))
+    monkeypatch.setattr(sys, "path", [])
+    module.own_data.cache_clear()
+    yield prefix
+    module.own_data.cache_clear()
+
+
+@pytest.mark.parametrize("layout", ["wheel", "editable", "checkout", "image"])
+def test_tests_of_dodos_own_installation_are_hidden(
+    tmp_path: Path, python: Path, monkeypatch: pytest.MonkeyPatch, layout: str
+) -> None:
+    data = python / "lib" / "python3.11" / "site-packages" / "dodo_dsl" / "_data"
+    checkout = tmp_path / "dodo"
+    for folder in (checkout / "dodo_dsl", checkout / "tests_registry", data / "tests_registry"):
+        folder.mkdir(parents=True)
+    shown, hidden = {
+        "wheel": (python, data),
+        "editable": (python, data),
+        "checkout": (checkout, checkout / "tests_registry"),
+        "image": (tmp_path, checkout),
+    }[layout]
+    monkeypatch.setattr(package_data, "root", lambda: data if layout == "wheel" else checkout)
+    found = confinement(tmp_path / "app", "network", 130, SandboxLimits(reads=(str(shown),)), ())
+    assert str(hidden) in found.hidden
+
+
+def test_what_is_hidden_is_hidden_by_each_name_of_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "models" / "tests").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("models")
+    shown = (str(tmp_path / "link"), str(tmp_path / "models"))
+    found = module._inside([tmp_path / "models" / "tests"], shown)
+    assert list(found) == [f"{path}/tests" for path in shown]
+
+
+def test_a_repository_where_every_application_sees_the_machine_is_hidden_around_its_folder() -> None:
+    """But not what may be read there, in which there may be tests again."""
+    folder, python = "/usr/share/doc", "/usr/share/common-licenses"
+    inner, tests = f"{python}/{next(Path(python).iterdir()).name}", f"{folder}/bash"
+    argv = words(
+        Confinement(folder, "network", 1, (python,), ("/usr/share", inner, tests, "/usr/share/perl5")),
+        MOUNTS,
+        "/usr/bin/x",
+        None,
+        5,
+    )
+    order = [argv.index(word) for word in ("/usr/share", python, folder, inner, tests)]
+    assert argv[order[0] - 1] == "--tmpfs"
+    assert max(order[1:3]) < argv.index(inner)
+    assert "/usr/share/perl5" not in argv
 
 
 def test_it_goes_to_the_sandbox_and_back() -> None:
@@ -56,7 +117,7 @@ def test_nothing_is_mounted_in_what_is_hidden_but_what_may_be_read(tmp_path: Pat
         folder.mkdir(parents=True)
     hidden = (str(report), str(tests), str(tests))
     argv = words(Confinement(str(tmp_path), "network", 1, (str(python),), hidden), MOUNTS, "/usr/bin/x", None, 5)
-    assert [path for word, path in itertools.pairwise(argv) if word == "--tmpfs"] == ["/run", "/var/tmp", str(tests)]
+    assert [path for word, path in itertools.pairwise(argv) if word == "--tmpfs"] == [str(tests)]
     inside = argv[argv.index("--bind", argv.index(str(MOUNTS.folder))) :]
     inside = inside[inside.index(str(tests)) + 1 :]
     assert inside[: inside.index("--remount-ro")] == [
