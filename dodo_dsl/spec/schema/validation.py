@@ -203,6 +203,9 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     wanted = error.validator_value
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
+    written = place.node.text if isinstance(place.node, Scalar) else ""
+    if error.instance == math.inf and written.isdigit():
+        found = f"has {len(written)} digits"
     names = names if error.schema.get("x-expect") != _TYPE_NAMES["boolean"] else [_TYPE_NAMES["boolean"]]
     message = f"{place.name} {found}, expected {' or '.join(names)}"
     hint, fix = error.schema.get(_HINT) or _of_file(place) or _in_quotes(error, place), None
