@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -74,6 +74,7 @@ class Compose:
             raise BackendError(f"docker compose rejects the compiled test: {why}")
         config = compose_paths.unescaped(json.loads(out))
         self._refuse(compiled_findings(config, self._test))
+        self._refuse(_unseen(config, hidden_folders(self.plan.application, self.folder, self.report)))
         self._secrets = config.get("secrets") or {}
         self._take(config)
 
@@ -240,3 +241,14 @@ class Compose:
             atomic.write_bytes(log, out + err)
         errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
         return process.returncode or 0, out.decode("utf-8", "replace"), errors[-1].strip() if errors else ""
+
+
+def _unseen(config: dict[str, Any], hidden: Iterable[Path]) -> Iterator[AccessFinding]:
+    """Configs and secrets that are files of tests, their output or ``.git``; mounts of these are masked."""
+    places = list(hidden)
+    for key in ("configs", "secrets"):
+        for name, about in (config.get(key) or {}).items():
+            file = about.get("file") if isinstance(about, dict) else None
+            if file and any(Path(os.path.realpath(file)).is_relative_to(place) for place in places):
+                what = f"'{file}' lies where tests, their output or .git are kept"
+                yield AccessFinding((key, name, "file"), what)
