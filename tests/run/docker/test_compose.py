@@ -105,5 +105,5 @@ def test_files_of_the_report_are_no_configs(key: str, tmp_path: Path, monkeypatc
         if not refused:
             asyncio.run(test.read())
             continue
-        with pytest.raises(BackendError, match="my-report/results.json' lies where tests, their output or .git are"):
+        with pytest.raises(BackendError, match=r"my-report/results\.json' lies where tests, their output or \.git are"):
             asyncio.run(test.read())
