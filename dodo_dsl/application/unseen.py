@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dodo_dsl.application.access.access_diagnostics import place
 from dodo_dsl.application.access.build_findings import is_remote
-from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.nested_mounts import shown_paths
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Mapping, Scalar
@@ -29,7 +29,6 @@ def folders(application: ApplicationSource, deployment: Deployment) -> list[Path
 
 def unseen_problems(application: ApplicationSource, deployment: Deployment) -> Iterator[Diagnostic]:
     """Mounts, configs, secrets, files of variables and builds' contexts that lie in such a folder."""
-    yield from _with_tests(application, deployment)
     hidden = folders(application, deployment)
     for source, span in _asked_for(application):
         if application.paths.is_open(source) or application.paths.is_writable(source):
@@ -39,21 +38,6 @@ def unseen_problems(application: ApplicationSource, deployment: Deployment) -> I
             what = f"'{holder.name}', {_reason(holder)}"
             message = f"'{source}' lies in {what}, which no application sees"
             yield Diagnostic(span, "application-isolation", message, "keep what it needs in another folder")
-
-
-def _with_tests(application: ApplicationSource, deployment: Deployment) -> Iterator[Diagnostic]:
-    """A warning of a build that gets maps and truths, as the tests are kept in the application's own folder."""
-    own = application.folder.resolve()
-    if not any(own.is_relative_to(folder.resolve()) for folder in deployment.registry):
-        return
-    for service in application.services.values():
-        for source, span in _context(service, application):
-            place = Path(application.paths.names(source)[-1])
-            if not application.paths.is_open(source) and any(s.is_relative_to(place) for s in deployment.registry):
-                message = f"the build of '{service.name}' gets maps and truths of the tests, which lie in its folder"
-                hint = "keep the tests in a folder of their own, and name that under 'registry' in dodo.yml"
-                yield Diagnostic(span, "application-isolation", message, hint, "warning")
-                return
 
 
 def _reason(holder: Path) -> str:
@@ -66,13 +50,8 @@ def _asked_for(application: ApplicationSource) -> Iterator[tuple[str, Span]]:
         yield shown.source, place(shown.node, shown.steps, shown.span)
     for service in application.services.values():
         yield from ((file.path, file.span) for file in service.env_files)
-        yield from _context(service, application)
-
-
-def _context(service: ComposeService, application: ApplicationSource) -> Iterator[tuple[str, Span]]:
-    """The folder that its image is built from, if it is one of this machine."""
-    build = service.node.get("build")
-    context = build.get("context") if isinstance(build, Mapping) else build
-    text = context.value if isinstance(context, Scalar) else None
-    if context and isinstance(text, str) and not is_remote(text, application.paths):
-        yield text, context.span
+        build = service.node.get("build")
+        context = build.get("context") if isinstance(build, Mapping) else build
+        text = context.value if isinstance(context, Scalar) else None
+        if context and isinstance(text, str) and not is_remote(text, application.paths):
+            yield text, context.span

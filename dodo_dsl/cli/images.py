@@ -20,6 +20,7 @@ from dodo_dsl.images import build_context, docker_command, sbom, wheels
 from dodo_dsl.images.names import DODO, PLATFORM, Image, choose, known, of_platforms, tagged
 from dodo_dsl.plan.rewrite.checked_builds import checked_builds
 from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
+from dodo_dsl.run.files_of_tests import files_of_tests
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -155,7 +156,10 @@ def _own_contexts(
         folder.mkdir(parents=True, exist_ok=True)
         own = Path(tempfile.mkdtemp(dir=folder))
         written = compose_paths.unescaped(builds)
-        written["services"] = own_contexts(written["services"], unseen.folders(source, deployment), own.resolve())
+        hidden = unseen.folders(source, deployment)
+        for root in source.paths.roots:
+            hidden += files_of_tests(root.resolve(), source.folder.resolve(), hidden)
+        written["services"] = own_contexts(written["services"], hidden, own.resolve())
     except (HiddenContext, OSError, shutil.Error) as error:
         raise UsageError(f"--contexts: {error}") from error
     escaped: dict[str, Any] = compose_paths.escaped_values(written)

@@ -58,12 +58,3 @@ def test_nor_by_a_symlink(root: Path) -> None:
 
 def test_what_holds_all_of_it_is_mounted_without(root: Path) -> None:
     assert _found(root, 'volumes: [".:/x"]\n    build: .') == []
-
-
-@pytest.mark.parametrize(("registry", "warned"), [(".", True), ("tests", False)])
-def test_a_build_beside_tests_is_warned_of(registry: str, warned: bool, root: Path) -> None:
-    (root / "dodo.yml").write_text(f"dodo: 1\nregistry: [{registry}]\napplication: docker-compose.yml\n")
-    (root / "docker-compose.yml").write_text(_SERVICE + "build: .")
-    found = [d.message for d in compiler.load((), start=root).diagnostics if d.severity == "warning"]
-    message = "the build of 'a' gets maps and truths of the tests, which lie in its folder"
-    assert (message in found) == warned

@@ -158,6 +158,8 @@ class Compose:
     def _builds(self, folder: Path) -> Path:
         """Writes a compose file with the application's builds alone, which get nothing that it never sees."""
         hidden = hidden_folders(self.plan.application, self.folder, self.report)
+        for root in self._paths.roots:
+            hidden += files_of_tests(root, self._paths.folder, hidden)
         services = own_contexts({n: s for n, s in self.services.items() if is_built(s)}, hidden, folder)
         for name, service in services.items():
             if image := self._images.get(image_variable(name)):

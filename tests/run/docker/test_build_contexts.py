@@ -107,6 +107,9 @@ def test_a_run_builds_from_the_copy_alone(repository: Path, tmp_path: Path, monk
         made, application=replace(made.application, folder="../..", services=(ApplicationService("a", None),))
     )
     monkeypatch.setattr(Pulls, "provide", _nothing)
+    (repository / "mine").mkdir()
+    (repository / "mine" / "map.json").write_text('{"model": []}')
+    (repository / "b.dodo.yml").write_text("a\0b")
     test = Compose(made, repository / "generated" / "sil-first", report, "project", print)
     test.folder.mkdir(parents=True)
     test.services = {"a": {"image": "team/a$b", "build": {"context": str(repository)}}}
@@ -115,6 +118,6 @@ def test_a_run_builds_from_the_copy_alone(repository: Path, tmp_path: Path, monk
     assert Path(seen["services"]["a"]["build"]["context"]).parents[1].parent == report
     files = (tmp_path / "files").read_text()
     assert "/app.py" in files
-    assert not [name for name in ("config", "results.json", "generated") if name in files]
+    assert not [name for name in ("config", "results.json", "generated", "mine", "dodo.yml") if name in files]
     assert seen["services"]["a"]["image"].startswith("dodo-build:")
     assert [path.name for path in report.iterdir()] == ["logs"]
