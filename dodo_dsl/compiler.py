@@ -10,6 +10,7 @@ from dodo_dsl import package_data
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
+from dodo_dsl.application.unseen import unseen_problems
 from dodo_dsl.check import manifest_messages
 from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.problems import Problems
@@ -115,7 +116,7 @@ def load(
     source = None
     if files := application or deployment.application:
         source, of_application = read_application(files, access(deployment), deployment.sandbox, reader)
-        found = [*found, *of_application]
+        found = [*found, *of_application, *(unseen_problems(source, deployment) if source else ())]
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     before = Findings(former.around, former.tests, former.by_rules) if former else None

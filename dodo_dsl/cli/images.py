@@ -3,11 +3,14 @@
 import argparse
 import json
 import shlex
+import shutil
 import tempfile
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from dodo_dsl import atomic, compiler
+from dodo_dsl.application import compose_paths, unseen
+from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.cli import image_pull, own_services, selection
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
@@ -16,6 +19,8 @@ from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
 from dodo_dsl.images.names import DODO, PLATFORM, Image, choose, known, of_platforms, tagged
 from dodo_dsl.plan.rewrite.checked_builds import checked_builds
+from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
+from dodo_dsl.run.files_of_tests import files_of_tests
 from dodo_dsl.spec.deployment.deployment import Deployment
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -29,7 +34,7 @@ EXAMPLES = """examples:
   dodo images push --prefix registry.example.org/dodo
   dodo images push --platform linux/amd64,linux/arm64 --prefix registry.example.org/dodo
   dodo images pull --for kiwi-dynamic                 on the rig's computer, before its first test
-  dodo images builds > builds.yml                    the application's own, checked, for docker buildx bake
+  dodo images builds --contexts /tmp/c > builds.yml  the application's own, checked, for docker buildx bake
   dodo images sbom --output build/sbom                a bill of materials of each image, and of this Python
 """
 _INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"
@@ -51,7 +56,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "pull the images that the tests of a rig need, if there is room for them"
     image_pull.add(actions.add_parser("pull", help=text, description=text))
     text = "check the application's builds, and write them as a compose file for 'docker buildx bake'"
-    selection.add_application(actions.add_parser("builds", help=text, description=text))
+    builds = actions.add_parser("builds", help=text, description=text)
+    selection.add_application(builds)
+    builds.add_argument(
+        "--contexts", type=Path, metavar="DIR",
+        help="build from copies in this folder, without tests, reports, compiled tests and .git: keep it until the "
+        "images are built (default: the folders themselves)"
+    )  # fmt: skip
     sbom = _action(actions, "sbom", "write what built images, and the Python that runs DoDo, are made of (CycloneDX)")
     sbom.add_argument("--no-images", action="store_true", help="only the Python that runs DoDo; needs no Docker engine")
     sbom.add_argument("-o", "--output", metavar="DIR", default="build/sbom", help="folder (default: build/sbom)")
@@ -131,8 +142,28 @@ def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) ->
     stderr.write(format_text(problems))
     if has_errors(problems):
         return Exit.PROBLEMS
-    stdout.write(json.dumps(builds, indent=2) + "\n")
+    stdout.write(json.dumps(_own_contexts(builds, source, deployment, options.contexts), indent=2) + "\n")
     return Exit.OK
+
+
+def _own_contexts(
+    builds: dict[str, Any], source: ApplicationSource, deployment: Deployment, folder: Path | None
+) -> dict[str, Any]:
+    """The same builds with contexts of their own in a folder; raises UsageError where it cannot be made."""
+    if folder is None:
+        return builds
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        own = Path(tempfile.mkdtemp(dir=folder))
+        written = compose_paths.unescaped(builds)
+        hidden = unseen.folders(source, deployment)
+        for root in source.paths.roots:
+            hidden += files_of_tests(root.resolve(), source.folder.resolve(), hidden)
+        written["services"] = own_contexts(written["services"], hidden, own.resolve())
+    except (HiddenContext, OSError, shutil.Error) as error:
+        raise UsageError(f"--contexts: {error}") from error
+    escaped: dict[str, Any] = compose_paths.escaped_values(written)
+    return escaped
 
 
 def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:

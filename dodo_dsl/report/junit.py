@@ -11,6 +11,8 @@ from dodo_dsl.report.run_record import RunRecord
 
 # what XML 1.0 cannot hold (section 2.2), whatever a service printed
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_ATTACHMENT = "[[ATTACHMENT|"
+"""What GitLab takes a file by, wherever it stands in a test's output: text of others has another."""
 
 
 def write(
@@ -48,16 +50,17 @@ def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
     case._elem.set("file", xml_text(outcome.spec))
     if outcome.outcome != "passed":
         kind = Failure if outcome.outcome == "failed" else Error
-        result = kind(xml_text(outcome.reason), outcome.outcome)
+        result = kind(_plain(outcome.reason), outcome.outcome)
         replay = [f"replay: {link}"] if link else []
-        result.text = xml_text("\n".join([outcome.reason, *replay, *outcome.last_lines]))
+        result.text = _plain("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
     # GitLab shows the text of a failure in place of this, and takes the attachment from here
-    lines = [check_words.line(check, outcome.checks) for check in outcome.checks] + [
+    said = [check_words.line(check, outcome.checks) for check in outcome.checks] + [
         f"note: {note}" for note in outcome.notes
     ]
+    lines = [_plain(line) for line in said]
     if attachment:
-        lines.append(f"[[ATTACHMENT|{attachment}]]")
+        lines.append(f"{_ATTACHMENT}{attachment}]]")
     if lines:
         case.system_out = xml_text("\n".join(lines))
     return case
@@ -70,6 +73,11 @@ def _skipped(test: NotRun) -> Any:
     case._elem.set("file", xml_text(test.spec))
     case.result = [Skipped(xml_text(f"not run: {test.reason}"))]
     return case
+
+
+def _plain(text: str) -> str:
+    """Text of others without what GitLab would take for an attachment."""
+    return xml_text(text).replace(_ATTACHMENT, "[ [ATTACHMENT|")
 
 
 def xml_text(text: str) -> str:

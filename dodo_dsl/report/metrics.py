@@ -1,9 +1,11 @@
 """``metrics.txt`` in OpenMetrics, which GitLab compares between branches."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from dodo_dsl.margins import worst_margin
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.terminal import printable
 
 
 def to_text(outcomes: Sequence[Outcome]) -> str:
@@ -26,20 +28,26 @@ def to_text(outcomes: Sequence[Outcome]) -> str:
     processor = Gauge("dodo_processor_seconds", "Processor time", ["test", "service"], registry=registry)
     memory = Gauge("dodo_peak_memory_bytes", "Most memory at any time", ["test", "service"], registry=registry)
     for outcome in outcomes:
-        passed.labels(outcome.slug).set(outcome.outcome == "passed")
+        slug = printable(outcome.slug)
+        passed.labels(slug).set(outcome.outcome == "passed")
         if outcome.setup_s is not None:
-            setup.labels(outcome.slug).set(round(outcome.setup_s, 3))
+            setup.labels(slug).set(round(outcome.setup_s, 3))
         if outcome.execution_s is not None:
-            execution.labels(outcome.slug).set(round(outcome.execution_s, 3))
+            execution.labels(slug).set(round(outcome.execution_s, 3))
         if (share := worst_margin(outcome)) is not None:
-            worst.labels(outcome.slug).set(share)
+            worst.labels(slug).set(share)
         for use in outcome.resources:
-            processor.labels(outcome.slug, use.service).set(round(use.processor_s, 3))
-            memory.labels(outcome.slug, use.service).set(use.peak_memory_bytes)
+            processor.labels(slug, printable(use.service)).set(round(use.processor_s, 3))
+            memory.labels(slug, printable(use.service)).set(use.peak_memory_bytes)
         for check in outcome.checks:
             if check["value"] is not None:
-                value.labels(outcome.slug, check["name"], check.get("unit") or "").set(check["value"])
+                value.labels(slug, *_labels(check)).set(check["value"])
             if check.get("margin") is not None:
-                margin.labels(outcome.slug, check["name"], check.get("unit") or "").set(check["margin"])
+                margin.labels(slug, *_labels(check)).set(check["margin"])
     text: str = generate_latest(registry).decode()  # type: ignore[no-untyped-call]
     return text
+
+
+def _labels(check: Mapping[str, Any]) -> tuple[str, str]:
+    """A check's name and unit, which an evaluator has written, or somebody else a file of results."""
+    return printable(check["name"]), printable(check.get("unit") or "")

@@ -115,9 +115,9 @@ def _named(spec: Path, folder: Path, own: Path) -> Iterator[Path]:
 
 
 def _data(path: Path) -> Path | None:
-    """The real path of a file of data, or of a folder with a map."""
-    real = Path(os.path.realpath(path))
+    """The real path of a file of data, or of a folder with a map; None for what can be no path, as with a NUL."""
     try:
+        real = Path(os.path.realpath(path))
         is_data = (real.suffix.lower() in _DATA - {".md"} and real.is_file()) or (real / _MAP).is_file()
     except (OSError, ValueError):
         return None

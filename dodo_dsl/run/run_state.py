@@ -196,7 +196,8 @@ class RunState:
         elif service not in self.ready and self.began is None:
             self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
         elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
-            self._end_by_exit("error", f"evaluator '{service}' ended without a verdict {when}", service)
+            reason = f"evaluator '{service}' ended without a verdict {when}".rstrip()
+            self._end_by_exit("error", reason, service)
 
     def is_to_explain(self) -> bool:
         """Whether the machine may be the reason for how the test ended, if something of it was used up."""

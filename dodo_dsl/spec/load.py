@@ -17,6 +17,9 @@ from dodo_dsl.spec.schema.validation import validate
 Loaded = tuple[list[Spec], list[Diagnostic]]
 """The instances of a file, and its problems."""
 
+_MOST_WRONG = 20
+"""Instances with mistakes after which no others are read: most have the same ones."""
+
 
 def load_spec(location: Location, reader: Reader = read) -> Loaded:
     """The instances of a file, as far as it can be read, and its problems."""
@@ -36,8 +39,10 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         return [Spec(location)], [*found, *validate(node, "dodo")]
     found.extend([*matrix.problems(node), *vary.problems(node)])
     specs = []
-    checked_by_rules = _only_in_parameters(node, matrix.PLACEHOLDERS)
+    checked_by_rules, wrong = _only_in_parameters(node, matrix.PLACEHOLDERS), 0
     for number, choice in enumerate(choices):
+        if wrong >= _MOST_WRONG:
+            break
         template = matrix.substitute(node, choice)
         assert isinstance(template, Mapping)
         ranges, problems = vary.read(template)
@@ -46,7 +51,9 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         found.extend(problems)
         if number == 0 or not checked_by_rules:
             checked = instance if number == 0 else without(instance, MATRIX)
-            found.extend(d for d in validate(checked, "dodo") if is_whole or not _is_missing(d, node))
+            problems = validate(checked, "dodo")
+            wrong += bool(problems)
+            found.extend(d for d in problems if is_whole or not _is_missing(d, node))
         corners, problems = _corners(spec)
         found.extend(problems)
         specs.append(replace(spec, corners=corners))

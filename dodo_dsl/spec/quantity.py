@@ -140,6 +140,10 @@ def written_unit(text: str) -> str | None:
     return unit if not unit or unit in _DIMENSION else None
 
 
+_MOST_DIGITS = 301
+"""Before the point, or zeros after it: services calculate with numbers of 64 bits."""
+
+
 def _converted(number: str, written: str, unit: str) -> Decimal:
     units = _FACTORS[_DIMENSION[unit]]
     with localcontext() as context:
@@ -148,11 +152,15 @@ def _converted(number: str, written: str, unit: str) -> Decimal:
             exact = Decimal(number)
         except InvalidOperation as error:
             raise QuantityError(f"'{number}' is not a number") from error
-        if written == unit:
-            return exact
-        result = exact * units[written] / units[unit]
-        context.prec = _DIGITS
-        return +result
+        result = exact
+        if written != unit:
+            result = exact * units[written] / units[unit]
+            context.prec = _DIGITS
+            result = +result
+    if result and abs(result.adjusted()) >= _MOST_DIGITS:
+        size = "large" if result.adjusted() > 0 else "small"
+        raise QuantityError(f"'{number}' is too {size} a number", "write one between 1e-300 and 1e300")
+    return result
 
 
 def decimal_text(number: Decimal) -> str:

@@ -348,6 +348,8 @@ def run_images(tmp_path: Path, docker: str, compose: str = BUILT, **inputs: Any)
     (tmp_path / "bin/docker").chmod(0o755)
     (tmp_path / "app").mkdir()
     (tmp_path / "app/docker-compose.yml").write_text(compose)
+    (tmp_path / "app/.git").mkdir()
+    (tmp_path / "app/.git/config").write_text("url = https://gitlab-ci-token:secret@gitlab.example.org/team/car.git")
     (tmp_path / "bin/dodo").write_text(f'#!/bin/sh\nexec {sys.executable} -P -m dodo_dsl "$@"\n')
     (tmp_path / "bin/dodo").chmod(0o755)
     environment = {
@@ -382,7 +384,9 @@ def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Cal
     assert (tmp_path / "calls.txt.token").read_text() == "secret"
     checked = tmp_path / "private/docker/builds.yml"
     assert f"buildx bake --file {checked} --set lane-finder.tags=" in calls
-    assert json.loads(checked.read_text())["services"]["steering"] == {"build": {"context": str(tmp_path / "app")}}
+    context = Path(json.loads(checked.read_text())["services"]["steering"]["build"].pop("context"))
+    assert context.is_relative_to(checked.parent / "contexts")
+    assert [path.name for path in context.iterdir()] == ["docker-compose.yml"]
     assert "secret" not in (tmp_path / "calls.txt.environment").read_text()
     image = "registry.example.org/team/car"
     images = {

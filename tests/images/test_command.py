@@ -184,3 +184,23 @@ def test_what_was_built_for_another_platform_is_not_pushed(docker: Path) -> None
 def test_a_wrong_platform_says_how_to_write_them(docker: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("build", "--platform", "arm64")[0] == Exit.USAGE
     assert "there is no platform 'arm64'; write them as linux/amd64,linux/arm64" in capsys.readouterr().err
+
+
+def test_builds_have_contexts_of_their_own(docker: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a pipeline builds with bake holds no more than what a run builds."""
+    root = docker.parent.parent / "a$b"
+    for name in (".git/config", "tests/a/map.json", "generated/x", "dodo-report/x", "main.py"):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text("x")
+    (root / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
+    (root / "docker-compose.yml").write_text("services: {a: {build: ., command: --cid=111}}\n")
+    monkeypatch.chdir(root)
+    code, said = run("builds", "--contexts", str(docker.parent / "contexts"))
+    assert code == Exit.OK, said
+    context = Path(json.loads(said)["services"]["a"]["build"]["context"].replace("$$", "$"))
+    assert (context.name, sorted(p.name for p in context.iterdir())) == (
+        "a$b",
+        ["docker-compose.yml", "dodo.yml", "main.py"],
+    )
+    docker.write_text("a file")
+    assert run("builds", "--contexts", str(docker))[0] == Exit.USAGE

@@ -33,3 +33,11 @@ def test_what_the_application_used() -> None:
 
 def test_an_error_has_no_margin() -> None:
     assert samples(to_text([replace(OUTCOME, outcome="error")]), "dodo_worst_margin") == []
+
+
+def test_text_of_others_commands_no_terminal() -> None:
+    check = {"name": "a\x1b[31m\nb", "value": 1, "limit": {}, "unit": "m\x1b", "ok": True, "margin": 1}
+    use = ServiceUse("s\x1b", 1.0, 0.4, 1, 0.0, None)
+    text = to_text([replace(OUTCOME, slug="t\x1b", checks=(check,), resources=(use,))])
+    assert "\x1b" not in text
+    assert samples(text, "dodo_check_value") == ['check="a�[31m�b",test="t�",unit="m�"} 1.0']

@@ -128,3 +128,13 @@ def test_names_that_utf_8_cannot_encode_are_reported(tmp_path: Path) -> None:
     assert write_report(tmp_path, [outcome], {}) == []
     (loaded,) = results.load(tmp_path / "results.json")
     assert (loaded.reason, loaded.notes, loaded.last_lines) == ("no file a?", ("?",), ("?",))
+
+
+def test_text_of_others_attaches_no_file(tmp_path: Path) -> None:
+    text = "a [[ATTACHMENT|.env]] b"
+    check = {"name": text, "value": 1, "limit": {}, "unit": "", "ok": False}
+    outcome = replace(OUTCOME, outcome="failed", reason=text, notes=(text,), last_lines=(text,), checks=(check,))
+    assert write_report(tmp_path, [outcome, replace(outcome, outcome="passed")], {}) == []
+    junit = (tmp_path / "junit.xml").read_text()
+    assert junit.count("[ [ATTACHMENT|.env]]") == 7
+    assert "[[ATTACHMENT|" not in junit

@@ -519,6 +519,11 @@ def test_a_crash_in_lockstep_has_no_time_that_the_clock_did_not_tell() -> None:
     assert found.reason == "application service 'app' ended with exit code 1, before the test was decided"
 
 
+def test_an_evaluator_without_a_verdict_is_told_at_its_test_time() -> None:
+    found = outcome(clocked((0.1, Time(0.0, False)), (3.0, ENDED), (3.0, Time(0.5, True))))
+    assert found.reason == "evaluator 'track' ended without a verdict, after 0.5 s of test time"
+
+
 def test_a_failed_verdict_has_no_other_time_than_its_own() -> None:
     failed = VerdictEvent("track", False, "hit wall left after 2.10 s", ())
     found = outcome(clocked((1.0, failed), (1.0, ENDED), (1.5, Time(2.1, True))))

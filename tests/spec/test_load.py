@@ -94,3 +94,16 @@ def test_ranges_that_an_extending_test_does_not_use_are_the_concern_of_the_other
     assert (problems, "start" in {one.name for one in spec.ranges}) == ([], True)
     path.write_text(f"{without}vary: {{far: {{from: 1, to: 2, nominal: 1}}}}\n")
     assert [found.rule for found in load_spec(Location(path, tmp_path))[1]] == ["vary-unused"]
+
+
+def test_no_more_instances_are_read_after_twenty_with_mistakes(tmp_path: Path) -> None:
+    """A long text is checked for each: a spec of 1 MB with 1,000 instances took minutes."""
+    folder = tmp_path / "a"
+    folder.mkdir()
+    values = ", ".join(f"v{number}" for number in range(50))
+    text = f'dodo: 1\nname: a\nmatrix: {{a: [{values}]}}\ndescription: "${{matrix.a}} {"x " * 5000}"\n'
+    (folder / "a.dodo.yml").write_text(text)
+    specs, problems = load_spec(Location(folder / "a.dodo.yml", tmp_path))
+    assert len(specs) == 20
+    sizes = {d.message for d in problems if d.span.line == 4}
+    assert sizes == {f"'description' has {n} characters, expected at most 2000" for n in (10_003, 10_004)}

@@ -11,6 +11,8 @@ from dodo_dsl.spec.quantity import SHARE, UNITS, QuantityError, convert, decimal
 CASES = [
     ("10 Hz", "Hz", "10"),
     ("9.5 cm", "m", "0.095"),
+    ("1e300 m", "m", "1" + "0" * 300),
+    ("0e999 m", "m", "0"),
     ("9.5cm", "m", "0.095"),
     ("48.8 deg", "deg", "48.8"),
     ("180 deg", "rad", "3.14159265358979"),
@@ -40,6 +42,9 @@ REFUSED = [
     ("", "m", "'' is not a quantity in m"),
     (True, "m", "expected a quantity in m"),
     ([1], "m", "expected a quantity in m"),
+    ("1e999 m", "m", "'1e999' is too large a number"),
+    ("-1e301 m", "mm", "'-1e301' is too large a number"),
+    ("1e-999 m", "m", "'1e-999' is too small a number"),
     ("nan m", "m", "'nan m' is not a quantity in m"),
     ("1" * 41 + " m", "m", f"'{'1' * 41} m' is not a quantity in m"),
 ]

@@ -3,6 +3,8 @@
 import difflib
 import functools
 import json
+import os
+import sys
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,7 +80,10 @@ class Node:
         except RecursionError as error:
             raise MapError(file, "the JSON is nested too deeply") from error
         except ValueError as error:
-            raise MapError(file, f"not JSON: {str(error)[:120]}") from error
+            most = sys.get_int_max_str_digits()
+            is_long = "integer string conversion" in str(error)
+            what = f"a number has more than {most} digits" if is_long else f"not JSON: {str(error)[:120]}"
+            raise MapError(file, what) from error
 
     def fail(self, expected: str, hint: str = "") -> NoReturn:
         raise MapError(self.file, f"expected {expected}, found {_shown(self.value)}", self.place, hint=hint)
@@ -132,7 +137,11 @@ class Node:
         except (ValueError, OSError, RuntimeError):
             self.fail("the path of a file")
         if not path.is_relative_to(folder):
-            self.fail("a file inside the map's folder", "copy it there: the map's folder goes with the test")
+            is_link = Path(os.path.normpath(folder / name)).is_relative_to(folder)
+            but = ", and no symbolic link out of it" if is_link else ""
+            self.fail(f"a file inside the map's folder{but}", "copy it there: the map's folder goes with the test")
+        if path.exists() and not path.is_file():
+            self.fail("a regular file, and no folder, FIFO or device")
         if not path.is_file():
             beside = (each.name for each in path.parent.iterdir()) if path.parent.is_dir() else ()
             self.fail("a file in the map's folder", near(path.name, beside))

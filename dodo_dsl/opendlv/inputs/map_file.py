@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from dodo_dsl.opendlv.inputs.json_node import MAX_NUMBER, MapError, Node, of_keys, unread
+from dodo_dsl.opendlv.inputs.obstacles import require_few_lines
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
@@ -274,4 +275,5 @@ def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report:
 def read_obstacles(path: Path) -> tuple[ObstacleEntry, ...]:
     """The map's obstacles that have lines; MapError names the file and the JSON path."""
     root = Node.load(find_map(path))
+    require_few_lines(root)
     return tuple(o for o in map(_obstacle, root.items("obstacles")) if o)

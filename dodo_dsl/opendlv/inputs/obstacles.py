@@ -7,6 +7,8 @@ from dodo_dsl.opendlv.inputs.json_node import MapError, Node
 Line = tuple[tuple[float, float], tuple[float, float]]
 NUMBERS = 4
 FARTHEST = 1e300
+MAX_LINES = 10_000
+"""Of all obstacles of a map, to each of which evaluators measure the distance."""
 
 
 def read(path: Path) -> dict[str, list[Line]]:
@@ -16,11 +18,20 @@ def read(path: Path) -> dict[str, list[Line]]:
     """
     file = path if path.suffix == ".json" else path / "map.json"
     root = Node.load(file)
+    require_few_lines(root)
     found: dict[str, list[Line]] = {}
     for entry in root.items("obstacles"):
         name, lines = _obstacle(entry)
         found.setdefault(name, []).extend(lines)
     return found
+
+
+def require_few_lines(root: Node) -> None:
+    """Raises MapError for more lines than a map may have."""
+    lines = [o.value.get("lines") for o in root.items("obstacles") if isinstance(o.value, dict)]
+    if (count := sum(len(each) for each in lines if isinstance(each, list))) > MAX_LINES:
+        what = f"{count} lines of obstacles, expected at most {MAX_LINES}"
+        raise MapError(root.file, what, "$.obstacles", hint="write long lines in the place of many short ones")
 
 
 def _obstacle(entry: Node) -> tuple[str, list[Line]]:

@@ -4,9 +4,10 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
 from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
 from dodo_dsl.run.docker import own_images
+from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
 from dodo_dsl.run.docker.builds import is_built, private_images
 from dodo_dsl.run.docker.masks import absent, masks
 from dodo_dsl.run.docker.pulls import PullError, Pulls, Say
@@ -49,6 +51,7 @@ class Compose:
         self.project = project
         self.services: dict[str, Any] = {}
         self._volumes: dict[str, Any] = {}
+        self._secrets: dict[str, Any] = {}
         self._images: dict[str, str] = {}
         self._say = say
         self._paths = replace(application_paths(plan.application, folder), tmp=plan.isolation == "host")
@@ -67,10 +70,20 @@ class Compose:
         if code and _NO_COMPOSE in problem and (await self._run("version"))[0]:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
         if code:
-            raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
+            why = f"{traced(self.plan, problem)}{self._of_env_file(problem)}"
+            raise BackendError(f"docker compose rejects the compiled test: {why}")
         config = compose_paths.unescaped(json.loads(out))
         self._refuse(compiled_findings(config, self._test))
+        self._refuse(_unseen(config, hidden_folders(self.plan.application, self.folder, self.report)))
+        self._secrets = config.get("secrets") or {}
         self._take(config)
+
+    def _of_env_file(self, problem: str) -> str:
+        """The files of variables that a problem with a line may be of, as compose does not name them."""
+        files = sorted({path for service in self.plan.application.services for path in service.env_files})
+        if not files or not re.search(r"\bline \d+", problem) or any(name in problem for name in files):
+            return ""
+        return f"; the line may be of an env_file: {', '.join(files)}"
 
     def _take(self, config: dict[str, Any]) -> None:
         """Keeps what the engine is asked for of the test as ``docker compose config`` shows it."""
@@ -130,11 +143,31 @@ class Compose:
         """Builds images; compose labels them with the project, so named images are built in one common project."""
         self._say(f"building {', '.join(names)}")
         log = self.report / "logs" / "build.log"
-        code, _, problem = await self._run("build", *names, log=log, project=project)
+        self.report.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".build-", dir=self.report) as folder:
+            try:
+                file = await asyncio.to_thread(self._builds, Path(folder))
+            except (HiddenContext, OSError, shutil.Error) as error:
+                raise BackendError(f"the application's images cannot be built: {error}") from error
+            code, _, problem = await self._run("build", *names, log=log, project=project, files=str(file))
         if code:
             where = f"{log.parent.name}/{log.name} of the test in the report"
             raise BackendError(f"the application's images cannot be built: {problem}; see {where}")
         return ""
+
+    def _builds(self, folder: Path) -> Path:
+        """Writes a compose file with the application's builds alone, which get nothing that it never sees."""
+        hidden = hidden_folders(self.plan.application, self.folder, self.report)
+        for root in self._paths.roots:
+            hidden += files_of_tests(root, self._paths.folder, hidden)
+        services = own_contexts({n: s for n, s in self.services.items() if is_built(s)}, hidden, folder)
+        for name, service in services.items():
+            if image := self._images.get(image_variable(name)):
+                service["image"] = image
+        file = folder / "builds.compose.json"
+        content = compose_paths.escaped_values({"services": services, "secrets": self._secrets})
+        file.write_text(json.dumps(content), encoding="utf-8")
+        return file
 
     async def create(self, subnets: Iterable[str], key: bytes) -> None:
         """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError.
@@ -210,3 +243,14 @@ class Compose:
             atomic.write_bytes(log, out + err)
         errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
         return process.returncode or 0, out.decode("utf-8", "replace"), errors[-1].strip() if errors else ""
+
+
+def _unseen(config: dict[str, Any], hidden: Iterable[Path]) -> Iterator[AccessFinding]:
+    """Configs and secrets that are files of tests, their output or ``.git``; mounts of these are masked."""
+    places = list(hidden)
+    for key in ("configs", "secrets"):
+        for name, about in (config.get(key) or {}).items():
+            file = about.get("file") if isinstance(about, dict) else None
+            if file and any(Path(os.path.realpath(file)).is_relative_to(place) for place in places):
+                what = f"'{file}' lies where tests, their output or .git are kept"
+                yield AccessFinding((key, name, "file"), what)

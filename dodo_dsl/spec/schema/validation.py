@@ -203,6 +203,9 @@ def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
     wanted = error.validator_value
     names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
     found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
+    written = place.node.text if isinstance(place.node, Scalar) else ""
+    if error.instance == math.inf and written.isdigit():
+        found = f"has {len(written)} digits"
     names = names if error.schema.get("x-expect") != _TYPE_NAMES["boolean"] else [_TYPE_NAMES["boolean"]]
     message = f"{place.name} {found}, expected {' or '.join(names)}"
     hint, fix = error.schema.get(_HINT) or _of_file(place) or _in_quotes(error, place), None
@@ -300,6 +303,9 @@ def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
     yield Diagnostic(place.span, "wrong-value", message, hint)
 
 
+_MOST_READ = 200
+
+
 def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
     expected = error.schema.get("x-expect", f"a string that matches {error.schema.get('pattern')}")
     span = place.span
@@ -307,7 +313,7 @@ def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
         span = place.key(str(error.instance))
     hint = _of_file(place)
     if not hint and isinstance(error.instance, str):
-        name = re.sub(r"[^a-z0-9]+", "-", error.instance.lower()).strip("-")[:40]
+        name = re.sub(r"[^a-z0-9]+", "-", error.instance[:_MOST_READ].lower()).strip("-")[:40]
         is_text = name != error.instance and resolve(name) == name != ""
         hint = f"for example '{name}'" if is_text and place.fits(name) else ""
     yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} is not allowed here, expected {expected}", hint)
@@ -317,6 +323,14 @@ def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
     low, high = error.schema.get("minimum"), error.schema.get("maximum")
     message = f"{place.name} is {_shown(error.instance)[1:-1]}, expected {low} to {high}"
     yield Diagnostic(place.span, "out-of-range", message)
+
+
+def _too_long(error: Any, place: _Place) -> Iterator[Diagnostic]:
+    if "x-expect" in error.schema:
+        yield from _pattern(error, place)
+        return
+    message = f"{place.name} has {len(error.instance)} characters, expected at most {error.validator_value}"
+    yield Diagnostic(place.span, "too-large", message)
 
 
 def _too_few(error: Any, place: _Place) -> Iterator[Diagnostic]:
@@ -342,7 +356,7 @@ _TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
     "enum": _choices,
     "const": _const,
     "pattern": _pattern,
-    "maxLength": _pattern,
+    "maxLength": _too_long,
     "minimum": _bounds,
     "maximum": _bounds,
     "maxProperties": _too_many,

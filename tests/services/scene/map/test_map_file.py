@@ -157,3 +157,27 @@ def test_whatever_stands_in_a_map_is_read_or_refused(tmp_path_factory, content):
 def test_long_values_are_shortened_in_messages(tmp_path):
     with pytest.raises(MapError, match=r"found \[0, 0, .{0,60}\.\.\.$"):
         Node(tmp_path, "$", [0] * 1000).text()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("out", "expected a file inside the map's folder, and no symbolic link out of it, found"),
+        ("fifo", "expected a regular file, and no folder, FIFO or device, found"),
+        ("folder", "expected a regular file, and no folder, FIFO or device, found"),
+    ],
+)
+def test_what_is_no_file_of_the_map_is_called_so(write_map, name, message):
+    folder = write_map({"model": [changed(GOOD_MODEL, textureFile=name)]})
+    (folder / "out").symlink_to("/etc/passwd")
+    os.mkfifo(folder / "fifo")
+    (folder / "folder").mkdir()
+    with pytest.raises(MapError) as raised:
+        read_map(folder)
+    assert str(raised.value).endswith(f'$.model[0].textureFile: {message} "{name}"')
+    assert "did you mean" not in raised.value.hint
+
+
+def test_a_number_of_too_many_digits_names_no_function_of_python(write_map):
+    with pytest.raises(MapError, match=r"map\.json: a number has more than 4300 digits$"):
+        read_map(write_map(f'{{"model": [{"9" * 5000}]}}'))

@@ -1,0 +1,123 @@
+"""What builds get of a repository: not its tests, their output and ``.git``."""
+
+import asyncio
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl.plan.model import ApplicationService
+from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
+from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.docker.pulls import Pulls
+from tests.run.scripted import plan
+
+_FILES = (
+    "Dockerfile", "app.py", "data/a.txt", ".git/config", "sub/.git/config", "tests/a.dodo.yml", "tests/map.json",
+    "dodo-report/results.json", "b.dodo.yml", ".dockerignore",
+    "old/results.json", "old/index.html", "out/child.gitlab-ci.yml", "out/a/test.json", "one/test.rec",
+    "one/logs/a.log",
+    "compiled/test.json", "compiled/compose.yaml",
+)  # fmt: skip
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    root = tmp_path / "repository"
+    for name in _FILES:
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(name)
+    (root / "link").symlink_to("tests")
+    os.mkfifo(root / "fifo")
+    return root
+
+
+def _built(root: Path, build: Any, folder: Path) -> dict[str, Any]:
+    hidden = [root / ".git", root / "tests", root / "dodo-report"]
+    folder.mkdir(exist_ok=True)
+    found: dict[str, Any] = own_contexts({"a": {"image": "a", "build": build, "command": "x"}}, hidden, folder)
+    return dict(found["a"])
+
+
+def _shown(folder: str) -> set[str]:
+    return {str(p.relative_to(folder)) for p in Path(folder).rglob("*") if p.is_symlink() or not p.is_dir()}
+
+
+def test_a_context_holds_nothing_that_no_application_sees(repository: Path, tmp_path: Path) -> None:
+    found = _built(repository, {"context": str(repository), "dockerfile": "Dockerfile"}, tmp_path / "copies")
+    assert set(found) == {"image", "build"}
+    assert found["build"]["dockerfile"] == "Dockerfile"
+    assert _shown(found["build"]["context"]) == {"Dockerfile", "app.py", "data/a.txt", ".dockerignore", "link"}
+    copied, original = (Path(root, "app.py").stat() for root in (found["build"]["context"], repository))
+    assert (copied.st_mtime_ns, copied.st_mode) == (original.st_mtime_ns, original.st_mode)
+    assert Path(found["build"]["context"]).name == repository.name
+
+
+def test_so_do_named_contexts(repository: Path, tmp_path: Path) -> None:
+    others = {
+        "same": str(repository),
+        "data": str(repository / "data"),
+        "base": "docker-image://python",
+        "s": "service:b",
+    }
+    build = _built(repository, {"context": str(repository), "additional_contexts": others}, tmp_path / "copies")[
+        "build"
+    ]
+    own = build["additional_contexts"]
+    assert own == {**others, "same": build["context"]}
+    assert ".git/config" not in _shown(own["same"])
+
+
+@pytest.mark.parametrize("context", ["data", "https://example.org/a.git"])
+def test_others_stay_where_they_are(context: str, repository: Path, tmp_path: Path) -> None:
+    where = context if "://" in context else str(repository / context)
+    assert _built(repository, {"context": where}, tmp_path / "copies")["build"]["context"] == where
+
+
+def test_a_dockerfile_may_be_kept_among_the_tests(repository: Path, tmp_path: Path) -> None:
+    build = {"context": str(repository), "dockerfile": "tests/map.json"}
+    found = _built(repository, build, tmp_path / "copies")["build"]["dockerfile"]
+    assert found == str(repository / "tests" / "map.json")
+
+
+@pytest.mark.parametrize("context", ["tests", "link", ".git", "sub/.git", "dodo-report"])
+def test_hidden_folders_are_no_context(context: str, repository: Path, tmp_path: Path) -> None:
+    with pytest.raises(
+        HiddenContext, match=rf"the build of 'a' takes '.*{context}', where tests, their output or \.git"
+    ):
+        _built(repository, {"context": str(repository / context)}, tmp_path / "copies")
+
+
+async def _nothing(*_: object) -> list[str]:
+    return []
+
+
+def test_a_run_builds_from_the_copy_alone(repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "docker"
+    lines = ['cat "$COMPOSE_FILE" > ../../seen', 'cd "$(dirname "$COMPOSE_FILE")"', f"find . > {tmp_path}/files"]
+    program.write_text("\n".join(["#!/bin/sh", *lines]).replace("../..", str(tmp_path)))
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    report = repository / "dodo-report" / "sil-first"
+    made = plan()
+    made = replace(
+        made, application=replace(made.application, folder="../..", services=(ApplicationService("a", None),))
+    )
+    monkeypatch.setattr(Pulls, "provide", _nothing)
+    (repository / "mine").mkdir()
+    (repository / "mine" / "map.json").write_text('{"model": []}')
+    (repository / "b.dodo.yml").write_text("a\0b")
+    test = Compose(made, repository / "generated" / "sil-first", report, "project", print)
+    test.folder.mkdir(parents=True)
+    test.services = {"a": {"image": "team/a$b", "build": {"context": str(repository)}}}
+    asyncio.run(test.provide_images(Pulls(None)))
+    seen = json.loads((tmp_path / "seen").read_text())
+    assert Path(seen["services"]["a"]["build"]["context"]).parents[1].parent == report
+    files = (tmp_path / "files").read_text()
+    assert "/app.py" in files
+    assert not [name for name in ("config", "results.json", "generated", "mine", "dodo.yml") if name in files]
+    assert seen["services"]["a"]["image"].startswith("dodo-build:")
+    assert [path.name for path in report.iterdir()] == ["logs"]
