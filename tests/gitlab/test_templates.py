@@ -94,7 +94,9 @@ def test_inputs_reach_all_jobs(template: Path) -> None:
         assert job["allow_failure"] is True
         if "script" in job:
             found = job["services"], job["before_script"], job["artifacts"]["access"]
-            assert found == (["docker:dind"], ["a\nb"], "none"), name
+            commands = [] if name == "dodo-pipeline" else ["a\nb"]  # as it has no checkout
+            assert found == (["docker:dind"], commands, "none"), name
+            assert (job.get("variables", {}).get("GIT_STRATEGY") == "none") == (name == "dodo-pipeline"), name
 
 
 def test_the_team_s_jobs_are_waited_for_and_their_files_are_there() -> None:
@@ -165,7 +167,7 @@ def test_no_input_becomes_text_of_a_shell(template: Path) -> None:
     """They are variables there: a shell takes those as words, whatever they hold. One input is commands by its name."""
     for job in yaml.safe_load(template.read_text().split("\n---\n")[1]).values():
         assert "$[[" not in str([job.get(key) for key in ("script", "after_script")])
-        assert job.get("before_script") in (None, ["$[[ inputs.before-script ]]"])
+        assert job.get("before_script") in (None, [], ["$[[ inputs.before-script ]]"])
 
 
 @each
@@ -311,11 +313,11 @@ def test_another_job_of_the_name_compile_is_told(template: Path, tmp_path: Path)
     (tmp_path / "generated/child.gitlab-ci.yml").touch()
     result = run_script(job, tmp_path, {})
     assert result.returncode == 1
-    assert "There is no test, so that nothing is tested; with 'no-tests: pass'" in result.stdout
+    assert "No test was found, so nothing was tested; to allow that, set the input 'no-tests: pass'" in result.stdout
     assert jobs(included(template))["dodo-pipeline"]["variables"]["DODO_NO_TESTS"] == "fail"
     assert jobs(included(template, no_tests="pass"))["dodo-pipeline"]["variables"]["DODO_NO_TESTS"] == "pass"
     result = run_script(job, tmp_path, {"DODO_NO_TESTS": "pass"})
-    assert (result.returncode, "There is no test" in result.stdout) == (0, True)
+    assert (result.returncode, "No test was found" in result.stdout) == (0, True)
     (tmp_path / "generated/first/test.json").touch()
     assert run_script(job, tmp_path, {}).returncode == 0
 
@@ -427,7 +429,8 @@ def test_images_are_built_for_the_platforms_that_are_asked_for(tmp_path: Path) -
     calls = (tmp_path / "calls.txt").read_text()
     assert " --push --set lane-finder.platform=linux/amd64,linux/arm64 --metadata-file " in calls
     _, context, builder, *bakes, gone = calls.splitlines()  # the first one logs in
-    assert (context, builder) == ("context create dodo", "buildx create --name dodo-7 --driver docker-container dodo")
+    assert context == "context create dodo-7"
+    assert builder == "buildx create --name dodo-7 --driver docker-container dodo-7"
     assert {call.partition(" bake ")[0] for call in bakes} == {"buildx --builder dodo-7"}
     assert gone == "buildx rm --force dodo-7"
 

@@ -58,6 +58,7 @@ class PipelineFile:
     config: dict[str, Any] = field(default_factory=dict)
     included: list[Included] = field(default_factory=list)
     complete: bool = True
+    _read: set[Path] = field(default_factory=set)
 
     @property
     def says_all(self) -> bool:
@@ -66,7 +67,9 @@ class PipelineFile:
 
     def add(self, path: Path, top: Path, depth: int = 0) -> None:
         """Reads a file of the repository at ``top``, first what it includes."""
-        inside = path.resolve().is_relative_to(top.resolve()) and path.is_file() and depth <= _DEPTH
+        path = path.resolve()
+        inside = path.is_relative_to(top.resolve()) and path.is_file() and depth <= _DEPTH and path not in self._read
+        self._read.add(path)
         node, wrong = source.read(path) if inside else (None, [])
         if not isinstance(node, source.Mapping) or wrong:
             self.complete = False
@@ -144,10 +147,12 @@ def _twice(included: Sequence[Included]) -> Iterator[Diagnostic]:
 
 
 def _unused(found: PipelineFile) -> Iterator[Diagnostic]:
-    names = {name for one in found.included for name in one.inputs.get("variables") or ()}
-    for name in found.config.get("variables") or () if found.included else ():
+    lists = [one.inputs.get("variables") for one in found.included]
+    names = [str(name) for several in lists if isinstance(several, list) for name in several]
+    variables = found.config.get("variables")
+    for name in variables if found.included and isinstance(variables, dict) else ():
         if name.startswith("DODO_") and name not in names:
-            message = f"the variable '{name}' reaches no job of DoDo's, which get none of a pipeline's own variables"
+            message = f"no job of DoDo's gets the variable '{name}'; they get those that the input 'variables' names"
             hint = "there is an input for most; name others in the input 'variables'"
             yield Diagnostic(found.included[0].span, "pipeline-include", message, hint, "warning")
 
@@ -160,7 +165,9 @@ def _apart(found: PipelineFile) -> Iterator[Diagnostic]:
         tested = [one for one in found.included if _has_dodo(one, found, REQUEST)]
         missing = (_jobs(found, PUSH) | _jobs(found, REVIEWED)) - _jobs(found, REQUEST)
         if tested and missing:
-            message = f"the pipeline of a merge request has DoDo's jobs and not {_named(missing)}, as its branch's has"
+            message = (
+                f"a merge request's pipeline has DoDo's jobs but not {_named(missing)}, which only the branch's has"
+            )
             hint = "join the branch's with the input 'rules: joined', or let 'workflow: rules' make one for both"
             yield Diagnostic(tested[0].span, "pipeline-jobs", message, hint, "warning")
     yield from _untested(found, REQUEST)
@@ -213,8 +220,8 @@ def _has_dodo(one: Included, found: PipelineFile, variables: Variables) -> bool:
         return False
     own = found.config.get(one.name if one.template == "run" else ".dodo-rules") or {}
     chosen = _choices(one.template).get(str(one.inputs.get("rules", "joined")))
-    if chosen is None:
-        raise Unreadable(str(one.inputs["rules"]))
+    if chosen is None or not isinstance(own, dict):
+        raise Unreadable(f"{one.inputs.get('rules')}, {own}")
     return may_be_there({**chosen, **own}, variables, by_workflow=_has_rules(found))
 
 

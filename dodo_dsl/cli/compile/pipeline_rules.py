@@ -226,5 +226,8 @@ def _is_ref(word: str, variables: Variables) -> bool:
     if variables.get("CI_MERGE_REQUEST_ID"):
         return False  # its ref is none of a branch
     if pattern := re.fullmatch(r"/(.*)/(\w*)", word):
-        return bool(re.search(pattern[1], ref, re.IGNORECASE if "i" in pattern[2] else 0))
+        try:
+            return bool(re.search(pattern[1], ref, re.IGNORECASE if "i" in pattern[2] else 0))
+        except re.error:  # GitLab's are RE2's
+            raise Unreadable(word) from None
     return word == ref

@@ -179,7 +179,8 @@ def unpassable(path: Path, drive: Drive, application: ApplicationSource | None) 
         return ""
     named = " and ".join(f"'{name}'" for name in readers)
     waits = "waits" if len(readers) == 1 else "wait"
-    return f"warning: {named} of the application {waits} for pictures, and '{path.name}' has none: it cannot pass\n"
+    of_it = f"and '{path.name}' has none, so the test cannot pass"
+    return f"warning: {named} of the application {waits} for pictures, {of_it}\n"
 
 
 def _quoted(text: str) -> str:

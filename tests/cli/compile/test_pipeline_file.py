@@ -29,7 +29,7 @@ def test_dodo_s_jobs_alone_in_a_merge_request(tmp_path: Path) -> None:
     (problem,) = said(tmp_path, f"include:\n{REQUESTS}{BUILD}test: {{extends: .x, script: [a]}}\n.x: {{stage: test}}\n")
     assert (problem.rule, problem.severity, problem.span.line) == ("pipeline-jobs", "warning", 2)
     assert problem.message == (
-        "the pipeline of a merge request has DoDo's jobs and not 'build' and 'test', as its branch's has"
+        "a merge request's pipeline has DoDo's jobs but not 'build' and 'test', which only the branch's has"
     )
     assert "'rules: joined'" in problem.hint and "'workflow: rules'" in problem.hint
 
@@ -45,6 +45,11 @@ def test_dodo_s_jobs_alone_in_a_merge_request(tmp_path: Path) -> None:
         f"include:\n{REQUESTS}{BUILD}dodo-run: {{rules: [{{if: $CI_COMMIT_BRANCH}}]}}\n",
         BUILD,
         "include: [",
+        f"include:\n{REQUESTS}deploy: {{script: [a], only: ['/^v[0-9]+\\z/']}}\n",
+        f"include:\n{REQUESTS}deploy: {{script: [a], except: ['/^(?i)rel/']}}\n",
+        f"include:\n{RUN}    inputs: {{variables: 3, rules: 3}}\nvariables: 3\n",
+        f"include:\n{REQUESTS}{BUILD}dodo-run: [a]\n",
+        f"include:\n  - .gitlab-ci.yml\n  - .gitlab-ci.yml\n{REQUESTS}{BUILD}",
     ],
 )
 def test_nothing_is_said_where_both_are_there(tmp_path: Path, text: str) -> None:
@@ -111,7 +116,7 @@ def test_one_job_twice_by_one_name(tmp_path: Path) -> None:
 def test_variables_that_reach_nobody(tmp_path: Path) -> None:
     text = f"include:\n{RUN}variables: {{DODO_REGISTRY: '', DOCKER_HOST: tcp://docker:2375}}\n"
     (problem,) = said(tmp_path, text)
-    assert problem.message.startswith("the variable 'DODO_REGISTRY' reaches no job of DoDo's")
+    assert problem.message.startswith("no job of DoDo's gets the variable 'DODO_REGISTRY'")
     assert said(tmp_path, text.replace("\nvar", "\n    inputs: {variables: [DODO_REGISTRY]}\nvar")) == []
 
 

@@ -69,7 +69,8 @@ def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: 
     """Such a test cannot be passed: ``new`` says so, and the check as long as it is so."""
     compose = empty / "compose.yml"
     write(empty / "drive.rec", (STEERING, 0, [0.1, 0.2] * 20))
-    warning = "warning: 'car' of the application waits for pictures, and 'drive.rec' has none: it cannot pass\n"
+    warning = "warning: 'car' of the application waits for pictures, and 'drive.rec' has none, "
+    warning += "so the test cannot pass\n"
     assert warning not in dodo("new", "blind", "--rec", "drive.rec")[1]
     assert dodo("compile", "--check")[1] == "1 test checked: no problems\n"
     compose.write_text(compose.read_text().replace("--cid=111", "--cid=111 --name=video0.argb"))
