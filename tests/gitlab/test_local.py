@@ -110,7 +110,8 @@ def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> 
     assert result.returncode == 0, result.stdout[-4000:] + result.stderr[-2000:]
     assert (repository / "gl-code-quality-report.json").read_text().strip() == "[]"
     assert artifact(repository, "dodo-pipeline", "generated/child.gitlab-ci.yml").is_file()
-    said = re.findall(r"^(?:\x1b\[[0-9;]*m)*([\w-]+)(?:\x1b\[[0-9;]*m)* +.*> *(.*)", result.stdout, re.MULTILINE)
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", result.stdout)
+    said = re.findall(r"^(?:\t\[dodo-tests\] -> )?([\w-]+) +> *(.*)", plain, re.MULTILINE)
     foreign = {name for name, words in said if "of foreign jobs only" in words}
     assert foreign == {"configure", "lint", "publish"}
     before = {name for name, words in said if words == f"before {name}"}

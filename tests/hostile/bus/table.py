@@ -70,7 +70,7 @@ ATTACKS = (
     BusAttack("directly", STRAIGHT, "realtime", only(FRAME, "pose")),
     BusAttack("true-pose", STRAIGHT, "lockstep", WALL),
     BusAttack("true-pose", STRAIGHT, "realtime", WALL),
-    BusAttack("true-pose", CURVE, "lockstep", WALL, long=True),
+    BusAttack("true-pose-curve", CURVE, "lockstep", WALL, long=True),
     BusAttack("true-pose", STRAIGHT, "realtime", WALL, "host"),
     BusAttack("easy", SIGNAL, "lockstep", ""),
     BusAttack("easy", SIGNAL, "realtime", "", long=True),

@@ -13,7 +13,7 @@ import yaml
 from tests.drive import heard
 from tests.drive.applications import TOLD, dodo, results
 from tests.drive.variants import registry, variant
-from tests.hostile.bus.table import ATTACKS, STRAIGHT, BusAttack
+from tests.hostile.bus.table import ATTACKS, BusAttack
 
 BUSY = "the machine was too busy to judge: "
 HERE = Path(__file__).parent
@@ -101,9 +101,10 @@ def test_it_does_not_get_through(found: Found, attack: BusAttack) -> None:
 
 
 @pytest.mark.slow
-def test_with_its_true_pose_it_would(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["true-pose", pytest.param("true-pose-curve", marks=pytest.mark.proof)])
+def test_with_its_true_pose_it_would(name: str, tmp_path: Path) -> None:
     """So what keeps it from passing is that it is not told; where it declares that, the verdict says so."""
-    (attack,) = (each for each in chosen("lockstep", "network") if (each.name, each.test) == ("true-pose", STRAIGHT))
+    (attack,) = (each for each in chosen("lockstep", "network") if each.name == name)
     test = attacked(tmp_path, [attack], told=True)[named(attack)]
     assert test["outcome"] == "passed", test["reason"]
     assert test["reason"].endswith("; the application is told its true pose (opendlv.sim.Frame)")
