@@ -126,4 +126,4 @@ def test_check_says_it_and_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / ".gitlab-ci.yml").write_text(f"include:\n{REQUESTS}{BUILD}")
     code, out, _ = run("compile", "--check")
     assert code == 0
-    assert ".gitlab-ci.yml:2:5: warning[pipeline-jobs]: the pipeline of a merge request has DoDo's jobs" in out
+    assert ".gitlab-ci.yml:2:5: warning[pipeline-jobs]: a merge request's pipeline has DoDo's jobs" in out
