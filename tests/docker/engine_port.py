@@ -24,8 +24,8 @@ def engine_port(engine: Path, certificates: Path | None = None) -> Iterator[dict
                 client, _ = listener.accept()
             except OSError:
                 return
-            ends.append(client.dup())  # TLS takes the socket itself
-            threads.append(threading.Thread(target=_pass_on, args=(client, engine, context)))
+            ends.append(client)
+            threads.append(threading.Thread(target=_pass_on, args=(client, engine, context, ends)))
             threads[-1].start()
 
     with socket.create_server(("127.0.0.1", 0)) as listener:
@@ -39,17 +39,20 @@ def engine_port(engine: Path, certificates: Path | None = None) -> Iterator[dict
             for end in [listener, *ends]:
                 with contextlib.suppress(OSError):
                     end.shutdown(socket.SHUT_RDWR)
-                end.close()
             for thread in [accepting, *threads]:
                 thread.join()
 
 
-def _pass_on(client: socket.socket, engine: Path, context: ssl.SSLContext | None) -> None:
-    """All that comes from either side, until one of them ends; one thread, as a TLS socket bears no more."""
+def _pass_on(client: socket.socket, engine: Path, context: ssl.SSLContext | None, ends: list[socket.socket]) -> None:
+    """All that comes from either side, until one of them ends; one thread, as a TLS socket bears no more.
+
+    The engine's side is one of ``ends``, as TLS takes the descriptor of the client's.
+    """
     with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
         near = stack.enter_context(context.wrap_socket(client, server_side=True) if context else client)
         far = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
         far.connect(str(engine))
+        ends.append(far)
         while True:
             waiting = isinstance(near, ssl.SSLSocket) and near.pending() > 0
             ready = [near] if waiting else select.select([near, far], [], [])[0]
