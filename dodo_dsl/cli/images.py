@@ -158,7 +158,7 @@ def _own_contexts(
         written = compose_paths.unescaped(builds)
         hidden = unseen.folders(source, deployment)
         for root in source.paths.roots:
-            hidden += files_of_tests(root.resolve(), source.folder.resolve(), hidden)
+            hidden += files_of_tests(root.resolve(), source.folder.resolve(), hidden).paths
         written["services"] = own_contexts(written["services"], hidden, own.resolve())
     except (HiddenContext, OSError, shutil.Error) as error:
         raise UsageError(f"--contexts: {error}") from error
