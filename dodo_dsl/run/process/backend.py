@@ -274,6 +274,7 @@ class ProcessBackend:
         return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
+        self._is_noted = True  # what ends now was told to end
         for turn in self._turns.values():
             turn.cancel()
         if keep and (pid := self._sandbox.pid):
