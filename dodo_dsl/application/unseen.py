@@ -1,7 +1,7 @@
 """What of the repository no application sees: its tests, their output and ``.git``."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from dodo_dsl.application.access.access_diagnostics import place
@@ -25,6 +25,21 @@ def folders(application: ApplicationSource, deployment: Deployment) -> list[Path
     roots = {Path(os.path.realpath(root)) for root in (*application.paths.roots, deployment.root, own)}
     made = {root / name for root in roots for name in (".git", *_OUTPUT)}
     return sorted({path for path in found if not own.is_relative_to(path)} | made)
+
+
+def below(application: ApplicationSource, deployment: Deployment) -> tuple[str, ...]:
+    """Folders with tests, maps and truths within the application's own folder, relative to it."""
+    own = application.folder.resolve()
+    found = {folder.resolve() for folder in (*deployment.registry, *deployment.services)}
+    return tuple(sorted(path.relative_to(own).as_posix() for path in found if path != own and path.is_relative_to(own)))
+
+
+def read_by_tests(application: ApplicationSource, deployment: Deployment, files: Iterable[Path]) -> list[str]:
+    """The files, as far as they lie in a registry that holds the application's folder, relative to that."""
+    own = application.folder.resolve()
+    around = [folder for folder in map(Path.resolve, deployment.registry) if own.is_relative_to(folder)]
+    inside = {path for path in files if any(map(path.is_relative_to, around))} if around else ()
+    return sorted(Path(os.path.relpath(path, own)).as_posix() for path in inside)
 
 
 def unseen_problems(application: ApplicationSource, deployment: Deployment) -> Iterator[Diagnostic]:

@@ -142,12 +142,12 @@ def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) ->
     stderr.write(format_text(problems))
     if has_errors(problems):
         return Exit.PROBLEMS
-    stdout.write(json.dumps(_own_contexts(builds, source, deployment, options.contexts), indent=2) + "\n")
+    stdout.write(json.dumps(_own_contexts(builds, source, deployment, options.contexts, stderr), indent=2) + "\n")
     return Exit.OK
 
 
 def _own_contexts(
-    builds: dict[str, Any], source: ApplicationSource, deployment: Deployment, folder: Path | None
+    builds: dict[str, Any], source: ApplicationSource, deployment: Deployment, folder: Path | None, stderr: TextIO
 ) -> dict[str, Any]:
     """The same builds with contexts of their own in a folder; raises UsageError where it cannot be made."""
     if folder is None:
@@ -158,7 +158,9 @@ def _own_contexts(
         written = compose_paths.unescaped(builds)
         hidden = unseen.folders(source, deployment)
         for root in source.paths.roots:
-            hidden += files_of_tests(root.resolve(), source.folder.resolve(), hidden)
+            found = files_of_tests(root.resolve(), source.folder.resolve(), hidden)
+            hidden += found.paths
+            stderr.write(f"{found.problem}\n" if found.problem else "")
         written["services"] = own_contexts(written["services"], hidden, own.resolve())
     except (HiddenContext, OSError, shutil.Error) as error:
         raise UsageError(f"--contexts: {error}") from error

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dodo_dsl import package_data, source
+from dodo_dsl.application import unseen
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounted_folders import large_folders
 from dodo_dsl.check import world
@@ -67,7 +68,7 @@ def build(
         return Compiled(Suite(()), {}), [problem]
     tree = functools.cache(copies)  # tests share maps and recordings
     imports = _import_paths(deployment, out / "test")
-    limits, hidden = _limits(application, deployment), _hidden(application, deployment)
+    limits, hidden = _limits(application, deployment), unseen.below(application, deployment)
 
     @functools.cache
     def rewritten(
@@ -102,6 +103,8 @@ def build(
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
+    if more := unseen.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
+        plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
     of_copies = large_folders(application, [*deployment.registry, *deployment.services])
     of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
     problems = [
@@ -147,13 +150,6 @@ def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLi
         for path in limits.reads
     ]
     return replace(limits, reads=tuple(reads))
-
-
-def _hidden(application: ApplicationSource, deployment: Deployment) -> tuple[str, ...]:
-    """Folders with tests, maps and truths within the application's own folder, relative to it."""
-    own = application.folder.resolve()
-    found = {folder.resolve() for folder in (*deployment.registry, *deployment.services)}
-    return tuple(sorted(path.relative_to(own).as_posix() for path in found if path != own and path.is_relative_to(own)))
 
 
 def _import_paths(deployment: Deployment, folder: Path) -> tuple[str, ...]:
@@ -202,6 +198,8 @@ class _Builder:
         self.rewritten = rewritten
         self.imports = imports
         self.files: set[FileCopy] = set()
+        self.named: set[Path] = set()
+        """Files that the spec names, or a folder does that it names."""
         self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
@@ -370,9 +368,13 @@ class _Builder:
         path = value.path or Path()
         root = self.spec.location.root.resolve()
         try:
-            self.files.update(self.tree(path, root))
+            found = self.tree(path, root)
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
+        else:
+            self.files.update(found)
+            if not self.application.folder.resolve().is_relative_to(path.resolve()):
+                self.named.update(copy.source for copy in found)
         return Flag(parameter.name, path.relative_to(root).as_posix(), "path")
 
 

@@ -39,15 +39,18 @@ def env_file_findings(application: Application, paths: HostPaths, known: Mapping
                 yield AccessFinding(("services", service.name, "env_file", item), problem)
 
 
-def hidden_folders(application: Application, folder: Path, report: Path) -> list[Path]:
-    """Folders with tests, compiled tests, reports, history, DoDo's state and caches, as far as they are there."""
+def hidden_paths(application: Application, folder: Path, report: Path) -> list[Path]:
+    """Folders with tests, compiled tests, reports, history, DoDo's state and caches, as far as they are there.
+
+    So are files that tests read, where the application's folder is one of tests.
+    """
     paths = application_paths(application, folder)
     found = [paths.folder / path for path in application.hidden]
     found += [path for own in (folder.resolve(), report.resolve()) if (path := _holder(own, paths.folder))]
     found += [folder.resolve().parent / SHARED] if folder.resolve().parent == paths.folder else []
     found += [root / ".git" for root in paths.roots]
     found += [own for own in _own_folders() if any(own.is_relative_to(root) for root in paths.roots)]
-    return [Path(os.path.realpath(path)) for path in found if path.is_dir()]
+    return [Path(os.path.realpath(path)) for path in found if path.exists()]
 
 
 def _own_folders() -> Iterator[Path]:

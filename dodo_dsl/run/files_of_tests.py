@@ -3,9 +3,13 @@
 These are specs and what they name, maps, recordings, compiled tests and reports.
 """
 
+import functools
+import json
 import os
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
@@ -16,21 +20,44 @@ from dodo_dsl.outcome import NEXT_REPORT
 MOST_FOLDERS = 20_000
 """That are looked into; a registry is not searched any further either."""
 _SPEC, _RECORDING, _MAP, _RESULTS = ".dodo.yml", ".rec", "map.json", "results.json"
-_MARKS: Mapping[str, bytes] = {_RESULTS: b'"dodo": "results"', PLAN_FILE: b'"dodo": "plan"', _MAP: b'"model"'}
-"""What DoDo's files of these names hold in their first bytes; an application may have others."""
+_MARKS: Mapping[str, bytes] = {_RESULTS: b'"dodo": "results"', PLAN_FILE: b'"dodo": "plan"'}
+"""What DoDo's output of these names holds in its first bytes; an application may have other files of these names."""
+MOST_IN_FOLDER = 100
+"""Files that are hidden one by one in a folder; beyond that, the whole folder is."""
+MOST_HIDDEN = 1_000
+"""Files and folders that a sandbox hides: bubblewrap takes 9,000 words, some four for each."""
+MOST_BYTES = 1 << 16
+"""Of their paths, which go to the sandbox in one message."""
 _ENVIRONMENT = "pyvenv.cfg"
 _HEAD = 4096
-_DATA = {".json", ".rec", ".obj", ".mtl", ".png", ".jpg", ".jpeg", ".mp4", ".yml", ".yaml", ".md"}
+_OF_MAPS = {".json", ".obj", ".mtl", ".png", ".jpg", ".jpeg", ".md"}
+_OF_RECORDINGS = {_RECORDING, ".mp4", ".md"}
+_DATA = _OF_MAPS | _OF_RECORDINGS | {".csv", ".yml", ".yaml"}
+_PLACEHOLDERS = re.compile(r"(\$\{[^}]*\}|\*)+")
 _WORD = re.compile(r"""[^\s'"\[\]{},:#]+""")
 
 
-def files_of_tests(folder: Path, own: Path, known: Collection[Path] = ()) -> list[Path]:
+@dataclass(frozen=True)
+class Found:
+    """Files and folders of tests; ``problem`` tells that there may be more of them, and is empty else."""
+
+    paths: tuple[Path, ...]
+    problem: str = ""
+
+
+def files_of_tests(folder: Path, own: Path, known: Collection[Path] = ()) -> Found:
     """Files and folders of tests below a folder, by their real paths, but for those in ``known`` folders.
 
     None is ``own`` or holds it, which is the application's folder: what a test has there itself is named one by one.
+    A folder is searched once, until ``forget``.
     """
+    return _files_of_tests(folder, own, frozenset(known))
+
+
+@functools.lru_cache(maxsize=64)
+def _files_of_tests(folder: Path, own: Path, passed: frozenset[Path]) -> Found:
     found: list[Path] = []
-    left, seen, passed = [folder], 0, frozenset(known)
+    left, seen = [folder], 0
     while left and seen < MOST_FOLDERS:
         place, seen = left.pop(), seen + 1
         if place in passed:
@@ -44,13 +71,34 @@ def files_of_tests(folder: Path, own: Path, known: Collection[Path] = ()) -> lis
         if not own.is_relative_to(place) and _is_of_tests(place, files, folders):
             found.append(place)
             continue
-        found += [place / name for name in files if name.endswith((_SPEC, _RECORDING)) or _is_marked(place, name)]
+        found += [place / name for name in files if name.endswith((_SPEC, _RECORDING)) or _is_ours(place, name)]
         if _is_report(place, files):
             left += [place / name for name in folders if not _is_test_of_report(place / name)]
             found += [place / name for name in folders if _is_test_of_report(place / name)]
         else:
             left += [place / name for name in folders if name != ".git"]
-    return list(dict.fromkeys(found))
+    what = f"'{folder}' holds more than {MOST_FOLDERS:,} folders: files of tests in the others are not hidden from the"
+    problem = f"{what} application; keep tests in a folder of theirs (registry in dodo.yml)" if left else ""
+    return Found(tuple(dict.fromkeys(found)), problem)
+
+
+def forget() -> None:
+    """Folders are searched anew, as by another run."""
+    _files_of_tests.cache_clear()
+
+
+def in_few(paths: Sequence[Path], own: Path) -> list[Path]:
+    """The paths with whole folders where many files are hidden, but for ``own``; raises ValueError for too many."""
+    counts = Counter(path.parent for path in paths)
+    full = {folder for folder, count in counts.items() if count > MOST_IN_FOLDER and not own.is_relative_to(folder)}
+    found = [*(path for path in paths if not full.intersection(path.parents)), *sorted(full)]
+    if len(found) > MOST_HIDDEN or sum(len(json.dumps(str(path))) for path in found) > MOST_BYTES:
+        what = f"{len(found):,} files and folders of tests lie among the application's own in '{own}'"
+        way_out = "keep them in a folder of theirs (registry in dodo.yml)"
+        raise ValueError(
+            f"{what}, and a sandbox hides at most {MOST_HIDDEN:,} with {MOST_BYTES:,} bytes of paths: {way_out}"
+        )
+    return found
 
 
 def _entries(folder: Path) -> tuple[list[str], list[str]]:
@@ -69,15 +117,35 @@ def _entries(folder: Path) -> tuple[list[str], list[str]]:
 
 
 def _is_of_tests(place: Path, files: list[str], folders: list[str]) -> bool:
-    """Whether a folder is a report, a compiled test, a map, or holds specs or recordings and nothing but data."""
+    """Whether a folder is a report or a compiled test, or holds a map, specs or recordings and nothing else."""
     if place.name.startswith(NEXT_REPORT) or any(_is_marked(place, name) for name in files):
         return True
-    is_data = not folders and all(Path(name).suffix.lower() in _DATA for name in files)
-    return is_data and any(name.endswith((_SPEC, _RECORDING)) for name in files)
+    kinds = {Path(name).suffix.lower() for name in files}
+    if folders or not kinds <= _DATA:
+        return False
+    if any(name.endswith(_SPEC) for name in files):
+        return True
+    return (_RECORDING in kinds <= _OF_RECORDINGS) or (kinds <= _OF_MAPS and _MAP in files and _is_map(place))
+
+
+def _is_ours(place: Path, name: str) -> bool:
+    return _is_marked(place, name) or (name == _MAP and _is_map(place))
 
 
 def _is_marked(place: Path, name: str) -> bool:
     return name in _MARKS and _MARKS[name] in _head(place / name)
+
+
+def _is_map(place: Path) -> bool:
+    """Whether the folder's ``map.json`` has what OpenDLV's maps have."""
+    try:
+        raw = json.loads(regular_file.content(place / _MAP))
+    except (OSError, ValueError, RecursionError):
+        return False
+    models = raw.get("model") if isinstance(raw, dict) else None
+    return isinstance(models, list) and all(
+        isinstance(model, dict) and not model.keys().isdisjoint(("instances", "frames")) for model in models
+    )
 
 
 def _is_report(place: Path, files: list[str]) -> bool:
@@ -108,10 +176,19 @@ def _named(spec: Path, folder: Path, own: Path) -> Iterator[Path]:
             section = line.split(":", 1)[0]
         if section == "application":
             continue
-        for word in _WORD.findall(line):
-            path = _data(spec.parent / word)
+        for path in map(_data, _paths(spec.parent, line)):
             if path and path.is_relative_to(folder) and not own.is_relative_to(path):
                 yield path
+
+
+def _paths(folder: Path, line: str) -> Iterator[Path]:
+    """What the words of a line may name; a placeholder as ``${matrix.map}`` stands for whatever is there."""
+    has_placeholders = "${" in line
+    for word in _WORD.findall(_PLACEHOLDERS.sub("*", line) if has_placeholders else line):
+        if not has_placeholders or "*" not in word:
+            yield folder / word
+        elif any(map(str.isalnum, word)) and "\0" not in word and not word.startswith("/"):
+            yield from (path for path in folder.glob(word) if Path(word).suffix or path.is_dir())
 
 
 def _data(path: Path) -> Path | None:

@@ -8,7 +8,7 @@ import pytest
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
+from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_paths, secrets_of
 
 FOLDER = Path("generated/t")
 
@@ -58,7 +58,7 @@ def test_the_whole_report_is_hidden_also_while_the_next_one_is_written(tmp_path:
     team = tmp_path / "team"
     (team / report).mkdir(parents=True)
     made = Application(".", (ApplicationService("driver"),))
-    assert hidden_folders(made, team, team / report) == [team / "dodo-report"]
+    assert hidden_paths(made, team, team / report) == [team / "dodo-report"]
 
 
 def test_own_state_and_caches_in_the_repository_are_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,7 +67,7 @@ def test_own_state_and_caches_in_the_repository_are_hidden(tmp_path: Path, monke
         (team / name / "dodo").mkdir(parents=True)
         monkeypatch.setenv(variable, str(team / name))
     made = Application(".", (ApplicationService("driver"),))
-    assert hidden_folders(made, team, tmp_path / "report") == [team / ".state" / "dodo", team / ".cache" / "dodo"]
+    assert hidden_paths(made, team, tmp_path / "report") == [team / ".state" / "dodo", team / ".cache" / "dodo"]
 
 
 def test_files_that_tests_share_are_hidden_with_the_tests(tmp_path: Path) -> None:
@@ -76,5 +76,5 @@ def test_files_that_tests_share_are_hidden_with_the_tests(tmp_path: Path) -> Non
         (tmp_path / name).mkdir(parents=True)
     made = Application(folder="..", services=())
     elsewhere = tmp_path.parent / "report"
-    assert hidden_folders(made, tmp_path / "dil-a", elsewhere) == [tmp_path / "dil-a", tmp_path / "_files"]
-    assert hidden_folders(replace(made, folder="../.."), tmp_path / "out/dil-a", elsewhere) == [tmp_path / "out"]
+    assert hidden_paths(made, tmp_path / "dil-a", elsewhere) == [tmp_path / "dil-a", tmp_path / "_files"]
+    assert hidden_paths(replace(made, folder="../.."), tmp_path / "out/dil-a", elsewhere) == [tmp_path / "out"]

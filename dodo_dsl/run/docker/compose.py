@@ -24,7 +24,7 @@ from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.trace import traced
-from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_folders, secrets_of
+from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_paths, secrets_of
 from dodo_dsl.run.docker import own_images
 from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
 from dodo_dsl.run.docker.builds import is_built, private_images
@@ -74,7 +74,7 @@ class Compose:
             raise BackendError(f"docker compose rejects the compiled test: {why}")
         config = compose_paths.unescaped(json.loads(out))
         self._refuse(compiled_findings(config, self._test))
-        self._refuse(_unseen(config, hidden_folders(self.plan.application, self.folder, self.report)))
+        self._refuse(_unseen(config, hidden_paths(self.plan.application, self.folder, self.report)))
         self._secrets = config.get("secrets") or {}
         self._take(config)
 
@@ -157,9 +157,9 @@ class Compose:
 
     def _builds(self, folder: Path) -> Path:
         """Writes a compose file with the application's builds alone, which get nothing that it never sees."""
-        hidden = hidden_folders(self.plan.application, self.folder, self.report)
+        hidden = hidden_paths(self.plan.application, self.folder, self.report)
         for root in self._paths.roots:
-            hidden += files_of_tests(root, self._paths.folder, hidden)
+            hidden += files_of_tests(root, self._paths.folder, hidden).paths
         services = own_contexts({n: s for n, s in self.services.items() if is_built(s)}, hidden, folder)
         for name, service in services.items():
             if image := self._images.get(image_variable(name)):
@@ -176,6 +176,9 @@ class Compose:
         so do the application's services what hides the tests from them.
         """
         code, problem = 1, "no subnet is free"
+        masked, unsearched = await asyncio.to_thread(self._masks)
+        for text in unsearched:
+            self._say(text)
         with tempfile.TemporaryDirectory(prefix="dodo-key-") as folder:
             keys = Path(folder) / "keys.compose.json"
             given: dict[str, Any] = {
@@ -183,7 +186,7 @@ class Compose:
                 for service in self.plan.services
                 if service.name in self.services
             }
-            given.update(compose_paths.escaped_values(self._masks()))
+            given.update(compose_paths.escaped_values(masked))
             keys.write_text(json.dumps({"services": given}), encoding="utf-8")
             files = os.pathsep.join([*self._files(Path(folder)), str(keys)])
             for subnet in subnets:
@@ -199,12 +202,18 @@ class Compose:
         """The project's compose files; others than the compiled ones may be written into a private folder."""
         return [f"{layer}.compose.yml" for layer in LAYERS]
 
-    def _masks(self) -> dict[str, Any]:
-        """What hides the tests from the application's services, and stands for what is not there."""
-        hidden = hidden_folders(self.plan.application, self.folder, self.report)
+    def _masks(self) -> tuple[dict[str, Any], list[str]]:
+        """What hides the tests from the application's services, and stands for what is not there.
+
+        With it, sentences on folders that are too large to be searched.
+        """
+        problems: list[str] = []
+        hidden = hidden_paths(self.plan.application, self.folder, self.report)
         for root in self._paths.roots:
             ours = files_of_tests(root, self._paths.folder, hidden)
-            hidden += [path for path in ours if path.is_dir()]  # the engine masks no single file
+            hidden += ours.paths
+            problems += [ours.problem] if ours.problem else []
+        hidden = [path for path in hidden if path.is_dir()]  # the engine masks no single file
         every = (*(service.name for service in self.plan.application.services), FILES)
         names = [name for name in every if name in self.services]
         found = {
@@ -214,7 +223,7 @@ class Compose:
             ]
             for name in names
         }
-        return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}
+        return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}, problems
 
     async def _run(
         self, *words: str, subnet: str = "", log: Path | None = None, project: str = "", files: str = ""
@@ -247,7 +256,7 @@ class Compose:
 
 def _unseen(config: dict[str, Any], hidden: Iterable[Path]) -> Iterator[AccessFinding]:
     """Configs and secrets that are files of tests, their output or ``.git``; mounts of these are masked."""
-    places = list(hidden)
+    places = [place for place in hidden if place.is_dir()]
     for key in ("configs", "secrets"):
         for name, about in (config.get(key) or {}).items():
             file = about.get("file") if isinstance(about, dict) else None

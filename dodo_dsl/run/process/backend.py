@@ -12,8 +12,8 @@ from typing import Any
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run.application_files import application_paths, hidden_folders
-from dodo_dsl.run.files_of_tests import files_of_tests
+from dodo_dsl.run.application_files import application_paths, hidden_paths
+from dodo_dsl.run.files_of_tests import Found, files_of_tests, in_few
 from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
@@ -32,6 +32,8 @@ from dodo_dsl.run.services.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
+MOST_NAMED = 5
+"""Hidden files that a note names."""
 _OF_SANDBOX = ("bwrap:", "setpriv:")
 """How lines of the programs begin that confine an application's."""
 
@@ -72,6 +74,7 @@ class ProcessBackend:
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._conditions = Conditions(plan.application.services, has_health=False)
+        self._is_noted = False
         self._turns: dict[str, asyncio.Task[None]] = {}
         """The services of the application that wait for the end of others."""
         self._asked: dict[str, asyncio.Future[Any]] = {}
@@ -120,6 +123,8 @@ class ProcessBackend:
             self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
             self._conditions.failed(exited)
             return
+        if code > 0 and exited in {service.name for service in self.plan.application.services}:
+            self._note_hidden()
         if used:
             most = self.plan.application.limits.memory
             text = f"application service '{exited}' used {used / 1e6:,.0f} MB of memory, at most {most / 1e6:,.0f}"
@@ -127,7 +132,27 @@ class ProcessBackend:
         self._events.put_nowait(Exited(exited, code, out_of_memory=used > 0))
         self._conditions.ended(exited, code)
 
+    def _note_hidden(self) -> None:
+        """Notes what the application's folder has and the application did not find there, once."""
+        if self._is_noted or self.is_on_host or not self._is_confined:
+            return
+        self._is_noted = True
+        own = application_paths(self.plan.application, self._folder).folder
+        named = [path for path in self._known if path.is_file()]
+        reads = {(own / Path(path).expanduser()).resolve() for path in self.plan.application.limits.reads}
+        paths = {path for path in (*named, *self._found.paths) if path.is_relative_to(own)} - reads
+        found = sorted(path.relative_to(own).as_posix() for path in paths)
+        if found:
+            more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+            shown = ", ".join(f"'{name}'" for name in found[:MOST_NAMED])
+            text = f"hidden from the application in its folder, as files of tests: {shown}{more}"
+            self._events.put_nowait(Noted(f"{text}; 'sandbox: read' in dodo.yml shows what is the application's own"))
+
     async def start(self, layer: str) -> dict[str, bool]:
+        if layer == "application" and self._is_confined and not self.is_on_host:
+            problem = (await asyncio.to_thread(lambda: self._found)).problem
+            if problem:
+                self._events.put_nowait(Noted(problem))
         commands = []
         for service in self._services(layer):
             try:
@@ -170,8 +195,8 @@ class ProcessBackend:
         self._pids[command.name] = asyncio.get_running_loop().create_future()
         hidden = command.masked if self.isolation == "host" and self.is_apart else ()
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module, "masked": hidden}
-        message = {"do": "start", "id": command.name, "confined": self._confined(command), **words}
         try:
+            message = {"do": "start", "id": command.name, "confined": self._confined(command), **words}
             self._sandbox.send({**message, "env": changes(own_environment(), command.environment)}, (output.writer,))
         except ValueError as error:
             self._events.put_nowait(Unstartable(command.name, str(error)))
@@ -194,9 +219,17 @@ class ProcessBackend:
     def _hidden(self) -> list[Path]:
         """Files of tests, and what lies around the application's folder: its repository, the folders of this test."""
         paths = application_paths(self.plan.application, self._folder)
-        known = hidden_folders(self.plan.application, self._folder, self.report)
-        found = files_of_tests(paths.folder, paths.folder, known)
-        return [*known, *found, *paths.roots, self._folder.resolve(), self.report.resolve()]
+        ours = in_few([*self._known, *self._found.paths], paths.folder)
+        return [*ours, *paths.roots, self._folder.resolve(), self.report.resolve()]
+
+    @functools.cached_property
+    def _known(self) -> list[Path]:
+        return hidden_paths(self.plan.application, self._folder, self.report)
+
+    @functools.cached_property
+    def _found(self) -> Found:
+        own = application_paths(self.plan.application, self._folder).folder
+        return files_of_tests(own, own, self._known)
 
     async def next_event(self) -> Event:
         return await self._events.get()
@@ -241,6 +274,7 @@ class ProcessBackend:
         return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
+        self._is_noted = True  # what ends now was told to end
         for turn in self._turns.values():
             turn.cancel()
         if keep and (pid := self._sandbox.pid):

@@ -7,7 +7,7 @@ import pytest
 
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.plan.model import Application
-from dodo_dsl.run.application_files import hidden_folders
+from dodo_dsl.run.application_files import hidden_paths
 from dodo_dsl.run.docker.masks import absent, masks
 
 HIDDEN = [Path("/team/tests"), Path("/team/.git")]
@@ -43,14 +43,14 @@ def test_folders_of_the_tests(tmp_path: Path) -> None:
     for name in ("tests", "generated/t", "dodo-report/t", ".git", "maps"):
         (tmp_path / name).mkdir(parents=True)
     application = Application("../..", (), hidden=("tests", "gone"))
-    hidden = hidden_folders(application, tmp_path / "generated" / "t", tmp_path / "dodo-report" / "t")
+    hidden = hidden_paths(application, tmp_path / "generated" / "t", tmp_path / "dodo-report" / "t")
     assert hidden == [tmp_path / name for name in ("tests", "generated", "dodo-report", ".git")]
 
 
 def test_a_report_elsewhere_needs_no_mask(tmp_path: Path) -> None:
     (tmp_path / "team" / "generated" / "t").mkdir(parents=True)
     application = Application("../..", ())
-    assert hidden_folders(application, tmp_path / "team" / "generated" / "t", tmp_path / "report") == [
+    assert hidden_paths(application, tmp_path / "team" / "generated" / "t", tmp_path / "report") == [
         tmp_path / "team" / "generated"
     ]
 

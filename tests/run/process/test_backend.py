@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run import engine
+from dodo_dsl.run import engine, files_of_tests
 from dodo_dsl.run.services import conditions
 from tests.run.desk import processes_with
 from tests.run.helpers import AFTER_START, BEGUN, PASS, READY, STARTED, WAIT, Bench
@@ -202,3 +202,37 @@ def test_services_are_waited_for_until_they_are_ready(host: Bench, monkeypatch: 
     assert outcome.outcome == "passed"
     assert outcome.setup_s is not None
     assert outcome.setup_s >= 0.5
+
+
+IS_THERE = """
+def is_there(name):
+    try:
+        return open(name).read() == "there"
+    except OSError:
+        return False
+"""
+
+
+def test_what_is_hidden_in_the_applications_folder_is_absent_and_named_when_it_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But what dodo.yml names. Folders beyond the limit are told, too."""
+    (tmp_path / "aaa").mkdir()  # the seventh, after the application's own and five others
+    monkeypatch.setattr(files_of_tests, "MOST_FOLDERS", 6)
+    bench = Bench(tmp_path, "network")
+    names = ("truths/a.csv", "truths/own.txt", "data/a.rec", "data/own.yml", "data/own.rec", "kept/a.rec")
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("there")
+    look = f"{IS_THERE}os.chdir({str(tmp_path)!r})\nprint([n for n in {names} if is_there(n)])"
+    plan = bench.plan(application=look + "\nsys.exit(7)", judge=READY + WAIT)
+    limits = replace(plan.application.limits, reads=("data/own.rec", "kept"))
+    plan = replace(plan, application=replace(plan.application, hidden=("truths/a.csv",), limits=limits))
+    (outcome,) = bench.run(plan)
+    assert bench.log(plan, "application.app") == "['truths/own.txt', 'data/own.yml', 'data/own.rec', 'kept/a.rec']\n"
+    unsearched, note = [note for note in outcome.notes if "hidden" in note]
+    assert "holds more than 6 folders" in unsearched
+    assert note == (
+        "hidden from the application in its folder, as files of tests: 'data/a.rec', 'truths/a.csv'; "
+        "'sandbox: read' in dodo.yml shows what is the application's own"
+    )

@@ -87,9 +87,9 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
 
 
 def _mask(path: str, read: Sequence[str], mounts: Mounts) -> list[str]:
-    """Nothing in the place of a file or folder, but what may be read in it."""
+    """Nothing in the place of a file or folder, but what may be read in it, or is that itself."""
     if not Path(path).is_dir():
-        return ["--ro-bind", os.devnull, path]
+        return [] if path in read else ["--ro-bind", os.devnull, path]
     inside = [one for one in read if Path(one).is_relative_to(path)]
     parents = [one for one in _parents(inside) if Path(one).is_relative_to(path) and one != path]
     return ["--tmpfs", path, *_folders(parents), *_read_only(inside, mounts), "--remount-ro", path]
@@ -105,13 +105,13 @@ def _read_only(paths: Iterable[str], mounts: Mounts) -> list[str]:
 
 def _outermost(paths: Iterable[str], shown: Iterable[str]) -> list[str]:
     """Paths without those that lie in another one and in nothing ``shown`` there: they are hidden already."""
-    found: list[str] = []
+    found: dict[str, None] = {}
     for path in sorted(set(paths), key=lambda one: Path(one).parts):  # what holds others comes before them
-        holds = [one for one in shown if one != path and Path(path).is_relative_to(one)]
-        outer = [other for other in found if Path(path).is_relative_to(other)]
+        outer = [other for other in map(str, Path(path).parents) if other in found]
+        holds = [one for one in shown if outer and one != path and Path(path).is_relative_to(one)]
         if all(any(Path(one).is_relative_to(other) for one in holds) for other in outer):
-            found.append(path)
-    return found
+            found[path] = None
+    return list(found)
 
 
 def _parents(paths: Iterable[str]) -> list[str]:
