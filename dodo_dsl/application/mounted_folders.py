@@ -22,7 +22,7 @@ def missing_folders(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Mounts of what is not there, and that the engine is told not to make; others are empty folders of the test."""
     for shown in _of_repository(application):
         if shown.is_required and not os.path.lexists(application.paths.whole(shown.source)):
-            message = f"there is no file or folder '{shown.source}', and 'create_host_path: false' asks for it"
+            message = f"there is no file or folder '{shown.source}', and 'create_host_path: false' requires it"
             yield _problem(shown, message, "create it, or remove 'create_host_path'; paths are relative to this file")
 
 

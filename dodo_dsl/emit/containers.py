@@ -70,7 +70,7 @@ def containers(plan: Plan, layer: str) -> list[Container]:
 _COUNT = """\
 files=0 size=0
 fits() {
-  own=$(find "$1" | head -n %(most)s | wc -l); files=$((files + own))
+  own=$(find "$1" -mindepth 1 | head -n %(most)s | wc -l); files=$((files + own))
   [ $files -le %(files)s ] || fail "$2" "at least $own files" "%(files)s" copied-files
   own=$(du -sk --apparent-size "$1" | cut -f1); size=$((size + own))
   [ $size -le %(size)s ] || fail "$2" "$((own * 128 / 125000)) MB" "%(shown)s MB" copies

@@ -54,7 +54,7 @@ class ApplicationService:
     """A service under test; ``process`` starts it without containers, None when only its image can.
 
     ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``. ``after`` are
-    the services for which it waits, each with its condition.
+    the services for which it waits, each with its condition; without the ``optional`` ones of them it starts, too.
     """
 
     name: str
@@ -67,6 +67,7 @@ class ApplicationService:
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     after: dict[str, str] = field(default_factory=dict)
+    optional: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import re
+from graphlib import CycleError, TopologicalSorter
 from typing import Any, get_args
 
 import orjson
@@ -125,16 +126,26 @@ def _problem(plan: Plan) -> str:
         "access": _is_access(plan.application.access),
         "resources": plan.resources is None or is_valid(plan.resources),
         "message": all(isinstance(m, str) for s in plan.application.services for m in (*s.inputs, *s.outputs)),
-        "condition": all(_is_after(s.after, plan.application) for s in plan.application.services),
+        "condition": all(_is_after(s, plan.application) for s in plan.application.services),
+        "order of starts: services wait for one another": not _is_cyclic(plan.application),
         "environment file": all(isinstance(f, str) for s in plan.application.services for f in s.env_files),
     }
     return next((name for name, holds in rules.items() if not holds), "")
 
 
-def _is_after(after: dict[str, str], application: Application) -> bool:
+def _is_after(service: ApplicationService, application: Application) -> bool:
     names = {service.name for service in application.services}
     conditions = {STARTED, HEALTHY, COMPLETED}
-    return all(name in names and c in conditions for name, c in after.items())
+    known = all(name in names and c in conditions for name, c in service.after.items())
+    return known and all(name in service.after for name in service.optional)
+
+
+def _is_cyclic(application: Application) -> bool:
+    try:
+        tuple(TopologicalSorter({s.name: s.after for s in application.services}).static_order())
+    except CycleError:
+        return True
+    return False
 
 
 def _words(plan: Plan) -> tuple[str, ...]:
@@ -183,5 +194,5 @@ def _service(raw: dict[str, Any]) -> PlannedService:
 def _application_service(raw: dict[str, Any]) -> ApplicationService:
     process = raw["process"]
     words = {"process": None if process is None else tuple(process), "command": tuple(raw["command"])}
-    lists = {key: tuple(raw[key]) for key in ("env_files", "inputs", "outputs")}
+    lists = {key: tuple(raw[key]) for key in ("env_files", "inputs", "outputs", "optional")}
     return ApplicationService(**{**raw, **words, **lists})

@@ -25,11 +25,10 @@ from dodo_dsl.run.protocol import (
     VerdictEvent,
 )
 from dodo_dsl.run.run_state import Ended, RunState
+from dodo_dsl.run.services import conditions
 from dodo_dsl.run.standing import Standing, standing
 
 READY_PATIENCE_S = READY_S
-WAITS_PATIENCE_S = 3600.0
-"""For one that waits for others: the backend knows better for which, and how long."""
 LAST_TIME_PATIENCE_S = 2.0
 BEGIN_PATIENCE_S = 2.0
 EXPLAIN_PATIENCE_S = 5.0
@@ -186,7 +185,7 @@ class Engine:
         begin = self._now()
         patience = dict.fromkeys(waits, READY_PATIENCE_S)
         patience |= {s.name: READY_PATIENCE_S + s.setup_s for s in self.plan.services if s.name in waits}
-        patience |= {s.name: WAITS_PATIENCE_S for s in self.plan.application.services if s.after and s.name in waits}
+        patience |= {s.name: self._longest_s(s.name) for s in self.plan.application.services if s.after}
         while left := waits - self.state.ready:
             late = min(left, key=lambda name: (patience[name], name))
             event = await self._next(begin + patience[late])
@@ -194,6 +193,11 @@ class Engine:
                 self.state.end("error", f"service '{late}' was not ready within {patience[late]:g} s", late)
             else:
                 self.state.take(event)
+
+    def _longest_s(self, name: str) -> float:
+        """For one that waits for others, and then for its own health: beyond what the backend gives it."""
+        services = self.plan.application.services
+        return conditions.longest_s(services, name) + conditions.LONGEST_S + READY_PATIENCE_S
 
     async def _next(self, deadline: float) -> Event | None:
         try:

@@ -184,7 +184,9 @@ class RunState:
         layer, when = self.layer_of.get(service, "application"), self._when()
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
         if layer == "application":
-            is_done = code == 0 and (self.input_ended or service in conditions.one_off(self.plan.application.services))
+            is_done = (code == 0 and self.input_ended) or conditions.may_end(
+                self.plan.application.services, service, code
+            )
             if code in _KILLED and not out_of_memory and self.memory_kills() > self._killed_before:
                 self.notes.append(MEMORY_KILL)
             if not is_done and not self._all_verdicts_given():

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.bus.session import Session, SessionError
 from dodo_dsl.opendlv.messages.codec import MessageError
 from services.base.clock import Clock
 from services.base.evaluator import UnjudgeableError
@@ -179,8 +179,10 @@ class Loop:
         if self._world.holds(envelope):
             if self.clock.relays:
                 return encode_frame(envelope)
-            if self.members is not None:
-                return self.members.send(envelope)
+            if self.members is None:
+                name = self.session.messages.name(envelope.data_type)
+                raise SessionError(f"'{name}' must not come to the bus, and the services that get it are not known")
+            return self.members.send(envelope)
         return self.session.send_envelope(envelope)
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:

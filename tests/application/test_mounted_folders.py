@@ -84,12 +84,24 @@ def test_what_copies_counts_first(names: tuple[str, ...], lines: str, team: Path
         assert ran.stdout.startswith(f"'./{names[-1]}' holds ") and ran.stdout.endswith(f"{WAY_OUT.format(lines)}\n")
 
 
+def test_the_folder_itself_does_not_count_as_one_of_its_files(team: Path, tmp_path: Path) -> None:
+    """Neither where they are counted before a test, nor by its program."""
+    (tmp_path / "to").mkdir()
+    for most, code in ((11, 0), (10, 1)):
+        limits = replace(LIMITS, copied_files=most)
+        assert bool(told(team, limits, "./many:/app")) == bool(code)
+        script = copy_command(Application("../..", (), copies={"files-0": "../../many"}, limits=limits))
+        script = script.replace("/from/files-0", str(team / "many")).replace("/to/files-0", str(tmp_path / "to"))
+        script = script.replace("touch /run/copied", "true").replace("sleep infinity", "true").replace("$$", "$")
+        assert subprocess.run(["sh", "-c", script], capture_output=True, check=False).returncode == code
+
+
 def test_folders_that_are_asked_for_and_not_there(team: Path) -> None:
     """Of others the test has an empty one, as compose makes it."""
     long = "{type: bind, source: ./gone, target: /g, bind: {create_host_path: %s}}"
     for word, count in (("false", 1), ("true", 0)):
         found = problems(f"services: {{a: {{image: x, command: --cid=1, volumes: [{long % word}]}}}}\n", team)
         assert [p.message for p in found] == [
-            "there is no file or folder './gone', and 'create_host_path: false' asks for it"
+            "there is no file or folder './gone', and 'create_host_path: false' requires it"
         ] * count
     assert not (team / "gone").exists()

@@ -20,7 +20,7 @@ from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.services import conditions
 from tests.docker.compose import SUBNETS, Crate
 from tests.docker.test_mixed import separate
-from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT
+from tests.run.helpers import BEGUN, PASS, READY, STARTED, WAIT
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
@@ -64,10 +64,21 @@ TABLE: dict[str, tuple[dict[str, Any], str, str]] = {
         "service 'app' waits for 'db' to be healthy (depends_on), but neither the compose file nor the image of 'db' "
         "has a healthcheck",
     ),
+    "own-health": (
+        {
+            "app": (
+                "",
+                "",
+                {"entrypoint": ["sleep", "600"], "command": [], "healthcheck": {**CHECK, "test": ["CMD", "false"]}},
+            )
+        },
+        "error",
+        "service 'app' could not be started: its healthcheck failed",
+    ),
     "never-ends": (
         {"init": (COMPLETED, "sleep 600", {})},
         "error",
-        "service 'app' could not be started: it waits for 'init' to end with exit code 0 (depends_on), which did not "
+        "service 'app' could not be started: it waits for 'init' to end with exit code 0 (depends_on), and it did not "
         "within 9 s",
     ),
 }
@@ -75,11 +86,13 @@ TABLE: dict[str, tuple[dict[str, Any], str, str]] = {
 
 def waiting(crate: Crate, slug: str, scripts: Path, others: Mapping[str, tuple[str, str, dict[str, Any]]]) -> Job:
     """A test whose application waits for other services, each with a condition, a script and keys."""
-    job = separate(crate.job(slug, READY + AFTER_START + PASS, APP, timeout_s=30.0), scripts)
+    job = separate(crate.job(slug, READY + BEGUN + PASS, APP, timeout_s=30.0), scripts)
     path = job.folder / "application.compose.yml"
     content = json.loads(path.read_text())
     app = content["services"]["app"]
     shared = {key: app[key] for key in ("image", "volumes", "stop_grace_period", "depends_on", "ipc")}
+    others = dict(others)
+    app |= others.pop("app", ("", "", {}))[2]
     for name, (_, script, keys) in others.items():
         words = ["sh", "-c", script.replace("$", "$$"), name]
         content["services"][name] = {**shared, "entrypoint": words, **keys}

@@ -95,6 +95,20 @@ def test_wrong_values_of_the_application(key: str, value: Any, problem: str) -> 
     assert f"(wrong {problem})" in refused(found)
 
 
+@pytest.mark.parametrize("after", [("b", "a"), ("c", "a", "b")])
+def test_services_that_wait_for_one_another(after: tuple[str, ...]) -> None:
+    """The first for the first of these, the second for the second, and so on; one that waits for itself, too."""
+    found = document()
+    (service,) = found["application"]["services"]
+    found["application"]["services"] = [
+        {**service, "name": name, "after": {other: "service_started"}}
+        for name, other in zip("abc", after, strict=False)
+    ]
+    assert "(wrong order of starts: services wait for one another)" in refused(found)
+    found["application"]["services"] = [{**service, "after": {service["name"]: "service_completed_successfully"}}]
+    assert "(wrong order of starts: services wait for one another)" in refused(found)
+
+
 @pytest.mark.parametrize("text", ["", "[]", "{}", "null", "[" * 100_000, '{"dodo": "plan", "version": 1}'])
 def test_other_files(text: str) -> None:
     assert refused(text).startswith("not a compiled test (")

@@ -42,6 +42,7 @@ from dodo_dsl.run.protocol import (
     VerdictEvent,
 )
 from dodo_dsl.run.run_state import MEMORY_KILL
+from dodo_dsl.run.services.conditions import LONGEST_S
 from dodo_dsl.run.standing import Standing
 from dodo_dsl.spec.resource_limits import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
@@ -367,6 +368,21 @@ def test_what_happens_during_set_up(case: str) -> None:
     assert (found.outcome, found.reason) == ("error", reason)
     assert (found.setup_s, found.execution_s, backend.calls[-1]) == (None, None, "close")
     assert "begin" not in backend.calls
+
+
+class Waiting(ScriptedBackend):
+    """Its application's services say when they are ready, which they never do."""
+
+    async def start(self, layer: str) -> dict[str, bool]:
+        return dict.fromkeys(await super().start(layer), True)
+
+
+def test_one_that_waits_for_others_has_the_time_that_these_may_take() -> None:
+    services = (ApplicationService("app", after={"db": "service_healthy"}), ApplicationService("db"))
+    tested = plan(application=Application(".", services))
+    reason = f"service 'app' was not ready within {2 * LONGEST_S + READY_PATIENCE_S:g} s"
+    found = outcome(Waiting(tested, {**READY, "application": [(1.0, Ready("db"))]}))
+    assert (found.outcome, found.reason) == ("error", reason)
 
 
 def test_an_application_that_ends_during_set_up_fails() -> None:

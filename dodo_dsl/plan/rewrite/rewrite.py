@@ -139,7 +139,8 @@ def _planned(service: ComposeService, cid: int, application: ApplicationSource) 
         env_files=tuple(file.path for file in service.env_files),
         inputs=_names(service.declared.inputs) if service.declared else (),
         outputs=_names(service.declared.outputs) if service.declared else (),
-        after=_after(raw, application),
+        after=(after := _after(raw, application)),
+        optional=_optional(raw, after),
     )
 
 
@@ -150,6 +151,12 @@ def _after(service: dict[str, Any], application: ApplicationSource) -> dict[str,
     written = {str(n): _condition(how) for n, how in about.items()} if isinstance(about, dict) else {}
     every = {**dict.fromkeys(needed, STARTED), **written}
     return {name: condition for name, condition in every.items() if name in application.services}
+
+
+def _optional(service: dict[str, Any], after: Iterable[str]) -> tuple[str, ...]:
+    about = service.get("depends_on")
+    written = about if isinstance(about, dict) else {}
+    return tuple(n for n in after if isinstance(written.get(n), dict) and written[n].get("required") is False)
 
 
 def _condition(about: Any) -> str:

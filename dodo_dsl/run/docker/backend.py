@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
 from dodo_dsl.run.services.announce import hearers, that_hear
-from dodo_dsl.run.services.conditions import LONGEST_S, Conditions, one_off
+from dodo_dsl.run.services.conditions import LONGEST_S, Conditions, in_turn, one_off, optional
 from dodo_dsl.run.services.service_output import ServiceOutput
 
 _KILLED = 128 + signal.SIGKILL
@@ -86,6 +87,7 @@ class DockerBackend:
         self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self._copied, self._copy_problem = asyncio.Event(), ""
         self._conditions = Conditions(plan.application.services)
+        self._may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
         self._turns: set[asyncio.Task[None]] = set()
         """The services of the application that wait for others."""
         self.left_behind = False
@@ -232,17 +234,17 @@ class DockerBackend:
             )
         waiting = [name for name in names if self._conditions.of(name)]
         await asyncio.gather(*(self._start(name) for name in names if name not in waiting))
-        self._turns |= {asyncio.ensure_future(self._start_in_turn(name)) for name in waiting}
+        self._turns |= {in_turn(self._start_in_turn(name), partial(self._not_started, name)) for name in waiting}
         reports = {name for name in names if layer != "application" or self._compose.has_healthcheck(name)}
-        ready = ({*waiting} | reports) - one_off(self.plan.application.services)
+        ready = ({*waiting} | reports) - self._may_be_ill
         return {name: name in ready for name in names}
 
     async def _start_in_turn(self, name: str) -> None:
-        """Starts a service of the application when what it waits for is so."""
+        """Starts a service of the application when what it waits for is so, and then waits for its own health."""
         after = self._conditions.of(name)
         patience = {other: health_patience_s(self._containers[other]) for other in after if other in self._containers}
         try:
-            why = await self._conditions.unmet(name, patience)
+            why = await self._conditions.unmet(name, patience, lambda text: self._events.put_nowait(Noted(text)))
         except asyncio.CancelledError:
             self._outputs[name].release_writer()
             raise
@@ -252,6 +254,10 @@ class DockerBackend:
         await self._start(name)
         if not self._compose.has_healthcheck(name):
             self._events.put_nowait(Ready(name))
+            return
+        why = await self._conditions.ill(name, health_patience_s(self._containers[name]))
+        if why and name not in self._may_be_ill:
+            self._events.put_nowait(Unstartable(name, why))
 
     def _not_started(self, name: str, why: str) -> None:
         self._outputs[name].release_writer()

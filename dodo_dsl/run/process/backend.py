@@ -27,7 +27,7 @@ from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Ready, Unstartable
 from dodo_dsl.run.services import service_protocol
 from dodo_dsl.run.services.announce import begin_frame, hearers
-from dodo_dsl.run.services.conditions import Conditions, one_off
+from dodo_dsl.run.services.conditions import Conditions, in_turn, one_off
 from dodo_dsl.run.services.service_output import ServiceOutput
 
 LOAD_PATIENCE_S = 2.0
@@ -162,17 +162,21 @@ class ProcessBackend:
         by_name = {command.name: command for command in commands}
         for name in self._conditions.in_order(by_name):
             if self._conditions.waits_for_ends(name):
-                self._turns[name] = asyncio.ensure_future(self._start_in_turn(by_name[name]))
+                failed = functools.partial(self._not_started, name)
+                self._turns[name] = in_turn(self._start_in_turn(by_name[name]), failed)
             else:
                 self._start(by_name[name])
         ready = {*self._turns} - one_off(self.plan.application.services)
         return {name: layer != "application" or name in ready for name in by_name}
 
+    def _not_started(self, name: str, why: str) -> None:
+        self._events.put_nowait(Unstartable(name, why))
+        self._conditions.failed(name)
+
     async def _start_in_turn(self, command: Command) -> None:
         """Starts a service of the application when others have ended."""
-        if why := await self._conditions.unmet(command.name, {}):
-            self._events.put_nowait(Unstartable(command.name, why))
-            self._conditions.failed(command.name)
+        if why := await self._conditions.unmet(command.name, {}, lambda text: self._events.put_nowait(Noted(text))):
+            self._not_started(command.name, why)
         else:
             self._start(command)
 

@@ -15,7 +15,7 @@ from dodo_dsl.run.protocol import Malformed, Noted, VerdictEvent
 from dodo_dsl.run.recorded.test_recording import TestRecording
 from dodo_dsl.run.services import service_protocol
 
-NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG")
+NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG", "DODO_WORLD", "DODO_TOLD", "DODO_TRUTH")
 _TAIL_LINES, _TAIL_WIDTH = 8, 300
 
 

@@ -1,14 +1,16 @@
 """The order in which services of the application start: by the conditions of their ``depends_on``."""
 
 import asyncio
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from typing import Any
 
 from dodo_dsl.plan.model import COMPLETED, HEALTHY, STARTED, ApplicationService
 from dodo_dsl.run.outcomes import how_it_ended
 
 LONGEST_S = 600.0
-"""The longest that a service waits for another one to come true, in s, once that has started."""
+"""The longest that a service waits for a condition to come true, in s, once the other one has started."""
 _ASKED = {STARTED: "start", HEALTHY: "be healthy", COMPLETED: "end with exit code 0"}
+_UNHEALTHY = "is unhealthy"
 
 
 class Conditions:
@@ -18,7 +20,9 @@ class Conditions:
     """
 
     def __init__(self, services: Iterable[ApplicationService], has_health: bool = True) -> None:
+        services = tuple(services)
         self._after = {s.name: {n: _without_health(c, has_health) for n, c in s.after.items()} for s in services}
+        self._optional = {s.name: s.optional for s in services}
         self._known: dict[tuple[str, str], asyncio.Future[str]] = {}
 
     def of(self, name: str) -> Mapping[str, str]:
@@ -27,7 +31,7 @@ class Conditions:
 
     def waits_for_ends(self, name: str) -> bool:
         """Whether a service starts only after another one has ended, directly or through others."""
-        return any(c == COMPLETED or self.waits_for_ends(other) for other, c in self.of(name).items())
+        return any(COMPLETED in self.of(each).values() for each in _chain(self._after, name))
 
     def in_order(self, names: Iterable[str]) -> list[str]:
         """The names, each behind those for which it waits."""
@@ -50,7 +54,7 @@ class Conditions:
         self._decide(name, HEALTHY, "")
 
     def unhealthy(self, name: str) -> None:
-        self._decide(name, HEALTHY, "is unhealthy")
+        self._decide(name, HEALTHY, _UNHEALTHY)
 
     def ended(self, name: str, code: int) -> None:
         self._decide(name, HEALTHY, how_it_ended(code))
@@ -61,10 +65,11 @@ class Conditions:
         for condition in _ASKED:
             self._decide(name, condition, "could not be started")
 
-    async def unmet(self, name: str, patience: Mapping[str, float]) -> str:
+    async def unmet(self, name: str, patience: Mapping[str, float], note: Callable[[str], None]) -> str:
         """Waits until a service may start; why it never may, in a sentence, else empty.
 
-        ``patience`` is how long another service may take to be healthy, in s, where that is not LONGEST_S.
+        ``patience`` is how long another service may take to be healthy, in s, where that is not LONGEST_S. ``note``
+        gets a sentence for each optional service without which it starts.
         """
         for other, asked in self.of(name).items():
             longest = patience.get(other, LONGEST_S) if asked == HEALTHY else LONGEST_S
@@ -72,11 +77,24 @@ class Conditions:
             try:
                 async with asyncio.timeout(longest):
                     why = why or await self._fact(other, asked)
+                why = why and f"which {why}"
             except TimeoutError:
-                why = f"did not within {longest:g} s"
+                why = f"and it did not within {longest:g} s"
+            if why and other not in self._optional[name]:
+                return f"it waits for '{other}' to {_ASKED[asked]} (depends_on), {why}"
             if why:
-                return f"it waits for '{other}' to {_ASKED[asked]} (depends_on), which {why}"
+                key = "depends_on, required: false"
+                note(f"service '{name}' starts all the same: it waits for '{other}' to {_ASKED[asked]} ({key}), {why}")
         return ""
+
+    async def ill(self, name: str, patience_s: float) -> str:
+        """Waits until a service that has started is healthy, or has ended; why it is neither, else empty."""
+        try:
+            async with asyncio.timeout(patience_s):
+                why = await self._fact(name, HEALTHY)
+        except TimeoutError:
+            return f"its healthcheck did not succeed within {patience_s:g} s"
+        return "its healthcheck failed" if why == _UNHEALTHY else ""
 
     def _fact(self, name: str, condition: str) -> "asyncio.Future[str]":
         """Resolves to why the condition will not come true, empty when it has; not to be cancelled by one who waits."""
@@ -94,6 +112,18 @@ class Conditions:
             future.set_result(why)
 
 
+def in_turn(start: Coroutine[Any, Any, None], failed: Callable[[str], None]) -> "asyncio.Task[None]":
+    """Starts a service in a task of its own; ``failed`` gets what its exception says, as nobody awaits the task."""
+
+    def ended(task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            failed(f"{type(error).__name__}: {error}")
+
+    task = asyncio.ensure_future(start)
+    task.add_done_callback(ended)
+    return task
+
+
 def waits(services: Iterable[ApplicationService], name: str) -> str:
     """Who waits for a service and for what, as half a sentence; empty where nobody does."""
     found = ((s.name, s.after[name]) for s in services if name in s.after)
@@ -104,6 +134,34 @@ def waits(services: Iterable[ApplicationService], name: str) -> str:
 def one_off(services: Iterable[ApplicationService]) -> set[str]:
     """The services that may end, as others start when they have."""
     return {n for s in services for n, condition in s.after.items() if condition == COMPLETED}
+
+
+def may_end(services: Iterable[ApplicationService], name: str, code: int) -> bool:
+    """Whether the end of a service is no failure of the application."""
+    services = tuple(services)
+    return name in one_off(services) and (code == 0 or name in optional(services))
+
+
+def optional(services: Iterable[ApplicationService]) -> set[str]:
+    """The services whose health or end others wait for, and without which all of these start, too."""
+    services = tuple(services)
+    found = [(n, n in s.optional) for s in services for n, condition in s.after.items() if condition != STARTED]
+    return {n for n, _ in found} - {n for n, is_optional in found if not is_optional}
+
+
+def longest_s(services: Iterable[ApplicationService], name: str) -> float:
+    """The longest, in s, until a service has started: all may wait as long as they can, one after the other."""
+    after = {s.name: s.after for s in services}
+    waits = [c for each in _chain(after, name) for c in after.get(each, {}).values() if c != STARTED]
+    return LONGEST_S * len(waits)
+
+
+def _chain(after: Mapping[str, Mapping[str, str]], name: str) -> list[str]:
+    """A service, and those for which it waits, directly or through others."""
+    found = [name]
+    for each in found:
+        found += [other for other in after.get(each, {}) if other not in found]
+    return found
 
 
 def _without_health(condition: str, has_health: bool) -> str:

@@ -43,6 +43,8 @@ class World:
     def load(cls, messages: MessageSet) -> Self:
         """What the environment names, empty without it; raises ValueError for words that make none."""
         words = os.environ.get(VARIABLE, "").split()
+        if not words and os.environ.get(TRUTH, "").split():
+            raise ValueError(f"{TRUTH} names what the application must not get, and {VARIABLE} no service that gets it")
         if not words:
             return cls()
         entries = [word.partition("?=") for word in words]
@@ -53,7 +55,7 @@ class World:
         return cls(services, silent, told, truth, frozenset(names), names)
 
     def __bool__(self) -> bool:
-        return bool(self.services)
+        return bool(self.services or self.silent)
 
     def holds(self, envelope: Envelope) -> bool:
         """Whether a message must not come to the bus."""

@@ -127,7 +127,9 @@ services:
   gone: {image: a, profiles: [view]}
 """
     started = "service_started"
-    assert {service.name: service.after for service in planned(tmp_path, text).services} == {
+    services = planned(tmp_path, text).services
+    assert {service.name: service.optional for service in services if service.optional} == {"b": ("c",)}
+    assert {service.name: service.after for service in services} == {
         "a": {"c": started, "d": started, "b": started},
         "b": {"c": "service_healthy"},
         "c": {"d": "service_completed_successfully"},

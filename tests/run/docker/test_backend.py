@@ -5,8 +5,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
+from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run.docker.backend import DockerBackend
-from dodo_dsl.run.protocol import Exited
+from dodo_dsl.run.protocol import Event, Exited, Noted, Ready, Unstartable
 from tests.run.scripted import plan
 
 FATAL = "[FATAL tini (7)] exec drive failed: No such file or directory"
@@ -29,3 +32,62 @@ def test_words_of_a_program_are_no_excuse(tmp_path: Path) -> None:
     event = asyncio.run(died())
     assert isinstance(event, Exited)
     assert event.code == 127
+
+
+CHECK = {"test": ["CMD", "false"]}
+
+
+class Container:
+    """One that starts, with a health check that the engine never asks."""
+
+    def __init__(self) -> None:
+        self.attrs: dict[str, Any] = {"Config": {"Healthcheck": {"Test": CHECK["test"]}}}
+
+    def start(self) -> None:
+        """At once."""
+
+    def logs(self, **_: object) -> Any:
+        return SimpleNamespace(__iter__=lambda: iter(()), close=lambda: None)
+
+
+def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] = (), attrs: Any = None) -> Any:
+    """What is awaited of an application, and what is reported, of one that waits for another one's health."""
+    services = (ApplicationService("app", after={"db": "service_healthy"}, optional=optional), ApplicationService("db"))
+
+    async def started() -> tuple[dict[str, bool], list[Event]]:
+        client: Any = None
+        tested = plan("t", application=Application(".", services))
+        backend = DockerBackend(tested, folder, folder, client, client, "dodo-t", [], print, b"")
+        backend._containers = {name: Container() for name in ("app", "db")}
+        backend._compose.services = {name: {"healthcheck": CHECK} for name in ("app", "db")}
+        if attrs is not None:
+            backend._containers["db"].attrs = attrs
+        waits = await backend.start("application")
+        for name, status in statuses:
+            backend._take(name, f"health_status: {status}", {})
+        await asyncio.wait(backend._turns)
+        await asyncio.sleep(0)  # for what is called when they are done
+        events = [await backend.next_event() for _ in range(backend._events.qsize())]
+        await backend.close(keep=True)
+        return waits, events
+
+    return asyncio.run(asyncio.wait_for(started(), 20.0))
+
+
+@pytest.mark.parametrize(
+    ("status", "last"),
+    [("healthy", [Ready("app")]), ("unhealthy", [Unstartable("app", "its healthcheck failed")])],
+)
+def test_one_that_waits_for_others_has_its_own_health_awaited(status: str, last: list[Event], tmp_path: Path) -> None:
+    waits, events = in_turn(tmp_path, ("db", "healthy"), ("app", status))
+    assert (waits, events) == ({"app": True, "db": True}, [Ready("db"), *last])
+
+
+def test_an_optional_service_need_not_be_healthy(tmp_path: Path) -> None:
+    waits, events = in_turn(tmp_path, ("db", "unhealthy"), ("app", "healthy"), optional=("db",))
+    assert waits == {"app": True, "db": False}
+    assert [type(event) for event in events] == [Ready, Noted], events
+
+
+def test_an_exception_while_one_waits_is_the_test_s_error(tmp_path: Path) -> None:
+    assert in_turn(tmp_path, attrs={})[1] == [Unstartable("app", "KeyError: 'Config'")]

@@ -7,7 +7,7 @@ import pytest
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.proof import with_proof
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.bus.session import Session, SessionError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import RealTimeClock
 from services.base.identity.members import Members
@@ -120,6 +120,29 @@ def test_in_lockstep_the_clock_gets_everything(cid: int, monkeypatch: pytest.Mon
         Loop("pose", Teller(), session, clock, 0).run(lambda: False)
         assert taken(listener) == ([] if truth else [READING])
     assert clock.count == 4
+
+
+def test_what_reaches_no_service_of_the_test_does_not_come_to_the_bus(
+    application: Session, cid: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "pose track")
+    with Session(cid) as session, pytest.raises(SessionError, match=f"'{FRAME}' must not come to the bus"):
+        tell(session, None)
+    assert taken(application) == []
+
+
+def test_truth_without_services_that_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setenv(TRUTH, f"{READING}/0")
+    with pytest.raises(
+        ValueError, match="DODO_TRUTH names what the application must not get, and DODO_WORLD no service"
+    ):
+        World.load(MESSAGES)
+
+
+def test_services_that_may_not_say_where_they_listen_are_a_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, f"own?={FRAME}/0")
+    assert World.load(MESSAGES)
 
 
 def test_outside_of_a_test_the_bus_carries_everything(application: Session, cid: int) -> None:

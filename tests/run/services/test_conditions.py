@@ -1,0 +1,96 @@
+"""When services of an application start, and what becomes of those that never may: without any process."""
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Any
+
+import pytest
+
+from dodo_dsl.plan.model import COMPLETED, HEALTHY, STARTED, ApplicationService
+from dodo_dsl.run.services.conditions import LONGEST_S, Conditions, in_turn, longest_s, may_end, optional
+from tests.run.scripted import run
+
+DB = ApplicationService("db")
+
+
+def app(condition: str, *optional: str) -> tuple[ApplicationService, ...]:
+    return (ApplicationService("app", after={"db": condition}, optional=optional), DB)
+
+
+async def unmet(conditions: Conditions, notes: list[str]) -> tuple[str, list[str]]:
+    return await conditions.unmet("app", {"db": 7.0}, notes.append), notes
+
+
+@pytest.mark.parametrize(
+    ("condition", "what", "why"),
+    [
+        (STARTED, ("failed", "db"), "to start (depends_on{}), which could not be started"),
+        (HEALTHY, ("unhealthy", "db"), "to be healthy (depends_on{}), which is unhealthy"),
+        (HEALTHY, (), "to be healthy (depends_on{}), and it did not within 7 s"),
+        (COMPLETED, ("ended", "db", 3), "to end with exit code 0 (depends_on{}), which ended with exit code 3"),
+        (COMPLETED, (), "to end with exit code 0 (depends_on{}), and it did not within 600 s"),
+    ],
+)
+def test_one_that_never_may_start_unless_the_other_is_optional(condition: str, what: tuple[Any, ...], why: str) -> None:
+    async def waited(*optional: str) -> tuple[str, list[str]]:
+        conditions = Conditions(app(condition, *optional))
+        if what[:1] != ("failed",):
+            conditions.started("db")
+        if what:
+            getattr(conditions, what[0])(*what[1:])
+        return await unmet(conditions, [])
+
+    told = f"it waits for 'db' {why}"
+    assert run(waited()) == (told.format(""), [])
+    assert run(waited("db")) == ("", [f"service 'app' starts all the same: {told.format(', required: false')}"])
+
+
+def test_which_services_a_test_can_do_without() -> None:
+    both = (*app(HEALTHY, "db"), ApplicationService("other", after={"db": COMPLETED}))
+    assert (optional(app(HEALTHY, "db")), optional(app(HEALTHY)), optional(both)) == ({"db"}, set(), set())
+    assert optional(app(STARTED, "db")) == set(), "its health is none of the others' matter"
+    ends = [may_end(app(COMPLETED, *names), "db", code) for names in ((), ("db",)) for code in (0, 3)]
+    assert (ends, may_end(app(HEALTHY, "db"), "db", 0)) == ([True, False, True, True], False)
+
+
+@pytest.mark.parametrize(
+    ("what", "why"),
+    [
+        (("healthy",), ""),
+        (("unhealthy",), "its healthcheck failed"),
+        (("ended", 0), ""),
+        ((), "its healthcheck did not succeed within 60 s"),
+    ],
+)
+def test_the_health_of_one_that_has_started(what: tuple[Any, ...], why: str) -> None:
+    async def ill() -> str:
+        conditions = Conditions(app(STARTED))
+        conditions.started("app")
+        if what:
+            getattr(conditions, what[0])("app", *what[1:])
+        return await conditions.ill("app", 60.0)
+
+    assert run(ill()) == why
+
+
+def test_how_long_one_may_wait_is_by_those_for_which_it_waits() -> None:
+    first = ApplicationService("first", after={"app": STARTED, "db": HEALTHY})
+    services = (first, *app(COMPLETED))
+    assert [longest_s(services, name) for name in ("first", "app", "db")] == [2 * LONGEST_S, LONGEST_S, 0.0]
+    assert Conditions(services).waits_for_ends("first")
+    assert not Conditions(app(HEALTHY)).waits_for_ends("app")
+
+
+def test_an_exception_in_the_start_of_one_is_told() -> None:
+    async def start(error: type[BaseException] | None) -> None:
+        if error:
+            raise error("no such container")
+
+    async def told(start: Coroutine[Any, Any, None]) -> list[str]:
+        found: list[str] = []
+        await asyncio.wait([in_turn(start, found.append)])
+        await asyncio.sleep(0)
+        return found
+
+    errors = (KeyError, asyncio.CancelledError, None)
+    assert [run(told(start(error))) for error in errors] == [["KeyError: 'no such container'"], [], []]
