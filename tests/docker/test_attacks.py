@@ -17,7 +17,7 @@ from tests.hostile import attacks
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
-OF_ITS_IMAGE = {"read-cgroups", "read-log", "read-modules", "read-run", "read-var-lib"}
+OF_ITS_IMAGE = {"read-cgroups", "read-log", "read-modules", "read-run", "read-var-lib", "write-temporary"}
 """What every container has of its own, and of the kernel's to read."""
 OF_ITS_ENGINE = {"call-io_uring_setup", "call-ptrace", "socket-to-the-hypervisor"}
 """What the engine's filter of system calls allows, by its version: docs/explanation/security.md says so."""
@@ -25,9 +25,12 @@ OF_ITS_NETWORK = {"other-devices-of-the-network", "sends-to-the-networks-of-the-
 """The test's own device, from which nothing gets any further: see test_networks."""
 OF_ITS_ROOT = {
     *("becomes-root", "becomes-root-in-a-saved-id", "is-root", "changes-groups", "has-groups-of-root"),
-    *("has-capabilities", "call-chroot"),
+    *("has-capabilities", "call-chroot", "lease-on-a-file-of-the-machine"),
     *("read-home-of-root", "read-shadow"),
-    *(f"write-{place}" for place in ("etc", "home", "its-library", "optional", "root", "usr", "usr-folder")),
+    *(
+        f"write-{place}"
+        for place in ("devices", "etc", "home", "its-library", "optional", "root", "run", "usr", "usr-folder")
+    ),
 }
 """What the image's root may do to the image's own files, which nobody else uses."""
 CONTAINED = {"root": OF_ITS_IMAGE | OF_ITS_ENGINE | OF_ITS_NETWORK | OF_ITS_ROOT}

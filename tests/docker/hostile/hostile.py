@@ -23,6 +23,7 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 CID = int(FLAGS["cid"])
 MESSAGES = MessageSet.standard()
+LARGE = 40_000
 
 
 def request(name: str, **fields: float) -> bytes:
@@ -32,10 +33,14 @@ def request(name: str, **fields: float) -> bytes:
 
 
 def flood() -> None:
-    """Some 15,000 datagrams a second, garbage and large ones, on the test's own bus."""
-    junk = encode_frame(Envelope(5000, os.urandom(20_000), 0, 0, 0, 0))
+    """Some 15,000 datagrams a second, garbage and large ones, on the test's own bus.
+
+    Later ones are small, so that the recording stays within its limit however slow the machine is.
+    """
+    junk, small = (encode_frame(Envelope(5000, os.urandom(size), 0, 0, 0, 0)) for size in (20_000, 200))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for turn in itertools.count():
+            junk = junk if turn < LARGE else small
             sender.sendto(junk if turn % 2 else os.urandom(100), group(CID))
             if turn % 200 == 0:
                 time.sleep(0.01)
