@@ -30,6 +30,7 @@ _OF_DESKTOP = re.compile(
 )
 _FALSE = ("false", "f", "0", "no", "n", "off", "")
 _WHOLE = ("/", "/run", "/var/run", "/var", "/var/lib/docker")
+_OF_KERNEL = ("/proc", "/sys/firmware", "/sys/fs", "/sys/hypervisor", "/sys/kernel")
 _SOCKET = re.compile(r"(docker|podman|containerd|crio)\.sock$")
 
 
@@ -103,7 +104,8 @@ def is_hardware(found: Mount) -> bool:
 
 def is_machine(found: Mount) -> bool:
     """A mount that gives access to the host itself, or to other tests' containers."""
-    return found.source in _WHOLE or found.below("/proc") or bool(_SOCKET.search(found.source))
+    is_of_kernel = found.source == "/sys" or any(map(found.below, _OF_KERNEL))
+    return is_of_kernel or found.source in _WHOLE or bool(_SOCKET.search(found.source))
 
 
 def is_of_machine(device: object) -> bool:

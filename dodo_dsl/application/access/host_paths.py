@@ -14,8 +14,13 @@ NUL = "a path has a NUL character, so it can be no file"
 INSIDE = "put the files themselves in its place"
 
 TO_READ = ("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
-           "/run/udev/data", "/sys")  # fmt: skip
-"""What all users of a machine may read, and nobody keeps own files in."""
+           "/run/udev/data", "/sys/block", "/sys/bus", "/sys/class", "/sys/dev", "/sys/devices",
+           "/sys/module")  # fmt: skip
+"""What all users of a machine may read, and nobody keeps own files in.
+
+Not all of ``/sys``: the engine makes only the top of a mount read-only, and a container's root could write to the
+control groups of the host that are mounted below it.
+"""
 _TMP, _MEMORY = "/tmp", "/dev/shm"
 
 
