@@ -1,5 +1,7 @@
 """The child pipeline: what its jobs say, and what GitLab would refuse of it."""
 
+import os
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -204,6 +206,27 @@ def test_images_that_were_built_are_what_is_tested(plan: Plan) -> None:
     assert made["variables"] == {"DODO_REGISTRY": "$CI_REGISTRY", "DODO_RUN_OPTIONS": "-v"}
     expected = f"dodo run --compiled out/{plan.slug} --backend docker --report dodo-report $DODO_RUN_OPTIONS"
     assert made[plan.slug]["script"] == [expected], "further options win"
+
+
+def test_a_login_leaves_the_user_s_own_plugins_in_place(plan: Plan, tmp_path: Path) -> None:
+    """Docker looks for Compose below DOCKER_CONFIG, which the login sets; a job that was killed has left its link."""
+    plugin = tmp_path / ".docker/cli-plugins/docker-compose"
+    plugin.parent.mkdir(parents=True)
+    plugin.touch()
+    (tmp_path / "docker").write_text("#!/bin/sh\ncat > /dev/null\n")
+    (tmp_path / "docker").chmod(0o755)
+    environment = {
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+        "HOME": str(tmp_path),
+        "CI_PROJECT_DIR": str(tmp_path / "project"),
+        "DODO_REGISTRY": "registry.example.org",
+    }
+    default = yaml.safe_load(render_pipeline(Suite((plan,)), "generated").text)["default"]
+    for step in ("before_script", "before_script", "after_script"):
+        if step == "after_script":
+            assert (tmp_path / "project.tmp/docker/cli-plugins/docker-compose").samefile(plugin)
+        subprocess.run(["sh", "-ec", "\n".join(default[step])], env=environment, check=True)
+    assert [path.name for path in plugin.parent.iterdir()] == ["docker-compose"]
 
 
 def test_packed_tests_share_jobs(plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]) -> None:

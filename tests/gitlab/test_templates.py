@@ -378,6 +378,16 @@ def run_images(tmp_path: Path, docker: str, compose: str = BUILT, **inputs: Any)
     return result
 
 
+def test_the_user_s_own_plugins_are_found_beside_the_job_s_login(tmp_path: Path) -> None:
+    """Docker looks for Compose and buildx below DOCKER_CONFIG, which the job sets."""
+    plugin = tmp_path / ".docker/cli-plugins/docker-buildx"
+    plugin.parent.mkdir(parents=True)
+    plugin.touch()
+    result = run_images(tmp_path, DOCKER)
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "private/docker/cli-plugins/docker-buildx").samefile(plugin)
+
+
 def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Callable[..., None]) -> None:
     result = run_images(tmp_path, DOCKER)
     assert result.returncode == 0, result.stderr
