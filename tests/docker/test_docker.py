@@ -246,8 +246,12 @@ def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", *DRIVES, "-o", str(out)], cwd=ROOT, check=True)
     folder = out / "sil-closed-straight"
     up = ["docker", "compose", "up", "--exit-code-from", "track"]
-    result = subprocess.run(up, cwd=folder, capture_output=True, text=True, check=False, timeout=900)
-    subprocess.run(["docker", "compose", "down", "-v"], cwd=folder, capture_output=True, check=True)
+    for n in range(100, 116):  # as somebody would who shares the engine with others
+        variables = {**os.environ, "DODO_SUBNET": f"10.213.{n}.0/28"}
+        result = subprocess.run(up, cwd=folder, env=variables, capture_output=True, text=True, check=False, timeout=900)
+        subprocess.run(["docker", "compose", "down", "-v"], cwd=folder, env=variables, capture_output=True, check=True)
+        if "Pool overlaps" not in result.stderr:
+            break
     assert '"outcome": "passed"' in result.stdout, result.stdout[-3000:] + result.stderr[-3000:]
     assert result.returncode == 0
 

@@ -18,6 +18,7 @@ from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes, import_paths
+from dodo_dsl.run.process.confined import bubblewrap
 from dodo_dsl.run.process.confined.confinement import confinement
 from dodo_dsl.run.process.entered import Entered
 from dodo_dsl.run.process.environment import own_environment
@@ -74,6 +75,8 @@ class ProcessBackend:
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._conditions = Conditions(plan.application.services, has_health=False)
+        self._starts: dict[str, list[Command]] = {}
+        """The commands by which each service of the application was started, several where a mount went meanwhile."""
         self._is_noted = False
         self._turns: dict[str, asyncio.Task[None]] = {}
         """The services of the application that wait for the end of others."""
@@ -118,6 +121,10 @@ class ProcessBackend:
                 await asyncio.wait_for(output.done.wait(), 1.0)
         if failed:
             said = " ".join(self.tail(exited)[-1:])
+            starts = self._starts[exited]
+            if self.is_on_host and bubblewrap.MOUNT_GONE.match(said) and len(starts) < bubblewrap.MOST_TRIES:
+                self._start(starts[-1])
+                return
             is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
             what = "its sandbox cannot be set up: " if is_of_sandbox else ""
             self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
@@ -194,6 +201,7 @@ class ProcessBackend:
                 self._events.put_nowait(event)
             return event is not None
 
+        self._starts.setdefault(command.name, []).append(command)
         output = ServiceOutput(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
         self._outputs[command.name] = output
         self._pids[command.name] = asyncio.get_running_loop().create_future()

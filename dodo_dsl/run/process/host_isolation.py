@@ -17,7 +17,7 @@ from typing import Any
 from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
-from dodo_dsl.run.process.confined.bubblewrap import PROGRAM
+from dodo_dsl.run.process.confined.bubblewrap import MOST_TRIES, MOUNT_GONE, PROGRAM
 from dodo_dsl.run.process.confined.confined_probe import BUBBLEWRAP, NAMESPACES
 from dodo_dsl.run.process.forks.fork_server_client import ForkServer
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
@@ -92,10 +92,15 @@ def _start(channel: socket.socket, _log: int, _slot: str) -> "subprocess.Popen[b
 def process_namespace_refusal() -> str:
     """Why an application on the host cannot have a process namespace of its own; empty when it can."""
     words = [PROGRAM, "--unshare-pid", "--dev-bind", "/", "/", "--proc", "/proc", "--", "true"]
-    try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=10)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return str(error)
+    for _ in range(MOST_TRIES):
+        try:
+            done = subprocess.run(
+                words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=10
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return str(error)
+        if not MOUNT_GONE.match(done.stderr):
+            break
     return "" if done.returncode == 0 else done.stderr.strip() or f"exit code {done.returncode}"
 
 

@@ -4,6 +4,7 @@ What becomes of a test whatever its processes do is tested without them, in ``te
 """
 
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -116,6 +117,31 @@ def test_services_start_when_those_for_which_they_wait_have_ended(host: Bench, m
     assert {slug: (o.outcome, o.reason) for slug, o in outcomes.items()} == {k: v[1:] for k, v in IN_TURN.items()}
     told = "it waits for 'init' to end with exit code 0 (depends_on, required: false), which ended with exit code 3"
     assert f"service 'app' starts all the same: {told}" in outcomes["optional"].notes
+
+
+GONE = """#!/bin/sh
+case "$*" in *" -- true") exec {program} "$@";; esac
+echo x >> {count}
+if [ $(wc -l < {count}) -le {most} ]; then
+    echo 'bwrap: Can'"'"'t bind mount /oldroot/ on /newroot/: Unable to apply mount flags: {why}'
+    exit 1
+fi
+exec {program} "$@"
+"""
+
+
+@pytest.mark.parametrize(("most", "outcome"), [(2, "passed"), (100, "error")])
+def test_mount_that_goes_away_meanwhile(host: Bench, monkeypatch: pytest.MonkeyPatch, most: int, outcome: str) -> None:
+    """As those of ended containers do while bubblewrap copies the host's: the application is started again."""
+    program, count = shutil.which("bwrap"), host.folder / "count"
+    (host.folder / "bin").mkdir()
+    fake = host.folder / "bin" / "bwrap"
+    why = 'remount "/newroot/gone": No such file or directory'
+    fake.write_text(GONE.format(count=count, most=most, program=program, why=why))
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
+    (result,) = host.run(host.plan(application=STARTED + WAIT, judge=READY + BEGUN + PASS))
+    assert (result.outcome, len(count.read_text().split())) == (outcome, min(most + 1, 10))
 
 
 def test_missing_program_is_an_error(host: Bench) -> None:

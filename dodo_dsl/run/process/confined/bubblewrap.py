@@ -1,6 +1,7 @@
 """The words that start a program in a sandbox of its own by bubblewrap (bwrap(1)): pure text."""
 
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,6 +9,10 @@ from pathlib import Path
 from dodo_dsl.run.process.confined.confinement import SYSTEM, Confinement
 
 PROGRAM = "bwrap"
+MOUNT_GONE = re.compile(r'bwrap: .*remount ".*": No such file or directory')
+"""What it says when somebody, such as a container engine, removed a mount while it copied those of the host."""
+MOST_TRIES = 10
+"""How often it is started then."""
 HOME = "/home/application"
 _MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 """On Debian since 12 these are links into /usr."""
