@@ -5,6 +5,7 @@ python -m benchmarks.pictures.run_trace OUT.json [WORD of dodo run ...]
 
 import contextlib
 import json
+import os
 import statistics
 import sys
 import time
@@ -30,19 +31,23 @@ class Trace:
         self.events: list[dict[str, Any]] = []
         self._open: dict[str, dict[str, Any]] = {}
         self._lanes: dict[str, int] = {}
+        ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
+        self._started = ticks / os.sysconf("SC_CLK_TCK")
+        self.enter(COMMAND, "start and load")
+        self._open[COMMAND].update({"ts": 0, "args": {OWN: 0.0}})  # since this process began
 
     def enter(self, lane: str, name: str = "") -> None:
         """A phase begins, which ends the one before it in the same lane; without a name, none begins."""
-        now, own = round(time.perf_counter() * 1e6), time.process_time()
+        now, own = time.clock_gettime(time.CLOCK_BOOTTIME) - self._started, time.process_time()
         if lane not in self._lanes:
             self._lanes[lane] = len(self._lanes)
             head = {"name": "thread_name", "ph": "M", "args": {"name": lane}}
             self.events.append({**head, "pid": 1, "tid": self._lanes[lane]})
         if last := self._open.pop(lane, None):
-            last["dur"], last["args"][OWN] = now - last["ts"], own - last["args"][OWN]
+            last["dur"], last["args"][OWN] = round(now * 1e6) - last["ts"], own - last["args"][OWN]
             self.events.append(last)
         if name:
-            place = {"pid": 1, "tid": self._lanes[lane], "ts": now}
+            place = {"pid": 1, "tid": self._lanes[lane], "ts": round(now * 1e6)}
             self._open[lane] = {"name": name, "ph": "X", **place, "args": {OWN: own}}
 
     def table(self) -> Iterator[str]:
@@ -80,7 +85,6 @@ def run(trace: Trace, words: Sequence[str]) -> int:
         stack.enter_context(mock.patch.object(progress, "choose", lambda stream, slugs, _: Traced(stream, slugs)))
         for name, phase in BEGINS.items():
             stack.enter_context(mock.patch.object(command, name, entering(phase, getattr(command, name))))
-        trace.enter(COMMAND, "load")
         code = dodo(["run", *words], sys.stdout, sys.stderr)
         trace.enter(COMMAND)
     return code
