@@ -41,7 +41,7 @@ RUN, SAMPLE = "run", "sample"
 _MOST_READ = 256  # files that are kept for the tests that extend them
 
 
-class Surroundings(NamedTuple):
+class CheckInputs(NamedTuple):
     """What every test is checked with."""
 
     manifests: Mapping[str, Manifest]
@@ -67,10 +67,10 @@ class Sources:
         once = functools.lru_cache(maxsize=_MOST_READ)(self.read)
         return {location.path: load_spec(location, once) for location in locations}
 
-    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], around: Surroundings) -> Ruled:
+    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> Ruled:
         """Resolves and checks the instances, and those at the ends of their ranges."""
-        tests = tuple(resolve(specs, *around))
-        return tests, check(tests, *around, resolve(corners, *around))
+        tests = tuple(resolve(specs, *inputs))
+        return tests, check(tests, *inputs, resolve(corners, *inputs))
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def load(
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
-    tests, by_rules = sources.check(specs, corners, Surroundings(manifests, deployment, source))
+    tests, by_rules = sources.check(specs, corners, CheckInputs(manifests, deployment, source))
     as_read = {path: of_file for path, (_, of_file) in loaded.items()}
     problems = Problems(tuple(found), (*manifest_problems, *own), as_read, by_rules)
     return Checked(deployment, manifests, tests, problems.of(specs), settings, source, tuple(empty), problems)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dodo_dsl.check import check
 from dodo_dsl.check.resolve import resolve
-from dodo_dsl.compiler import Ruled, Sources, Surroundings
+from dodo_dsl.compiler import CheckInputs, Ruled, Sources
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Node, Reader, parse_bytes, read
 from dodo_dsl.spec.load import Loaded, load_spec
@@ -45,7 +45,7 @@ class ChangedSources(Sources):
     def __init__(self, start: Path, texts: Texts) -> None:
         super().__init__(start, texts)
         self._loaded: dict[Location, tuple[list[tuple[Path, Parsed]], Loaded]] = {}
-        self._around: Surroundings | None = None
+        self._inputs: CheckInputs | None = None
         self._ruled: Ruled = (), {}
 
     def load(self, locations: Iterable[Location]) -> dict[Path, Loaded]:
@@ -66,24 +66,24 @@ class ChangedSources(Sources):
         self._loaded[location] = made_of, load_spec(location, recorded)
         return self._loaded[location][1]
 
-    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], around: Surroundings) -> Ruled:
+    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> Ruled:
         """Instances that are the very objects of the check before keep what it found.
 
         A test is checked again, too, where another one took or gave up its name.
         """
-        former, found = self._ruled if self._around == around else ((), {})
+        former, found = self._ruled if self._inputs == inputs else ((), {})
         known = {id(test.spec): test for test in former}
         new = [spec for spec in specs if id(spec) not in known]
         paths = {spec.path for spec in new}
-        fresh = {id(test.spec): test for test in resolve((s for s in specs if s.path in paths), *around)}
+        fresh = {id(test.spec): test for test in resolve((s for s in specs if s.path in paths), *inputs)}
         tests = tuple(fresh.get(id(spec)) or known[id(spec)] for spec in specs)
         here = {id(spec) for spec in specs}
         gone = [test.spec for key, test in known.items() if key not in here]
         names = {spec.name for spec in (*new, *gone)}
         affected = {spec.path for spec in specs if spec.name in names} | paths | {spec.path for spec in gone}
-        at_ends = resolve((corner for corner in corners if corner.path in affected), *around)
-        again = {**found, **check(tests, *around, at_ends, affected)}
-        self._around, self._ruled = around, (tests, {spec.path: again[spec.path] for spec in specs})
+        at_ends = resolve((corner for corner in corners if corner.path in affected), *inputs)
+        again = {**found, **check(tests, *inputs, at_ends, affected)}
+        self._inputs, self._ruled = inputs, (tests, {spec.path: again[spec.path] for spec in specs})
         return self._ruled
 
 
