@@ -4,18 +4,17 @@ import functools
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from dodo_dsl import package_data
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.application.unseen import unseen_problems
-from dodo_dsl.check import manifest_messages
+from dodo_dsl.check import check, manifest_messages
 from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.problems import Problems
 from dodo_dsl.check.resolve import ResolvedTest, resolve
-from dodo_dsl.check.unchanged import Findings, Surroundings, check_again
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
 from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
@@ -40,6 +39,38 @@ UNSATISFIED = ("no-producer", "no-sample", "true-pose")
 RUN, SAMPLE = "run", "sample"
 """What announces the number of a test at values of its ranges; the report groups samples by the second."""
 _MOST_READ = 256  # files that are kept for the tests that extend them
+
+
+class CheckInputs(NamedTuple):
+    """What every test is checked with."""
+
+    manifests: Mapping[str, Manifest]
+    deployment: Deployment
+    application: ApplicationSource | None
+
+
+Ruled = tuple[tuple[ResolvedTest, ...], Mapping[Path, Sequence[Diagnostic]]]
+"""The tests that instances are, and what the rules found, by spec."""
+
+
+class Sources:
+    """Where compiling starts, and how files are read and checked: all of them. An editor's know what has not changed.
+
+    The deployment is looked for at ``start``, then above the tests. ``read`` may know texts that are not saved yet.
+    """
+
+    def __init__(self, start: Path | None = None, read: Reader = read) -> None:
+        self.start, self.read = start or Path.cwd(), read
+
+    def load(self, locations: Iterable[Location]) -> dict[Path, Loaded]:
+        """The specs of files."""
+        once = functools.lru_cache(maxsize=_MOST_READ)(self.read)
+        return {location.path: load_spec(location, once) for location in locations}
+
+    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> Ruled:
+        """Resolves and checks the instances, and those at the ends of their ranges."""
+        tests = tuple(resolve(specs, *inputs))
+        return tests, check(tests, *inputs, resolve(corners, *inputs))
 
 
 @dataclass(frozen=True)
@@ -71,10 +102,6 @@ class Checked:
         return self.problems.by_rules
 
     @property
-    def around(self) -> Surroundings:
-        return Surroundings(self.manifests, self.deployment, self.application)
-
-    @property
     def ok(self) -> bool:
         return not has_errors(self.diagnostics)
 
@@ -95,36 +122,31 @@ class NoApplication(Exception):
 def load(
     paths: Sequence[Path],
     application: Sequence[Path] = (),
-    start: Path | None = None,
     settings: Settings = Settings(),  # noqa: B008  (it is frozen)
-    reader: Reader = read,
-    loader: Callable[[Location, Reader], Loaded] = load_spec,
-    former: Checked | None = None,
+    sources: Sources | None = None,
 ) -> Checked:
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
-    ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
-    paths. ``reader`` may know texts that are not saved yet. Tests for which ``loader`` gives the specs of the
-    ``former`` check keep what it found.
+    ``application`` are compose files that replace the deployment's.
     """
-    deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
+    sources = sources or Sources()
+    reader = sources.read
+    deployment, found = load_deployment(find_deployment(sources.start, paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
     own = manifest_messages.problems(deployment.services, reader, known_messages(deployment.messages))
-    once = functools.lru_cache(maxsize=_MOST_READ)(reader)
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
-    loaded = {location.path: loader(location, once) for location in locations}
+    loaded = sources.load(locations)
     source = None
     if files := application or deployment.application:
         source, of_application = read_application(files, access(deployment), deployment.sandbox, reader)
         found = [*found, *of_application, *(unseen_problems(source, deployment) if source else ())]
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
-    before = Findings(former.around, former.tests, former.by_rules) if former else None
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
-    again = check_again(specs, corners, Surroundings(manifests, deployment, source), before)
+    tests, by_rules = sources.check(specs, corners, CheckInputs(manifests, deployment, source))
     as_read = {path: of_file for path, (_, of_file) in loaded.items()}
-    problems = Problems(tuple(found), (*manifest_problems, *own), as_read, again.by_rules)
-    return Checked(deployment, manifests, again.tests, problems.of(specs), settings, source, tuple(empty), problems)
+    problems = Problems(tuple(found), (*manifest_problems, *own), as_read, by_rules)
+    return Checked(deployment, manifests, tests, problems.of(specs), settings, source, tuple(empty), problems)
 
 
 def narrowed(checked: Checked, specs: Collection[Spec]) -> Checked:

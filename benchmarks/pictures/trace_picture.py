@@ -1,6 +1,6 @@
-"""Draws traces of ``dodo run --profile`` below one another, at one scale, as an SVG.
+"""Draws traces of ``run_trace`` below one another, at one scale, as an SVG.
 
-python -m benchmarks.pictures.trace_picture OUT.svg TITLE=profile.json [TITLE=profile.json ...]
+python -m benchmarks.pictures.trace_picture OUT.svg TITLE=TRACE.json [TITLE=TRACE.json ...]
 """
 
 import json

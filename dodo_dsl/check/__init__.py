@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check import replayed
 from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.rules import (
@@ -83,6 +84,12 @@ def check(
         path: [*_with_instances(group), *_of_corners(at_ends.get(path, ()), {d for _, found in group for d in found})]
         for path, group in by_path(t for t in everything if only is None or t.spec.path in only).items()
     }
+
+
+def forget_files() -> None:
+    """What is kept of the files that tests name, which may have changed."""
+    for cache in (references.entries, files.problems, replayed.known_ids, replayed.holds):
+        cache.cache_clear()
 
 
 def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[Diagnostic]:

@@ -13,7 +13,7 @@ from dodo_dsl.application import compose_paths, unseen
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.cli import image_pull, own_services, selection
-from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
+from dodo_dsl.cli.errors import NO_APPLICATION, UsageError, require_extra
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.images import build_context, docker_command, sbom, wheels
@@ -224,6 +224,7 @@ def _require_built(options: argparse.Namespace, images: list[Image]) -> None:
 
 
 def _sbom(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> int:
+    require_extra("this", "sbom")
     folder = Path(options.output)
     _require_built(options, images)
     folder.mkdir(parents=True, exist_ok=True)

@@ -8,12 +8,15 @@ the same text.
 import json
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from typing import Any
-from urllib.parse import quote
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+from uuid import NAMESPACE_URL, uuid5
 
 from dodo_dsl import __version__
 from dodo_dsl.images import docker_command
+
+if TYPE_CHECKING:  # of the extra sbom
+    from cyclonedx.model.license import License
 
 _QUESTION = r"""
 import importlib.metadata, json, re, shutil, subprocess
@@ -49,51 +52,45 @@ def of_image(name: str, reference: str) -> str:
         digest = docker_command.ask("image", "inspect", "--format", "{{.Id}}", reference)
     except (docker_command.DockerError, ValueError) as error:
         raise SbomError(f"{reference} does not say what it is made of: {error}") from None
-    kind, _, content = digest.partition(":")
-    hashes = [{"alg": "SHA-256", "content": content}] if kind == "sha256" else []
-    subject = {"type": "container", "name": name, "version": reference.rpartition(":")[2], "hashes": hashes}
-    return _bill(subject, told, with_debian=True)
+    return _bill("container", name, reference.rpartition(":")[2], told, digest.removeprefix("sha256:"))
 
 
 def of_environment() -> str:
     """The bill of the Python environment that this process runs in, without the machine's own packages."""
     done = subprocess.run([sys.executable, "-c", _QUESTION], capture_output=True, text=True, check=True)
-    subject = {"type": "application", "name": "dodo-dsl", "version": __version__}
-    return _bill(subject, json.loads(done.stdout), with_debian=False)
+    return _bill("application", "dodo-dsl", __version__, {**json.loads(done.stdout), "debian": []})
 
 
-def _bill(subject: Mapping[str, Any], told: Mapping[str, Any], *, with_debian: bool) -> str:
-    own = (subject["name"], subject["version"])
-    rows = [_python(*row) for row in told["python"] if tuple(row[:2]) != own]
-    if with_debian:
-        rows += [_debian(*row, *told["system"]) for row in told["debian"]]
-    components = {row["bom-ref"]: row for row in rows}
-    document = {
-        "bomFormat": "CycloneDX",
-        "specVersion": "1.6",
-        "version": 1,
-        "metadata": {
-            "component": {"bom-ref": f"{subject['name']}@{subject['version']}", **subject},
-            "tools": {"components": [{"type": "application", "name": "dodo-dsl", "version": __version__}]},
-        },
-        "components": [components[key] for key in sorted(components)],
-    }
-    return json.dumps(document, indent=2) + "\n"
+def _bill(kind: str, name: str, version: str, told: Mapping[str, Any], digest: str = "") -> str:
+    from cyclonedx.contrib.license.factories import LicenseFactory
+    from cyclonedx.model import HashAlgorithm, HashType
+    from cyclonedx.model.bom import Bom
+    from cyclonedx.model.component import Component, ComponentType
+    from cyclonedx.output.json import JsonV1Dot6
+    from packageurl import PackageURL
 
+    components: dict[str, Component] = {}
 
-def _python(name: str, version: str, licence: str) -> dict[str, Any]:
-    url = f"pkg:pypi/{quote(name.lower().replace('_', '-'))}@{quote(version)}"
-    return _component(name, version, url, [licence] if licence else [])
+    def add(name: str, url: PackageURL, licences: Iterable["License"]) -> None:
+        key = str(url)
+        components[key] = Component(name=name, version=url.version, bom_ref=key, purl=url, licenses=licences)
 
-
-def _debian(
-    name: str, version: str, architecture: str, licences: Sequence[str], system: str, release: str
-) -> dict[str, Any]:
-    distribution = f"{system}-{release}" if release else system
-    more = f"?arch={quote(architecture)}&distro={quote(distribution)}"
-    return _component(name, version, f"pkg:deb/{quote(system)}/{quote(name)}@{quote(version)}{more}", licences)
-
-
-def _component(name: str, version: str, url: str, licences: Sequence[str]) -> dict[str, Any]:
-    told = {"licenses": [{"license": {"name": one}} for one in licences]} if licences else {}
-    return {"type": "library", "bom-ref": url, "name": name, "version": version, "purl": url, **told}
+    licence, system = LicenseFactory(), told["system"]
+    for package, release, text in told["python"]:
+        if (package, release) != (name, version):
+            add(package, PackageURL("pypi", None, package, release), [licence.make_from_string(text)] if text else [])
+    for package, release, machine, texts in told["debian"]:
+        more = {"arch": machine, "distro": "-".join(filter(None, system))}
+        add(package, PackageURL("deb", system[0], package, release, more), map(licence.make_with_name, texts))
+    hashes = [HashType(alg=HashAlgorithm.SHA_256, content=digest)] if digest else []
+    subject = Component(
+        name=name, version=version, type=ComponentType(kind), hashes=hashes, bom_ref=f"{name}@{version}"
+    )
+    bom = Bom(components=components.values())
+    bom.metadata.component = subject
+    bom.metadata.tools.components.add(Component(name="dodo-dsl", version=__version__, type=ComponentType.APPLICATION))
+    bom.register_dependency(subject, bom.components)
+    # the same contents give the same text
+    bom.metadata.timestamp = None  # type: ignore[assignment]
+    bom.serial_number = uuid5(NAMESPACE_URL, " ".join([name, version, digest, *sorted(components)]))
+    return JsonV1Dot6(bom).output_as_string(indent=2) + "\n"

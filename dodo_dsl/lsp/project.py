@@ -4,11 +4,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.check import replayed
-from dodo_dsl.check.rules.inputs import files, references
+from dodo_dsl.check import forget_files
 from dodo_dsl.compiler import Checked, load, plan, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.lsp.texts import LoadedSpecs, Texts
+from dodo_dsl.lsp.texts import ChangedSources, Texts
 from dodo_dsl.spec.deployment.deployment import FILE_NAME, find_deployment, load_deployment
 from dodo_dsl.spec.manifest import load_manifests
 from dodo_dsl.spec.registry import SUFFIX
@@ -55,8 +54,7 @@ class Projects:
 
     def __init__(self, texts: Texts | None = None) -> None:
         self._texts = texts or Texts()
-        self._loader = LoadedSpecs()
-        self._former: dict[Path, Checked] = {}
+        self._sources: dict[Path, ChangedSources] = {}
         self._is_outdated = False
 
     def forget(self) -> None:
@@ -67,9 +65,9 @@ class Projects:
         """The projects, checked with the texts that are shown, by resolved path."""
         if self._is_outdated:
             self._is_outdated = False
-            self._loader, self._former = LoadedSpecs(), {}
-            for cache in (load_manifests, references.entries, files.problems, replayed.known_ids, replayed.holds):
-                cache.cache_clear()
+            self._sources.clear()
+            load_manifests.cache_clear()
+            forget_files()
         self._texts.show(shown)
         groups: dict[Path, list[Path]] = {}
         for file in sorted(filter(is_ours, shown)):
@@ -83,10 +81,8 @@ class Projects:
             registry = load_deployment(key, self._texts)[0].registry
             outside = [file for file in specs if not any(file.is_relative_to(folder) for folder in registry)]
             paths = [*registry, *outside] if outside else []
-        former = self._former.get(key)
-        checked = load(paths, start=key.parent, reader=self._texts, loader=self._loader, former=former)
-        self._former[key] = checked
-        return Project(key.parent, without_unsatisfied(checked, specs))
+        sources = self._sources.setdefault(key, ChangedSources(key.parent, self._texts))
+        return Project(key.parent, without_unsatisfied(load(paths, sources=sources), specs))
 
 
 def by_file(found: Iterable[Diagnostic]) -> Mapping[Path, list[Diagnostic]]:

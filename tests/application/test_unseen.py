@@ -27,7 +27,7 @@ def root(tmp_path: Path) -> Path:
 
 def _found(root: Path, written: str) -> list[str]:
     (root / "docker-compose.yml").write_text(_SERVICE + written)
-    found = [d for d in compiler.load((), start=root).diagnostics if d.severity == "error"]
+    found = [d for d in compiler.load((), sources=compiler.Sources(root)).diagnostics if d.severity == "error"]
     return [f"{Path(d.span.file).name}:{d.span.line}: {d.message}" for d in found]
 
 

@@ -37,4 +37,4 @@ def test_bars_have_one_scale(tmp_path: Path) -> None:
 
 def test_it_says_what_it_takes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["out.svg"]) == 2
-    assert "TITLE=profile.json" in capsys.readouterr().err
+    assert "TITLE=TRACE.json" in capsys.readouterr().err

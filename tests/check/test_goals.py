@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dodo_dsl.check.goals import resolved_goals
-from dodo_dsl.compiler import load
+from dodo_dsl.compiler import Sources, load
 from dodo_dsl.spec.goals import Goal
 from tests.check import examples
 
@@ -22,7 +22,7 @@ messages: {in: ["opendlv.proxy.GroundSteeringRequest"]}
 
 def resolved(folder: Path, example: str) -> tuple[tuple[Goal, ...], list[tuple[str, str]]]:
     examples.write(example, folder)
-    (test,) = load([folder / "tests" / "example"], start=folder).tests
+    (test,) = load([folder / "tests" / "example"], sources=Sources(folder)).tests
     found = resolved_goals(test)
     return found.goals, [(problem.rule, problem.message) for problem in found.problems]
 

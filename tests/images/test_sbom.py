@@ -1,7 +1,6 @@
 """Bills of materials have CycloneDX's form, and name what is installed."""
 
 import json
-import re
 import sys
 from importlib import metadata
 from io import StringIO
@@ -9,32 +8,26 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.images import sbom
 
-_PURL = re.compile(r"pkg:(pypi|deb/[a-z]+)/[A-Za-z0-9.%+-]+@[A-Za-z0-9.%~+-]+(\?arch=[a-z0-9]+&distro=[a-z0-9.-]+)?")
 _DIGEST = "ab" * 32
 TOLD = {
-    "python": [["PyYAML", "6.0.3", "MIT License"], ["sysv_ipc", "1.2.0", ""]],
+    "python": [["PyYAML", "6.0.3", "MIT License"], ["sysv_ipc", "1.2.0", ""], ["av", "18.0", "MIT"]],
     "debian": [["bash", "5.2.15-2+b7", "amd64", ["GFDL-1.3", "GPL-3"]], ["dash", "1:0.5", "amd64", []]],
     "system": ["debian", "12"],
 }
 
 
 def check(text: str) -> dict[str, Any]:
-    """The bill, which has what CycloneDX 1.6 requires: kinds, unique references, names, package URLs, known hashes."""
+    """The bill, which CycloneDX's schema allows, and whose references are unique."""
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(text) is None
     bill: dict[str, Any] = json.loads(text)
-    assert (bill["bomFormat"], bill["specVersion"], bill["version"]) == ("CycloneDX", "1.6", 1)
-    subject, components = bill["metadata"]["component"], bill["components"]
-    assert subject["type"] in ("container", "application") and subject["name"]
-    references = [subject["bom-ref"], *(component["bom-ref"] for component in components)]
+    references = [component["bom-ref"] for component in (bill["metadata"]["component"], *bill["components"])]
     assert len(set(references)) == len(references)
-    for component in components:
-        assert component["type"] == "library" and component["name"] and component["version"]
-        assert _PURL.fullmatch(component["purl"]), component["purl"]
-        assert all(entry["license"]["name"] for entry in component.get("licenses", ()))
-    assert all(re.fullmatch("[0-9a-f]{64}", entry["content"]) for entry in subject.get("hashes", ()))
     return bill
 
 
@@ -62,15 +55,17 @@ def test_an_image_names_pythons_packages_and_debians(tmp_path: Path, monkeypatch
         "version": "1",
         "hashes": [{"alg": "SHA-256", "content": _DIGEST}],
     }
-    assert [component["purl"] for component in bill["components"]] == [
+    components = sorted(bill["components"], key=lambda component: str(component["purl"]))
+    assert [component["purl"] for component in components] == [
         "pkg:deb/debian/bash@5.2.15-2%2Bb7?arch=amd64&distro=debian-12",
-        "pkg:deb/debian/dash@1%3A0.5?arch=amd64&distro=debian-12",
+        "pkg:deb/debian/dash@1:0.5?arch=amd64&distro=debian-12",
+        "pkg:pypi/av@18.0",
         "pkg:pypi/pyyaml@6.0.3",
         "pkg:pypi/sysv-ipc@1.2.0",
     ]
-    licences = [component.get("licenses") for component in bill["components"]]
+    licences = [component.get("licenses") for component in components]
     assert licences[0] == [{"license": {"name": "GFDL-1.3"}}, {"license": {"name": "GPL-3"}}]
-    assert licences[1:] == [None, [{"license": {"name": "MIT License"}}], None]
+    assert licences[1:] == [None, [{"license": {"id": "MIT"}}], [{"license": {"name": "MIT License"}}], None]
 
 
 def test_an_image_that_says_nothing_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,6 @@ from dodo_dsl.cli.run import progress, summary
 from dodo_dsl.cli.run.forecast import at_once, expectation, forecast, usage
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.loading import Loading, loading
-from dodo_dsl.cli.run.profile import COMMAND, FILE_NAME, Profile, ProfiledProgress
 from dodo_dsl.cli.run.report_lock import reserved
 from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, signals_interrupt, undisturbed
 from dodo_dsl.cli.run.written import drawable, write
@@ -96,7 +95,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         "print only what did not pass, and a last line with the counts",
         "print each test's phases, checks, what the application used, and errors and warnings in logs",
     )
-    parser.add_argument("--profile", action="store_true", help="show where the time went, and write DIR/profile.json")
     selection.add_application(parser)
 
 
@@ -107,7 +105,6 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 def _main(options: argparse.Namespace, stdout: TextIO) -> int:
     more_descriptors()
-    profile = Profile()
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
     if options.watch:
@@ -115,28 +112,17 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
 
         return watch.main(options, stdout)
     with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
-        profile.enter(COMMAND, "compile")
         with chatter(stdout, options.verbosity) as quietly:
             jobs, deployment = prepare(options, folder.path, quietly)
             _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-            runner = runner_of(options, jobs, deployment, quietly, load, profile)
+            runner = runner_of(options, jobs, deployment, quietly, load)
         with reserved(options.report, stdout):
             source, said = origin(options, deployment), options.verbosity
-            outcomes, is_reported = run(runner, jobs, options.report, stdout, profile, source, said=said)
+            outcomes, is_reported = run(runner, jobs, options.report, stdout, source, said=said)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
-    if options.profile:
-        _show(profile, options.report / FILE_NAME, stdout)
     return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
-
-
-def _show(profile: Profile, target: Path, stdout: TextIO) -> None:
-    profile.leave(COMMAND)
-    stdout.write("\n")
-    stdout.writelines(f"{printable(line)}\n" for line in profile.table())
-    profile.write(target)
-    stdout.write(f"profile: {target}\n")
 
 
 def _refuse_to_keep(plans: Sequence[Plan]) -> None:
@@ -148,12 +134,7 @@ def _refuse_to_keep(plans: Sequence[Plan]) -> None:
 
 
 def runner_of(
-    options: argparse.Namespace,
-    jobs: Sequence[Job],
-    deployment: Deployment,
-    stdout: TextIO,
-    load: Loading,
-    profile: Profile,
+    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, load: Loading
 ) -> Runner:
     """The runner of these jobs, announced."""
     plans = [job.plan for job in jobs]
@@ -161,7 +142,7 @@ def runner_of(
     order = schedule(options.jobs, expectation(backend), usage(backend))
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{forecast(order, jobs, backend)}\n")
-    shown = ProfiledProgress(progress.choose(stdout, [p.slug for p in plans], options.verbosity), profile)
+    shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
     backends = _backends(options, backend, plans, deployment, load)
     return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
 
@@ -198,7 +179,6 @@ def run(
     jobs: Sequence[Job],
     report: Path,
     stdout: TextIO,
-    profile: Profile,
     source: Origin,
     others: Sequence[Outcome] = (),
     said: Verbosity = Verbosity.NORMAL,
@@ -208,7 +188,6 @@ def run(
     ``others`` are outcomes of tests that did not run again and stay in the report.
     """
     slugs, kept = [job.plan.slug for job in jobs], {outcome.slug for outcome in others}
-    profile.enter(COMMAND, "run")
     in_place = runner.keep
     with recording(source) as record, next_report(report.resolve(), slugs, kept, in_place) as target:
         jobs = [replace(job, report=target.folder / job.plan.slug) for job in jobs]
@@ -218,7 +197,6 @@ def run(
         logs = {job.plan.slug: job.report / LOGS for job in jobs}
         summary.write(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, logs)
         stdout.flush()
-        profile.enter(COMMAND, "report")
         with undisturbed():
             circumstances = Circumstances((record(),), tuple(not_run))
             written = write(

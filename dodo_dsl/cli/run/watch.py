@@ -14,7 +14,6 @@ from dodo_dsl.cli.repeat.origin import origin
 from dodo_dsl.cli.run import command
 from dodo_dsl.cli.run.jobs import prepare
 from dodo_dsl.cli.run.loading import loading
-from dodo_dsl.cli.run.profile import Profile
 from dodo_dsl.cli.run.report_lock import reserved
 from dodo_dsl.cli.run.saved_files import Seen, saved, seen
 from dodo_dsl.outcome import Outcome
@@ -34,7 +33,7 @@ BEFORE = Path("the run before")
 
 def main(options: argparse.Namespace, stdout: TextIO) -> int:
     """Until Ctrl-C; the exit code is that of the latest outcomes."""
-    for name in ("compiled", "keep", "profile"):
+    for name in ("compiled", "keep"):
         if getattr(options, name):
             raise UsageError(f"--watch and --{name} do not go together")
     options.clock = options.clock or "lockstep"
@@ -100,14 +99,13 @@ class Watch:
                 return False
             if changed:
                 self._stdout.write(f"saved: {names}\n")
-            profile = Profile()
-            runner = command.runner_of(self._options, chosen, deployment, self._stdout, load, profile)
+            runner = command.runner_of(self._options, chosen, deployment, self._stdout, load)
             slugs = {job.plan.slug for job in jobs} - {job.plan.slug for job in chosen}
             others = [outcome for slug, outcome in self.outcomes.items() if slug in slugs]
             with reserved(self._options.report, self._stdout):
                 report, said = self._options.report, self._options.verbosity
                 source = origin(self._options, deployment)
-                outcomes, _ = command.run(runner, chosen, report, self._stdout, profile, source, others, said)
+                outcomes, _ = command.run(runner, chosen, report, self._stdout, source, others, said)
         self._show_change(outcomes)
         self.outcomes = {outcome.slug: outcome for outcome in [*others, *outcomes]}
         return runner.interrupted

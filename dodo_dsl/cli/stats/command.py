@@ -7,7 +7,7 @@ from typing import Any, TextIO
 from dodo_dsl.cli.display.colours import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
-from dodo_dsl.cli.stats import reuse, thesis
+from dodo_dsl.cli.stats import reuse
 from dodo_dsl.compiler import load
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.terminal import json_text, printable
@@ -22,7 +22,7 @@ it is fitted as they are listed, and to its mean over all orders. Points of one 
 true intervals are wider.
 """
 
-VERSION = 1
+VERSION = 2
 _ORDERS = (("in this order", reuse.in_order), ("mean of all orders", reuse.averaged))
 
 
@@ -50,7 +50,7 @@ def _services(specs: Sequence[Spec]) -> dict[str, tuple[str, ...]]:
 
 
 def as_text(tests: Mapping[str, Sequence[str]]) -> str:
-    """The growth test by test, the fits, and those of the thesis' table beside what it states."""
+    """The growth test by test, and the fits."""
     counts = reuse.in_order(list(tests.values()))
     width = max(map(len, tests))
     lines = [f"{'test':<{width}}  services  together  new"]
@@ -58,26 +58,13 @@ def as_text(tests: Mapping[str, Sequence[str]]) -> str:
         f"{name:<{width}}  {len(tests[name]):8}  {count:8g}  {', '.join(new)}".rstrip()
         for (name, new), count in zip(_new(tests), counts, strict=True)
     ]
-    lines += ["", *_fits(f"{len(tests)} tests, {counts[-1]:g} services", list(tests.values())), ""]
-    lines += _fits(
-        "thesis (Johansson and Paulsson, 2024), Table 5.1: 9 tests, 10 services", list(thesis.TESTS.values())
-    )
-    low, high = thesis.B_INTERVAL
-    stated = f"b = {thesis.B} ({low} to {high}); its a = {thesis.LN_A} is ln a"
-    lines += [f"  as the thesis states    {stated}; no order of its rows gives these figures"]
+    lines += ["", *_fits(f"{len(tests)} tests, {counts[-1]:g} services", list(tests.values()))]
     return "".join(f"{printable(line)}\n" for line in lines)
 
 
 def as_json(tests: Mapping[str, Sequence[str]]) -> str:
     """The same as one object."""
-    published = {"ln_a": thesis.LN_A, "b": thesis.B, "b_interval": thesis.B_INTERVAL}
-    document = {
-        "dodo": "reuse",
-        "version": VERSION,
-        "level": reuse.LEVEL,
-        "registry": _document(tests),
-        "thesis": {**_document(thesis.TESTS), "stated": published},
-    }
+    document = {"dodo": "reuse", "version": VERSION, "level": reuse.LEVEL, "registry": _document(tests)}
     return json_text(document)
 
 

@@ -36,7 +36,7 @@ def repository(tmp_path: Path) -> Path:
         (("--level", "sil", "--level", "dil", "--wall-timeout", "90"),
          "dodo run --level sil --level dil --wall-timeout 90"),
         (("--repeat", "3", "--retry-errors", "--fail-fast"), "dodo run --repeat 3 --retry-errors 1 --fail-fast"),
-        (("--application", "a b.yml", "-q", "--report", "out", "--profile"), "dodo run --application 'a b.yml'"),
+        (("--application", "a b.yml", "-q", "--report", "out"), "dodo run --application 'a b.yml'"),
     ],
 )  # fmt: skip
 def test_a_command_is_noted_that_does_the_same(words: tuple[str, ...], noted: str) -> None:

@@ -132,7 +132,7 @@ def test_it_looks_at_specs_maps_and_the_application_and_not_at_its_report(desk: 
     assert not [path for path in found if path.is_relative_to(desk.folder / "report")]
 
 
-@pytest.mark.parametrize("word", ["--keep", "--compiled=x", "--profile"])
+@pytest.mark.parametrize("word", ["--keep", "--compiled=x"])
 def test_some_options_make_no_sense_with_it(word: str) -> None:
     stdout, stderr = StringIO(), StringIO()
     assert main(["run", "--watch", word], stdout, stderr) == 2

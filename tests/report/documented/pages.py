@@ -102,14 +102,18 @@ def drive_kiwi(work: Path) -> None:
         (kiwi / "tests" / name).mkdir()
         (kiwi / "tests" / name / f"{name}.dodo.yml").write_text(spec)
     (kiwi / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: application/docker-compose.yml\n")
-    dodo(kiwi, "run", "sil-cones", "sil-curve", "--profile")
+    python(kiwi, "benchmarks.pictures.run_trace", "trace.json", "sil-cones", "sil-curve")
 
 
 def dodo(folder: Path, *words: str) -> None:
     """A command whose tests may fail, in a folder, without history of earlier runs."""
+    python(folder, "dodo_dsl", *words)
+
+
+def python(folder: Path, *words: str) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(folder.parent / "state")}
-    command = [sys.executable, "-m", "dodo_dsl", *words]
+    command = [sys.executable, "-m", *words]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1), done.stdout + done.stderr
 
@@ -153,8 +157,8 @@ def settled(page: Page) -> Picture:
 
 def trace(work: Path) -> str:
     """Where the time of the run with a profile went."""
-    profile = json.loads((work / "kiwi" / "dodo-report" / "profile.json").read_text())
-    return trace_picture.draw({"sil-cones and sil-curve at once": profile})
+    trace = json.loads((work / "kiwi" / "trace.json").read_text())
+    return trace_picture.draw({"sil-cones and sil-curve at once": trace})
 
 
 def sheet() -> Picture:
