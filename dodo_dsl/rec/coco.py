@@ -28,7 +28,7 @@ _PREFIX = "opendlv.logic.perception.Detection"
 _KINDS = ("BoundingBox", "Property", "Type")
 
 
-class Key(NamedTuple):
+class DetectionKey(NamedTuple):
     """The identity of a detection, common to its messages."""
 
     sample_time: int
@@ -88,7 +88,7 @@ def detections(
     """The detections with a box among the messages of ``rows``, by sample time; of one sender or all."""
     known = messages.names()
     kinds = {messages.id(_PREFIX + name): name for name in _KINDS if _PREFIX + name in known}
-    found: defaultdict[Key, Detection] = defaultdict(Detection)
+    found: defaultdict[DetectionKey, Detection] = defaultdict(Detection)
     chosen = rows[np.isin(recording.index["data_type"][rows], list(kinds))]
     for envelope in recording.envelopes(chosen):
         if sender_stamp not in (None, envelope.sender_stamp):
@@ -97,7 +97,7 @@ def detections(
             message = messages.decode(envelope.data_type, envelope.payload)
         except MessageError:
             continue
-        key = Key(envelope.sample_time, envelope.sender_stamp, message.detectionId)
+        key = DetectionKey(envelope.sample_time, envelope.sender_stamp, message.detectionId)
         _take(found[key], kinds[envelope.data_type], message)
     by_time: dict[int, list[Detection]] = {}
     for key in sorted(found):
@@ -107,7 +107,7 @@ def detections(
 
 
 @dataclass
-class Export:
+class CocoExport:
     """How frames are written into ``folder``: as ``png`` or ``jpg``, only those with a label or ``everything``.
 
     ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all.

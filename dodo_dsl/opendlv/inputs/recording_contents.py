@@ -28,7 +28,7 @@ _HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder wri
 
 
 @dataclass
-class Contents:
+class LookedThrough:
     """The senders of one message, up to the one that is looked for.
 
     ``ends_at`` is the byte behind the last whole message that was looked at; ``is_whole`` says that no
@@ -42,10 +42,10 @@ class Contents:
     senders: set[int] = field(default_factory=set)
 
 
-def look(path: Path, message: int, sender: int) -> Contents:
+def look(path: Path, message: int, sender: int) -> LookedThrough:
     """Looks for a message of a sender, from the begin to the first bytes that are no message; raises OSError."""
     with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
-        found = Contents(os.fstat(stream.fileno()).st_size)
+        found = LookedThrough(os.fstat(stream.fileno()).st_size)
         for body in _bodies(stream, found):
             if _type(body) == message:
                 found.senders.add(first_number(body, _STAMP_FIELD))
@@ -100,7 +100,7 @@ def _fault(path: Path, _changed_ns: int) -> str:
     """What is wrong with the times of messages; the libraries for that are loaded only where something may be."""
     try:
         with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
-            if not _is_doubtful(_bodies(stream, Contents(0))):
+            if not _is_doubtful(_bodies(stream, LookedThrough(0))):
                 return ""
         from dodo_dsl.opendlv.recordings import timing
         from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
@@ -136,7 +136,7 @@ def _time(body: bytes, wanted: int) -> int:
     return first_number(time, 1) * 1_000_000 + first_number(time, 2)
 
 
-def _read_by_index(path: Path, message: int, found: Contents) -> Iterator[InputError]:
+def _read_by_index(path: Path, message: int, found: LookedThrough) -> Iterator[InputError]:
     """What services make of a recording with damage; the libraries for that are loaded here only."""
     from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
 
@@ -154,7 +154,7 @@ def _read_by_index(path: Path, message: int, found: Contents) -> Iterator[InputE
             yield InputError(path, what, hint="'dodo rec cut' writes a part without it", is_slip=True)
 
 
-def _bodies(stream: BinaryIO, found: Contents) -> Iterator[bytes]:
+def _bodies(stream: BinaryIO, found: LookedThrough) -> Iterator[bytes]:
     """The encoded envelopes from the begin to the first that is not whole."""
     while found.ends_at < MOST_BYTES:
         header = stream.read(HEADER_BYTES)

@@ -38,7 +38,7 @@ from typing import Any
 import msgspec
 
 from dodo_dsl.run.load import snapshot
-from dodo_dsl.run.load.service_use import ServiceUse
+from dodo_dsl.run.load.service_use import UseReader
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
@@ -65,7 +65,7 @@ class Sandbox:
         self.isolation = isolation
         self.forks = forks
         umask = UMASK if isolation == "network" else -1
-        self.use = ServiceUse()
+        self.use = UseReader()
         self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), self.use.note_end, umask)
         self.places: Places | None = None
         self.times = ThreadTimes()
