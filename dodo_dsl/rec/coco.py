@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dodo_dsl.opendlv.inputs.truth_file import plain
 from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
@@ -150,11 +151,12 @@ class CocoExport:
 
 
 def _take(detection: Detection, kind: str, message: Any) -> None:
+    """The first message of a kind counts, as for the evaluator of detections."""
     if kind == "BoundingBox":
-        detection.box = (message.x, message.y, message.width, message.height)
+        detection.box = detection.box or (message.x, message.y, message.width, message.height)
     elif kind == "Property":
-        detection.label = message.property.removeprefix("color:").strip()
-    else:
+        detection.label = detection.label or plain(message.property)
+    elif detection.type is None:
         detection.type = message.type
 
 
