@@ -26,7 +26,7 @@ TILT = "tilt the board by 20 to 45 degrees to all sides"
 
 
 @dataclass(frozen=True)
-class View:
+class BoardView:
     """The board in a picture of ``size`` (width, height): corners in m on the board, and in px."""
 
     size: tuple[int, int]
@@ -59,7 +59,7 @@ class Intrinsics:
         return math.degrees(2 * math.atan(self.height / 2 / self.focal_y))
 
 
-def view(picture: Any) -> View | None:
+def view(picture: Any) -> BoardView | None:
     """What a picture (grey, or B, G, R) shows of the board; None for too little."""
     grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     model = board()
@@ -68,10 +68,10 @@ def view(picture: Any) -> View | None:
         return None
     corners = np.asarray(model.getChessboardCorners(), np.float32)[np.ravel(names)]
     height, width = grey.shape[:2]
-    return View((width, height), corners.reshape(-1, 1, 3), np.asarray(seen, np.float32).reshape(-1, 1, 2))
+    return BoardView((width, height), corners.reshape(-1, 1, 3), np.asarray(seen, np.float32).reshape(-1, 1, 2))
 
 
-def intrinsics(views: Sequence[View]) -> Intrinsics:
+def intrinsics(views: Sequence[BoardView]) -> Intrinsics:
     """From pictures of one camera; raises CalibrationProblem when they are not enough, or do not fit."""
     if len(views) < FEWEST_PICTURES:
         raise CalibrationProblem(f"{len(views)} pictures show the board, expected at least {FEWEST_PICTURES}")
@@ -116,7 +116,7 @@ def _tilted(turns: Sequence[Any]) -> int:
     return int((apart >= TILTED).sum())
 
 
-def _refuse_a_corner_of_the_picture(views: Sequence[View], size: tuple[int, int]) -> None:
+def _refuse_a_corner_of_the_picture(views: Sequence[BoardView], size: tuple[int, int]) -> None:
     """The lens is known only where the board was."""
     seen = np.concatenate([each.seen.reshape(-1, 2) for each in views])
     shares = (seen.max(axis=0) - seen.min(axis=0)) / np.array(size)

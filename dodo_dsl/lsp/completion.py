@@ -8,7 +8,7 @@ from dodo_dsl.check.rules.inputs import references
 from dodo_dsl.lsp import schema_keys
 from dodo_dsl.lsp.hover import parameter_text, service_text
 from dodo_dsl.lsp.incomplete import Cursor, cursor
-from dodo_dsl.lsp.scene import USES, WITH, Scene
+from dodo_dsl.lsp.scene import USES, WITH, DocumentContext
 from dodo_dsl.lsp.tree import Steps
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.deployment.rig import EMULATED_RIGS
@@ -29,7 +29,7 @@ Offer = tuple[str, types.CompletionItemKind, str, str]
 TRIGGERS = [" ", "{", "[", ",", "$", ".", "/"]
 
 
-def completion(scene: Scene, position: types.Position) -> types.CompletionList:
+def completion(scene: DocumentContext, position: types.Position) -> types.CompletionList:
     at = cursor(scene.lines.text, scene.lines.index(position))
     items = []
     if at is not None:
@@ -52,7 +52,7 @@ def _item(number: int, offer: Offer, place: types.Range) -> types.CompletionItem
     )
 
 
-def _offers(scene: Scene, at: Cursor) -> Iterator[Offer]:
+def _offers(scene: DocumentContext, at: Cursor) -> Iterator[Offer]:
     layered = scene.schema == "dodo" and len(at.steps) > 1 and at.steps[0] in LAYERS
     manifest = scene.manifest(at.steps, at.values.get((*at.steps[:2], USES), "")) if layered else None
     if layered and len(at.steps) > 2 and at.steps[2] == WITH:
@@ -73,7 +73,7 @@ def _offers(scene: Scene, at: Cursor) -> Iterator[Offer]:
         yield from _by_schema(scene, at)
 
 
-def _by_schema(scene: Scene, at: Cursor) -> Iterator[Offer]:
+def _by_schema(scene: DocumentContext, at: Cursor) -> Iterator[Offer]:
     part = schema_keys.at(scene.schema, at.steps) or {}
     if at.is_key:
         for name in part.get("properties", {}):
@@ -84,7 +84,7 @@ def _by_schema(scene: Scene, at: Cursor) -> Iterator[Offer]:
         yield from ((value, _VALUE, "", "") for value in schema_keys.values(part))
 
 
-def _rigs(scene: Scene, below: Steps) -> Iterator[Offer]:
+def _rigs(scene: DocumentContext, below: Steps) -> Iterator[Offer]:
     """Rigs by name; those of a pool (``below`` is what stands within ``rig``) in a list, or its kind."""
     rigs = scene.deployment.rigs if scene.deployment else {}
     if below == (ANY,):
@@ -94,7 +94,7 @@ def _rigs(scene: Scene, below: Steps) -> Iterator[Offer]:
         yield from ((name, _VALUE, "rig", "") for name in (*(() if below else EMULATED_RIGS), *rigs))
 
 
-def _services(scene: Scene, layer: str) -> Iterator[Offer]:
+def _services(scene: DocumentContext, layer: str) -> Iterator[Offer]:
     for manifest in scene.manifests.values():
         if layer in manifest.layers and is_offered(manifest):
             yield manifest.name, _SERVICE, manifest.description, service_text(manifest)
@@ -108,7 +108,7 @@ def _parameters(manifest: Manifest, present: Sequence[str]) -> Iterator[Offer]:
         yield parameter.name, _KEY, detail, parameter_text(parameter)
 
 
-def _values(scene: Scene, at: Cursor, parameter: Parameter) -> Iterator[Offer]:
+def _values(scene: DocumentContext, at: Cursor, parameter: Parameter) -> Iterator[Offer]:
     number = at.before.replace(".", "", 1).lstrip("+-").isdigit()
     if number and parameter.unit:
         yield from ((unit, _UNIT, f"{at.before} {unit}", "") for unit in quantity.units_of(parameter.unit))
@@ -128,7 +128,7 @@ def _values(scene: Scene, at: Cursor, parameter: Parameter) -> Iterator[Offer]:
             yield str(written(parameter, example)), _VALUE, detail, ""
 
 
-def _placeholders(scene: Scene, at: Cursor) -> list[str]:
+def _placeholders(scene: DocumentContext, at: Cursor) -> list[str]:
     """``matrix.light``, ``vary.speed``: those of the document before the cursor, and those of the extended test."""
     found = [f"{steps[0]}.{steps[1]}" for steps in at.values if steps[0] in (matrix.KEY, vary.KEY) and len(steps) > 1]
     if spec := scene.test.spec if scene.test else None:
@@ -137,7 +137,7 @@ def _placeholders(scene: Scene, at: Cursor) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _named(scene: Scene, at: Cursor, parameter: Parameter) -> list[str]:
+def _named(scene: DocumentContext, at: Cursor, parameter: Parameter) -> list[str]:
     """The names of the map, or other file, that the service has according to its text, or else to the last check."""
     source, _, key = parameter.among.partition(".")
     here = at.values.get((*at.steps[:3], source)), *(text for key, text in at.values.items() if key[3:] == (source,))

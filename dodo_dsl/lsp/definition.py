@@ -10,15 +10,15 @@ from dodo_dsl.check.rules.inputs.references import MAP
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.lsp.documents import saved_text, uri_of
 from dodo_dsl.lsp.positions import Lines
-from dodo_dsl.lsp.scene import USES, Scene
-from dodo_dsl.lsp.tree import Place, below, find
+from dodo_dsl.lsp.scene import USES, DocumentContext
+from dodo_dsl.lsp.tree import DocumentPlace, below, find
 from dodo_dsl.source import Mapping, path_of, read
 from dodo_dsl.spec import extends
 
 _FILES = ("application", "messages")
 
 
-def definition(scene: Scene, position: types.Position, codec: PositionCodec) -> types.Location | None:
+def definition(scene: DocumentContext, position: types.Position, codec: PositionCodec) -> types.Location | None:
     place = find(scene.root, *scene.lines.place(position)) if scene.root else None
     span = next(_spans(scene, place), None) if place else None
     if span is None:
@@ -27,7 +27,7 @@ def definition(scene: Scene, position: types.Position, codec: PositionCodec) -> 
     return types.Location(uri_of(path), Lines(saved_text(path), codec).range(span))
 
 
-def _spans(scene: Scene, place: Place) -> Iterator[Span]:
+def _spans(scene: DocumentContext, place: DocumentPlace) -> Iterator[Span]:
     """Where what stands at a place is defined."""
     steps = place.steps
     if scene.schema == "deployment":

@@ -6,14 +6,14 @@ from lsprotocol import types
 
 from dodo_dsl.check.wiring import End, Wiring
 from dodo_dsl.lsp import schema_keys
-from dodo_dsl.lsp.scene import USES, Scene
-from dodo_dsl.lsp.tree import Place, find
+from dodo_dsl.lsp.scene import USES, DocumentContext
+from dodo_dsl.lsp.tree import DocumentPlace, find
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.schema.editor_schema import description, written
 from dodo_dsl.terminal import printable
 
 
-def hover(scene: Scene, position: types.Position) -> types.Hover | None:
+def hover(scene: DocumentContext, position: types.Position) -> types.Hover | None:
     place = find(scene.root, *scene.lines.place(position)) if scene.root else None
     text = _text(scene, place) if place else ""
     if place is None or not text:
@@ -21,7 +21,7 @@ def hover(scene: Scene, position: types.Position) -> types.Hover | None:
     return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, text), scene.lines.range(place.span))
 
 
-def _text(scene: Scene, place: Place) -> str:
+def _text(scene: DocumentContext, place: DocumentPlace) -> str:
     if parameter := scene.parameter(place):
         return parameter_text(parameter)
     manifest = scene.manifest(place.steps)
@@ -59,7 +59,7 @@ def service_text(manifest: Manifest) -> str:
     return f"**{manifest.name}**: {printable(manifest.description)}\n\nLayer: {' or '.join(manifest.layers)}."
 
 
-def _wires(scene: Scene, name: str) -> Iterator[str]:
+def _wires(scene: DocumentContext, name: str) -> Iterator[str]:
     """Who hears a service of the test, and whom it hears, as lists."""
     if scene.test is None:
         return

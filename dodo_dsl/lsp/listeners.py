@@ -11,7 +11,7 @@ from dodo_dsl.lsp.definition import definition
 from dodo_dsl.lsp.edits.rename import prepare, rename
 from dodo_dsl.lsp.hover import hover
 from dodo_dsl.lsp.outline import outline
-from dodo_dsl.lsp.scene import Scene
+from dodo_dsl.lsp.scene import DocumentContext
 from dodo_dsl.lsp.server import DodoServer, log
 
 _WATCHED = "**/*.{yml,yaml,json,odvd,env}"
@@ -90,7 +90,7 @@ def _requests(server: DodoServer) -> None:
         return server.quick_fixes(params)
 
 
-def _answer(server: DodoServer, params: Any, work: Callable[[Scene], _Answer]) -> _Answer | None:
+def _answer(server: DodoServer, params: Any, work: Callable[[DocumentContext], _Answer]) -> _Answer | None:
     """The answer to a request about a document; None where it fails, which the log then says."""
     try:
         scene = server.scene(params.text_document.uri)

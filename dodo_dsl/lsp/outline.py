@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from lsprotocol import types
 
 from dodo_dsl.lsp.positions import Lines
-from dodo_dsl.lsp.scene import USES, WITH, Scene
+from dodo_dsl.lsp.scene import USES, WITH, DocumentContext
 from dodo_dsl.lsp.tree import below, last, text_of
 from dodo_dsl.source import Entry, Mapping, Sequence
 from dodo_dsl.spec.model import LAYERS
@@ -13,7 +13,7 @@ from dodo_dsl.spec.model import LAYERS
 _MAX_DETAIL = 80
 
 
-def outline(scene: Scene) -> list[types.DocumentSymbol]:
+def outline(scene: DocumentContext) -> list[types.DocumentSymbol]:
     return list(_symbols(scene.lines, scene.root, ())) if isinstance(scene.root, Mapping) else []
 
 

@@ -8,7 +8,7 @@ from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.lsp.positions import Lines
 from dodo_dsl.lsp.project import Project
 from dodo_dsl.lsp.texts import parse_text
-from dodo_dsl.lsp.tree import Place, Steps, below, text_of
+from dodo_dsl.lsp.tree import DocumentPlace, Steps, below, text_of
 from dodo_dsl.source import Node
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.deployment.deployment import FILE_NAME, Deployment
@@ -19,7 +19,7 @@ WITH, USES = "with", "uses"
 
 
 @dataclass(frozen=True)
-class Scene:
+class DocumentContext:
     """``root`` is the document as far as its text can be parsed; ``test`` is what the last check made of it."""
 
     path: Path
@@ -48,7 +48,7 @@ class Scene:
             return service.manifest
         return self.manifests.get(written)
 
-    def parameter(self, place: Place) -> Parameter | None:
+    def parameter(self, place: DocumentPlace) -> Parameter | None:
         """The parameter that a place belongs to."""
         manifest = self.manifest(place.steps)
         if manifest is None or len(place.steps) < 4 or place.steps[2] != WITH:
@@ -56,12 +56,12 @@ class Scene:
         return manifest.parameters.get(str(place.steps[3]))
 
 
-def scene(path: Path, lines: Lines, projects: Sequence[Project]) -> Scene:
+def scene(path: Path, lines: Lines, projects: Sequence[Project]) -> DocumentContext:
     """A document with what was found about its test when it was checked last."""
     root, _ = parse_text(lines.text, path)
     for project in projects:
         checked = project.checked
         test = next((test for test in checked.tests if test.spec.path == path), None)
         if test or checked.deployment.file == path:
-            return Scene(path, lines, root, checked.manifests, checked.deployment, test)
-    return Scene(path, lines, root, load_manifests()[0])
+            return DocumentContext(path, lines, root, checked.manifests, checked.deployment, test)
+    return DocumentContext(path, lines, root, load_manifests()[0])

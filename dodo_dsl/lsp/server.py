@@ -18,7 +18,7 @@ from dodo_dsl.lsp.documents import Document, opened, path_of, saved_text, uri_of
 from dodo_dsl.lsp.edits.quick_fixes import quick_fixes
 from dodo_dsl.lsp.positions import Lines
 from dodo_dsl.lsp.project import Project, Projects, by_file, is_ours
-from dodo_dsl.lsp.scene import Scene, scene
+from dodo_dsl.lsp.scene import DocumentContext, scene
 from dodo_dsl.terminal import printable
 
 PAUSE_S = 0.05
@@ -45,7 +45,7 @@ class DodoServer(LanguageServer):
     def lines(self, text: str) -> Lines:
         return Lines(text, self.workspace.position_codec)
 
-    def scene(self, uri: str) -> Scene | None:
+    def scene(self, uri: str) -> DocumentContext | None:
         """An open document of a test or deployment with what the last check found; None for any other."""
         path = path_of(uri)
         if path is None or not is_ours(path):

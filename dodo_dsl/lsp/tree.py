@@ -10,7 +10,7 @@ Steps = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
-class Place:
+class DocumentPlace:
     """A key or a scalar of a document, ``steps`` are the keys and indices that lead to it.
 
     ``value`` is the scalar, or what the key has.
@@ -26,14 +26,14 @@ class Place:
         return self.value.text if isinstance(self.value, Scalar) else ""
 
 
-def find(node: Node, line: int, column: int, steps: Steps = ()) -> Place | None:
+def find(node: Node, line: int, column: int, steps: Steps = ()) -> DocumentPlace | None:
     """The key or scalar at a line and column, which count from 1; None beside all."""
     if isinstance(node, Scalar):
-        return Place(steps, False, node.span, node) if _covers(node.span, line, column) else None
+        return DocumentPlace(steps, False, node.span, node) if _covers(node.span, line, column) else None
     if isinstance(node, Mapping):
         for key, entry in node.entries.items():
             if _covers(entry.key, line, column):
-                return Place((*steps, key), True, entry.key, entry.value)
+                return DocumentPlace((*steps, key), True, entry.key, entry.value)
         children: Iterable[tuple[str | int, Node]] = ((key, entry.value) for key, entry in node.entries.items())
     else:
         children = enumerate(node.items)

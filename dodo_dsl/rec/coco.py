@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dodo_dsl.opendlv.inputs.truth_file import plain
 from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
@@ -28,7 +29,7 @@ _PREFIX = "opendlv.logic.perception.Detection"
 _KINDS = ("BoundingBox", "Property", "Type")
 
 
-class Key(NamedTuple):
+class DetectionKey(NamedTuple):
     """The identity of a detection, common to its messages."""
 
     sample_time: int
@@ -88,7 +89,7 @@ def detections(
     """The detections with a box among the messages of ``rows``, by sample time; of one sender or all."""
     known = messages.names()
     kinds = {messages.id(_PREFIX + name): name for name in _KINDS if _PREFIX + name in known}
-    found: defaultdict[Key, Detection] = defaultdict(Detection)
+    found: defaultdict[DetectionKey, Detection] = defaultdict(Detection)
     chosen = rows[np.isin(recording.index["data_type"][rows], list(kinds))]
     for envelope in recording.envelopes(chosen):
         if sender_stamp not in (None, envelope.sender_stamp):
@@ -97,7 +98,7 @@ def detections(
             message = messages.decode(envelope.data_type, envelope.payload)
         except MessageError:
             continue
-        key = Key(envelope.sample_time, envelope.sender_stamp, message.detectionId)
+        key = DetectionKey(envelope.sample_time, envelope.sender_stamp, message.detectionId)
         _take(found[key], kinds[envelope.data_type], message)
     by_time: dict[int, list[Detection]] = {}
     for key in sorted(found):
@@ -107,7 +108,7 @@ def detections(
 
 
 @dataclass
-class Export:
+class CocoExport:
     """How frames are written into ``folder``: as ``png`` or ``jpg``, only those with a label or ``everything``.
 
     ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all.
@@ -150,11 +151,12 @@ class Export:
 
 
 def _take(detection: Detection, kind: str, message: Any) -> None:
+    """The first message of a kind counts, as for the evaluator of detections."""
     if kind == "BoundingBox":
-        detection.box = (message.x, message.y, message.width, message.height)
+        detection.box = detection.box or (message.x, message.y, message.width, message.height)
     elif kind == "Property":
-        detection.label = message.property.removeprefix("color:").strip()
-    else:
+        detection.label = detection.label or plain(message.property)
+    elif detection.type is None:
         detection.type = message.type
 
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from dodo_dsl.opendlv.messages.message_set import MessageSet, UnknownMessage
 from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.recordings.recording import Recording
 
 ABSOLUTE_S = 1e8  # seconds from here on are counted since 1970
@@ -36,13 +35,18 @@ class Excerpt:
         if self.messages:
             index = recording.index[rows]
             chosen = np.zeros(len(rows), np.bool_)
-            for text in self.messages:
-                id_, stamp = _parsed(text, known)
+            for id_, stamp in self._keys(known):
                 chosen |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
             rows = rows[chosen]
         if not len(rows):
             raise NothingSelected(f"nothing selected: no message of {recording.path} matches {self}")
         return rows
+
+    def _keys(self, known: MessageSet) -> list[tuple[int, int | None]]:
+        try:
+            return list(map(known.key, self.messages))
+        except UnknownMessage as error:
+            raise NothingSelected(str(error)) from None
 
     def __str__(self) -> str:
         options = [f"--message {message}" for message in self.messages]
@@ -55,14 +59,3 @@ def _microseconds(seconds: float | None, begin: int) -> int | None:
     if seconds is None:
         return None
     return round(seconds * 1e6) + (0 if seconds >= ABSOLUTE_S else begin)
-
-
-def _parsed(text: str, known: MessageSet) -> tuple[int, int | None]:
-    name, slash, stamp = text.partition("/")
-    if slash and not is_whole(stamp):
-        raise NothingSelected(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
-    try:
-        id_ = whole(name) if is_whole(name) else known.id(name)
-    except UnknownMessage as error:
-        raise NothingSelected(str(error)) from None
-    return id_, whole(stamp) if slash else None

@@ -27,7 +27,7 @@ _STEERING, _PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalP
 
 
 @dataclass(frozen=True)
-class Requests:
+class RequestedValues:
     """Values of a request by the time (us) that they are of."""
 
     times: Numbers
@@ -40,7 +40,7 @@ class Requests:
 
 
 @dataclass
-class Export:
+class SteeringExport:
     """Writes into ``folder``, as ``png`` or ``jpg``; ``progress`` and ``problem`` as of the COCO export."""
 
     folder: Path
@@ -78,9 +78,9 @@ class Export:
             writer.writerows(self.rows)
 
 
-def _requests(recording: Recording, messages: MessageSet, rows: Numbers, name: str, of: str) -> Requests:
+def _requests(recording: Recording, messages: MessageSet, rows: Numbers, name: str, of: str) -> RequestedValues:
     if name not in messages.names():
-        return Requests(np.zeros(0, np.int64), [])
+        return RequestedValues(np.zeros(0, np.int64), [])
     found: list[tuple[int, float]] = []
     chosen = rows[recording.index["data_type"][rows] == messages.id(name)]
     for time, envelope in zip(recording.index["time"][chosen].tolist(), recording.envelopes(chosen), strict=True):
@@ -91,4 +91,4 @@ def _requests(recording: Recording, messages: MessageSet, rows: Numbers, name: s
         if np.isfinite(value):
             found.append((time, value))
     found.sort(key=lambda one: one[0])
-    return Requests(np.array([time for time, _ in found], np.int64), [value for _, value in found])
+    return RequestedValues(np.array([time for time, _ in found], np.int64), [value for _, value in found])

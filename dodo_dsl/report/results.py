@@ -9,9 +9,9 @@ from typing import Any
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import MachineLoad, NotRun, Outcome, Response, ServiceUse, Wait
-from dodo_dsl.report.run_record import RunRecord, run_record
-from dodo_dsl.spec.goals import Goal, is_goal
+from dodo_dsl.outcome import NotRun, Outcome
+from dodo_dsl.report.run_record import RunRecord
+from dodo_dsl.spec.goals import is_goal
 
 FILE_NAME = "results.json"
 VERSION = 1
@@ -105,17 +105,22 @@ def load(path: Path) -> list[Outcome]:
 
 def read(path: Path) -> Results:
     """A ``results.json`` that its schema accepts; raises ResultsError."""
+    import msgspec
+
     try:
         document = json.loads(regular_file.text(path), parse_int=_whole)
         if document["dodo"] != "results" or document["version"] != VERSION:
             raise ResultsError(f"{path}: not results of version {VERSION}")
         _validate(document)
-        return Results([_outcome(t) for t in document["tests"]], _circumstances(document))
+        outcomes = msgspec.convert(document["tests"], tuple[Outcome, ...])
+        if not all(is_goal(goal) for outcome in outcomes for goal in outcome.goals):
+            raise ResultsError(f"{path}: a goal whose numbers make no score")
+        return Results(outcomes, msgspec.convert(document, Circumstances))
     except FileNotFoundError as error:
         raise ResultsError(f"there is no {path}") from error
     except OSError as error:
         raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError, msgspec.ValidationError) as error:
         raise ResultsError(f"{path}: not results of DoDo ({error})") from error
 
 
@@ -145,26 +150,3 @@ def _sentence(problem: Any) -> str:
     hint = did_you_mean(name, known.keys() - problem.instance.keys())
     told = f"; {hint}" if hint.startswith("did") else ""
     return f"{problem.json_path}: unknown key '{name[:_MAX_PROBLEM_TEXT]}'{told}"
-
-
-def _outcome(test: dict[str, Any]) -> Outcome:
-    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in test.items()}
-    response = Response(**test["response"]) if test.get("response") else None
-    goals = tuple(Goal(**goal) for goal in test.get("goals", ()))
-    if not all(map(is_goal, goals)):
-        raise ValueError("a goal whose numbers make no score")
-    resources = tuple(ServiceUse(**use) for use in test.get("resources", ()))
-    read = {"machine": _load(test.get("machine")), "response": response, "resources": resources, "goals": goals}
-    return Outcome(**{**values, **read})
-
-
-def _circumstances(document: dict[str, Any]) -> Circumstances:
-    runs = tuple(map(run_record, document.get("runs", ())))
-    return Circumstances(runs, tuple(NotRun(**test) for test in document.get("not_run", ())))
-
-
-def _load(machine: dict[str, Any] | None) -> MachineLoad | None:
-    if machine is None:
-        return None
-    waits = {key: Wait(**machine[key]) for key in ("application", "services") if machine.get(key)}
-    return MachineLoad(**{**machine, **waits})

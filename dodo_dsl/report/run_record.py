@@ -1,9 +1,7 @@
 """When, where and of what a run was, and how to repeat it."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 COMMIT = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
 _SHOWN = 12
@@ -40,8 +38,3 @@ class RunRecord:
         return ", ".join(
             [f"{date} UTC on {self.host} with DoDo {self.dodo}", *(r.in_words() for r in self.repositories)]
         )
-
-
-def run_record(row: Mapping[str, Any]) -> RunRecord:
-    """Of its JSON."""
-    return RunRecord(**{**row, "repositories": tuple(Repository(**each) for each in row["repositories"])})

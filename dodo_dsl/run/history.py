@@ -3,7 +3,6 @@
 import contextlib
 import functools
 import json
-import math
 import os
 import statistics
 import time
@@ -13,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import orjson
+import msgspec
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
@@ -149,11 +148,8 @@ def _read_at(path: Path, *_stamp: int) -> tuple[PastRun, ...]:
 
 
 def _past_run(line: bytes) -> PastRun | None:
-    with contextlib.suppress(ValueError, TypeError, AttributeError):
-        run = PastRun(**orjson.loads(line))
-        texts = (run.spec, run.test, run.level, run.backend, run.clock, run.outcome)
-        times = (run.setup_s, run.execution_s, run.cores or 0.0)
-        is_measured = all(isinstance(value, int | float) and math.isfinite(value) for value in run.checks.values())
-        if is_measured and all(isinstance(text, str) for text in texts) and all(0 <= s < math.inf for s in times):
+    with contextlib.suppress(msgspec.DecodeError):
+        run = msgspec.json.decode(line, type=PastRun)
+        if min(run.setup_s, run.execution_s, run.cores or 0.0) >= 0:
             return run
     return None

@@ -17,14 +17,14 @@ class NoSuchInstance(Exception):
 
 
 @dataclass(frozen=True)
-class Asked:
+class InstancePattern:
     """The name or pattern of tests, and values of parameters, one of which an instance has to have."""
 
     test: str
     values: Mapping[str, Sequence[str]]
 
 
-def parse(word: str) -> Asked | None:
+def parse(word: str) -> InstancePattern | None:
     """None where a word is anything else."""
     match = PATTERN.fullmatch(word)
     if match is None:
@@ -33,10 +33,10 @@ def parse(word: str) -> Asked | None:
     for pair in _COMMA.split(match["pairs"]):
         name, _, value = pair.partition("=")
         values.setdefault(name.strip(), []).append(value.strip())
-    return Asked(match["test"], values)
+    return InstancePattern(match["test"], values)
 
 
-def instances(asked: Asked, specs: Sequence[Spec]) -> list[Spec]:
+def instances(asked: InstancePattern, specs: Sequence[Spec]) -> list[Spec]:
     """Those of ``specs``, the instances of one or more tests, with the values; raises NoSuchInstance."""
     for name, values in asked.values.items():
         has_name = [spec for spec in specs if name in dict(spec.choice.values)]

@@ -19,7 +19,7 @@ class ResourceLimits:
     max_processor_share: float | None = None
 
 
-class Key(NamedTuple):
+class ResourceKey(NamedTuple):
     """A key of ``resources``, the field that it sets, its unit and bounds, and these in words."""
 
     name: str
@@ -30,10 +30,10 @@ class Key(NamedTuple):
 
 
 KEYS = (
-    Key("max-memory", "max_memory_mb", "MB", (1, 1e6), "1 MB to 1000 GB"),
-    Key("max-memory-growth", "max_memory_growth", "MB/min", (0, 1e6), "0 MB/min to 1000000 MB/min"),
-    Key("max-processor-time", "max_processor_time_s", "s", (0.01, 1e6), "10 ms to 1000000 s"),
-    Key("max-processor-share", "max_processor_share", SHARE, (0.0001, 1000), "0.01 % to 100000 %"),
+    ResourceKey("max-memory", "max_memory_mb", "MB", (1, 1e6), "1 MB to 1000 GB"),
+    ResourceKey("max-memory-growth", "max_memory_growth", "MB/min", (0, 1e6), "0 MB/min to 1000000 MB/min"),
+    ResourceKey("max-processor-time", "max_processor_time_s", "s", (0.01, 1e6), "10 ms to 1000000 s"),
+    ResourceKey("max-processor-share", "max_processor_share", SHARE, (0.0001, 1000), "0.01 % to 100000 %"),
 )
 
 

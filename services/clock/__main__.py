@@ -6,7 +6,7 @@ from pathlib import Path
 from services.base import Context, Service, run
 from services.base.clock import MICROSECONDS
 from services.base.identity.senders import SenderTable
-from services.base.lockstep.channel import Channel
+from services.base.lockstep.channel import ClockChannel
 from services.base.service import period_of
 from services.clock.answers import Answers, filters
 from services.clock.participants import Patience, Roles
@@ -23,7 +23,7 @@ def build(context: Context) -> Service:
     senders = SenderTable.load(context.messages, context.key)
     answering = (each.data_type for each in answers.filters)
     context.session.hear_only([*answering, *senders.ids, *(ids[name] for name in CONSUMED)])
-    channel = Channel(context.session.cid, context.messages, context.key)
+    channel = ClockChannel(context.session.cid, context.messages, context.key)
     context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])

@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base.identity.senders import SenderTable
 from services.base.identity.world import World
-from services.base.lockstep.channel import Channel
+from services.base.lockstep.channel import ClockChannel
 from services.base.lockstep.datagrams import STEP, STEP_DONE, EncodedEnvelope, Reassembly, decode, split
 
 REPEAT_S = 0.2
@@ -59,7 +59,7 @@ class Exchange:
     def __init__(
         self,
         session: Session,
-        channel: Channel,
+        channel: ClockChannel,
         take: Callable[[Envelope], None],
         senders: SenderTable | None = None,
     ) -> None:

@@ -14,7 +14,7 @@ from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base.clock import MICROSECONDS
 from services.base.identity.senders import SenderTable
-from services.base.lockstep.channel import Channel
+from services.base.lockstep.channel import ClockChannel
 from services.base.lockstep.lockstep_clock import EPOCH
 from services.base.service import Service
 from services.clock.answers import Answers
@@ -47,7 +47,7 @@ class ClockService(Service):
     def __init__(
         self,
         session: Session,
-        channel: Channel,
+        channel: ClockChannel,
         roles: Roles,
         answers: Answers,
         period: Fraction | int,

@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.memory import pixels
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.video.decoder import VideoError
 from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder
-from services.rec_recorder.source import Source, SourceError
+from services.rec_recorder.source import PictureSource, SourceError
 
 MESSAGE = "opendlv.proxy.ImageReading"
 
@@ -41,7 +41,7 @@ class Taken(NamedTuple):
 class RecordedCamera:
     """One memory's pictures, encoded; `sender_stamp` tells the memories of a recording apart."""
 
-    def __init__(self, source: Source, quality: Quality, messages: MessageSet, sender_stamp: int) -> None:
+    def __init__(self, source: PictureSource, quality: Quality, messages: MessageSet, sender_stamp: int) -> None:
         self._source, self._quality = source, quality
         self._messages, self._sender_stamp = messages, sender_stamp
         self._count = 0

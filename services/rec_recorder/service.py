@@ -8,7 +8,7 @@ from services.base import Context, Service
 from services.base.recorded.step_marks import RECORDING_END
 from services.base.service import period_of
 from services.rec_recorder.model import RecordingFile
-from services.rec_recorder.source import MemorySpec, Source, parse
+from services.rec_recorder.source import MemorySpec, PictureSource, parse
 from services.rec_recorder.traffic import Traffic
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def build(context: Context) -> Service:
     if flags["paused"]:
         recording.is_on = False
     period, is_stepped = flags["frames"] and round(period_of(flags["frames"])), context.clock.relays
-    sources = [Source(spec, period, is_stepped=is_stepped) for spec in memories if flags["frames"]]
+    sources = [PictureSource(spec, period, is_stepped=is_stepped) for spec in memories if flags["frames"]]
     cameras = _cameras(context, sources, recording) if sources else None
     snapshot = _snapshot(context, Path(flags["snapshot"]), memories[0]) if flags["snapshot"] else None
     recorder = Recorder(recording, cameras, snapshot, flags["commands"], _looks_hz(context))
@@ -115,12 +115,12 @@ def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None
 def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "SnapshotWriter":
     from services.rec_recorder.snapshot import SnapshotWriter
 
-    snapshot = SnapshotWriter(Source(memory, 1), path)
+    snapshot = SnapshotWriter(PictureSource(memory, 1), path)
     context.resources.callback(snapshot.close)
     return snapshot
 
 
-def _cameras(context: Context, sources: list[Source], recording: RecordingFile) -> "Cameras":
+def _cameras(context: Context, sources: list[PictureSource], recording: RecordingFile) -> "Cameras":
     from services.rec_recorder.pictures import Cameras, Quality, RecordedCamera
 
     flags = context.flags

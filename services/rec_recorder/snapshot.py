@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 
 from dodo_dsl.opendlv.memory import pixels
-from services.rec_recorder.source import Source
+from services.rec_recorder.source import PictureSource
 
 _log = logging.getLogger(__name__)
 
@@ -17,7 +17,7 @@ class SnapshotWriter:
     A picture that cannot be written is logged; the recording goes on.
     """
 
-    def __init__(self, source: Source, path: Path) -> None:
+    def __init__(self, source: PictureSource, path: Path) -> None:
         self._source, self._path = source, path
         self._is_wanted = True
         self._is_ours = False

@@ -62,7 +62,7 @@ def parse(text: str) -> MemorySpec:
     return MemorySpec(match["name"], int(match["width"] or 0), int(match["height"] or 0))
 
 
-class Source:
+class PictureSource:
     """The newest picture of a memory, at most one each `period` microseconds of its own sample times.
 
     It polls the memory and never waits for a notification, so that a camera that counts its readers does not see it.

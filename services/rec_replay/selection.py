@@ -7,7 +7,6 @@ import numpy as np
 
 from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet, UnknownMessage
 from dodo_dsl.opendlv.messages.varints import Marks, Numbers
-from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.recordings import timing
 from dodo_dsl.opendlv.recordings.recording import Recording
 
@@ -91,18 +90,10 @@ def _stretch(recording: Recording, selection: Selection) -> Numbers:
 
 def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:
     marks: Marks = np.zeros(len(index), np.bool_)
-    for text in texts:
-        id_, stamp = _parsed(text, known)
+    try:
+        keys = list(map(known.key, texts))
+    except UnknownMessage as error:
+        raise SelectionError(str(error)) from None
+    for id_, stamp in keys:
         marks |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
     return marks
-
-
-def _parsed(text: str, known: MessageSet) -> tuple[int, int | None]:
-    name, slash, stamp = text.partition("/")
-    if slash and not is_whole(stamp):
-        raise SelectionError(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
-    try:
-        id_ = whole(name) if is_whole(name) else known.id(name)
-    except UnknownMessage as error:
-        raise SelectionError(f"{error} (or give an id)") from None
-    return id_, whole(stamp) if slash else None

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from dodo_dsl.calibration import board
-from dodo_dsl.calibration.intrinsics import View, intrinsics, view
+from dodo_dsl.calibration.intrinsics import BoardView, intrinsics, view
 from dodo_dsl.calibration.problem import CalibrationProblem
 from tests.calibration.board_pictures import HEIGHT, LENS, MATRIX, WIDTH, pictures
 
 
 @cache
-def views() -> list[View]:
+def views() -> list[BoardView]:
     return [seen for seen in map(view, pictures()) if seen]
 
 

@@ -26,42 +26,61 @@ def test_settings_replace_seed_and_wall_timeout() -> None:
     assert from_json(to_json(BASE), Settings(wall_timeout_s=9.0)).lockstep is None
 
 
+STEPPED = {"readers": 1, "wall_timeout_s": 1, "max_response_s": None, "response_over": 0, "is_copied": False}
+LIMITS = dict.fromkeys(("max_memory_mb", "max_memory_growth", "max_processor_time_s", "max_processor_share"))
 WRONG: list[tuple[str, Any, str]] = [
     ("slug", "../x", "slug"),
-    ("name", 3, "string"),
     ("spec", "a\0b", "string"),
-    ("more_tags", [3], "string"),
-    ("pool", {"name": "drive", "slug": "../drive"}, "pool"),
+    ("pool", {"name": "drive", "slug": "../drive"}, "slug"),
     ("level", "mil", "level"),
     ("isolation", "none", "isolation"),
     ("timeout_s", 0, "timeout_s"),
-    ("timeout_s", "60", "timeout_s"),
     ("cid", 255, "cid"),
     ("seed", 1 << 32, "seed"),
-    ("lockstep", {"readers": 0, "wall_timeout_s": 1}, "lockstep"),
-    ("resources", {"max_memory_mb": "200"}, "resources"),
-    ("resources", {"max_processor_share": -0.1}, "resources"),
+    ("lockstep", STEPPED | {"readers": 0}, "lockstep"),
+    ("lockstep", STEPPED | {"response_over": 1.1}, "lockstep"),
+    ("resources", LIMITS | {"max_processor_share": -0.1}, "resources"),
     ("messages", ["../x.odvd"], "messages"),
     ("messages", ["/x.odvd"], "messages"),
     ("import_paths", ["a\0b"], "import path"),
     ("shared", {"a.rec": "../a.rec"}, "shared file"),
     ("shared", {"../a.rec": f"{'0' * 64}-a.rec"}, "shared file"),
     ("goals", [{"check": "time", "zero": 1, "one": 1, "weight": 1}], "goal"),
-    ("goals", [{"check": 3, "zero": 1, "one": 2, "weight": 1}], "goal"),
 ]
 WRONG_SERVICES: list[tuple[str, Any, str]] = [
     ("name", "../x", "service name"),
     ("layer", "logic", "service layer"),
     ("flags", [{"name": "map", "value": "../x", "kind": "path"}], "flag"),
-    ("flags", [{"name": "map", "value": "x", "kind": "other"}], "flag"),
     ("setup_s", -1, "set-up time"),
     ("devices", ["/etc/passwd"], "device"),
-    ("process", [1], "command"),
 ]
-WRONG_APPLICATIONS: list[tuple[str, Any, str]] = [
-    ("command", [1], "command"),
-    ("environment", [], "environment"),
-    ("env_files", [1], "environment file"),
+OTHER_TYPES: list[tuple[str, Any, str]] = [
+    ("name", 3, "Expected `str`, got `int` - at `$.name`"),
+    ("more_tags", [3], "Expected `str`, got `int` - at `$.more_tags[0]`"),
+    ("timeout_s", "60", "Expected `float`, got `str` - at `$.timeout_s`"),
+    ("seed", True, "Expected `int`, got `bool` - at `$.seed`"),
+    (
+        "resources",
+        LIMITS | {"max_memory_mb": "2"},
+        "Expected `float | null`, got `str` - at `$.resources.max_memory_mb`",
+    ),
+    ("goals", [{"check": 3, "zero": 1, "one": 2, "weight": 1}], "Expected `str`, got `int` - at `$.goals[0].check`"),
+    (
+        "services.0.flags",
+        [{"name": "map", "value": "x", "kind": "other"}],
+        "Invalid enum value 'other' - at `$.services",
+    ),
+    ("services.0.process", [1], "Expected `str`, got `int` - at `$.services[0].process[0]`"),
+    ("application.services.0.command", [1], "Expected `str`, got `int` - at `$.application.services[0].command[0]`"),
+    ("application.services.0.environment", [], "Expected `object`, got `array`"),
+    ("application.services.0.env_files", [1], "Expected `str`, got `int`"),
+    ("application.access.outside", 1, "Expected `bool`, got `int` - at `$.application.access.outside`"),
+]
+OTHER_KEYS: list[tuple[str, Any]] = [
+    ("services.0.flags", [{"name": "map", "value": "x", "kind": "text", "more": 1}]),
+    ("services.0.flags", [{"name": "map", "value": "x"}]),
+    ("application.access", {}),
+    ("timeout_s", float("nan")),
 ]
 
 
@@ -88,11 +107,24 @@ def test_wrong_values_of_services(key: str, value: Any, problem: str) -> None:
     assert f"(wrong {problem})" in refused(found)
 
 
-@pytest.mark.parametrize(("key", "value", "problem"), WRONG_APPLICATIONS)
-def test_wrong_values_of_the_application(key: str, value: Any, problem: str) -> None:
+def with_value(place: str, value: Any) -> dict[str, Any]:
     found = document()
-    found["application"]["services"][0][key] = value
-    assert f"(wrong {problem})" in refused(found)
+    *steps, key = place.split(".")
+    inner: Any = found
+    for step in steps:
+        inner = inner[int(step) if step.isdigit() else step]
+    inner[key] = value
+    return found
+
+
+@pytest.mark.parametrize(("place", "value", "problem"), OTHER_TYPES)
+def test_values_of_another_type(place: str, value: Any, problem: str) -> None:
+    assert refused(with_value(place, value)).startswith(f"not a compiled test ({problem}")
+
+
+@pytest.mark.parametrize(("place", "value"), OTHER_KEYS)
+def test_missing_and_unknown_keys_at_any_depth(place: str, value: Any) -> None:
+    assert "(its keys are not those of this version)" in refused(with_value(place, value))
 
 
 @pytest.mark.parametrize("after", [("b", "a"), ("c", "a", "b")])
@@ -118,7 +150,7 @@ def test_another_version() -> None:
     assert refused({**document(), "version": 0}) == "not a compiled test (not a plan of version 1); compile it again"
 
 
-@pytest.mark.parametrize("key", sorted(document().keys() - {"rig"}))
+@pytest.mark.parametrize("key", sorted(document()))
 def test_a_missing_or_an_unknown_key(key: str) -> None:
     found = document()
     del found[key]

@@ -27,9 +27,10 @@ def drive(record: Callable[..., Path]) -> Path:
     envelopes = [
         *video(12),
         *cone(BEGIN + 700_000, 0, "yellow", 0.25),
-        *cone(BEGIN + 700_000, 1, "color:blue", 0.5),
+        *cone(BEGIN + 700_000, 1, " color:blue ", 0.5),
         *cone(BEGIN + 1_000_000, 0, "", 0.0, 3),
         *cone(BEGIN + 50_000, 0, "yellow", 0.75),
+        *cone(BEGIN + 700_000, 1, "red", 0.25),
         message(PREFIX + "Property", BEGIN, property="boxless"),
         message(PREFIX + "BoundingBox", BEGIN, x=float("nan")),
     ]

@@ -50,7 +50,7 @@ _PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
 
 
 @dataclass(frozen=True)
-class Drive:
+class RecordedDrive:
     """What a recording holds: ``cameras`` are sender stamps, that with most pictures first; ``duration`` is in s.
 
     ``gap`` is the longest time without a message in s. ``retimed`` are messages with their times of receipt, where
@@ -72,7 +72,7 @@ class Drive:
         return max(self.values) - min(self.values) or max(map(abs, self.values)) or 1.0
 
 
-def look(path: Path, sent: Collection[str]) -> Drive:
+def look(path: Path, sent: Collection[str]) -> RecordedDrive:
     """Looks into a recording; ``sent`` are messages of the application. Raises UsageError without a signal to judge."""
     with files_of_the_user(), Recording(path) as recording:
         if recording.size > LARGEST_BYTES:
@@ -91,7 +91,7 @@ def look(path: Path, sent: Collection[str]) -> Drive:
         gap = float(np.diff(times).max(initial=0)) / 1e6
         retimed = None if received is None else _retimed(recording, received)
     names = {stream.name for stream in streams if stream.name}
-    return Drive(
+    return RecordedDrive(
         float(times[-1] - times[0]) / 1e6,
         gap,
         retimed,
@@ -139,7 +139,7 @@ def _values(
     return tuple(value for value in values if math.isfinite(value)) or (0.0,)
 
 
-def files(name: str, path: Path, drive: Drive, registry: Path, root: Path) -> tuple[list[New], str]:
+def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path) -> tuple[list[New], str]:
     """The test's files, its spec first, with the recording where the registry has it not yet; and what was found."""
     place = path.resolve()
     copies = []
@@ -172,7 +172,7 @@ def files(name: str, path: Path, drive: Drive, registry: Path, root: Path) -> tu
     return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)
 
 
-def unpassable(path: Path, drive: Drive, application: ApplicationSource | None) -> str:
+def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None) -> str:
     """A warning where services of the application read pictures, of which the recording has none."""
     readers = [] if drive.cameras or application is None else memories.readers(application, _MEMORIES)
     if not readers:
@@ -194,7 +194,7 @@ def _limit(value: float) -> str:
     return f"{value:.{min(digits, 9)}f}"
 
 
-def _found(path: Path, drive: Drive, field: str) -> str:
+def _found(path: Path, drive: RecordedDrive, field: str) -> str:
     target = f"{drive.target.name}/{drive.target.sender_stamp}"
     lines = [
         f"{shown_path(str(path))}: {drive.duration:.1f} s, {_cameras(drive.cameras)}",

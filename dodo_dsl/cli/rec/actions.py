@@ -6,7 +6,7 @@ from typing import TextIO
 
 from dodo_dsl import atomic
 from dodo_dsl.cli.progress_bar import progress_bar
-from dodo_dsl.cli.rec.job import Job, tell
+from dodo_dsl.cli.rec.job import RecJob, tell
 from dodo_dsl.cli.rec.message_sets import messages_for
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.rec import contents, cut
@@ -30,7 +30,7 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
         recording = Recording(path, progress)
     with recording:
         version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
-        job = Job(options, recording, messages, stdout, stderr)
+        job = RecJob(options, recording, messages, stdout, stderr)
         if options.action == "info":
             _info(job, version)
         elif options.action == "cut":
@@ -49,7 +49,7 @@ def _only_one(options: argparse.Namespace) -> Path:
     return files[0]
 
 
-def _info(job: Job, version: str) -> None:
+def _info(job: RecJob, version: str) -> None:
     images = len(job.recording.rows(messages=[IMAGE]))
     with job.progress("decoding frames", images) as progress:
         decoding = None if job.options.no_decode else progress
@@ -60,7 +60,7 @@ def _info(job: Job, version: str) -> None:
         job.stdout.write(contents_text(found, job.recording))
 
 
-def _cut(job: Job) -> None:
+def _cut(job: RecJob) -> None:
     output = job.file()
     rows = job.rows()
     with atomic.replacing(output, durable=True) as place, job.progress(f"writing {output.name}", len(rows)) as progress:

@@ -9,7 +9,7 @@ from typing import TextIO
 from dodo_dsl import atomic
 from dodo_dsl.cli.progress_bar import progress_bar
 from dodo_dsl.cli.rec.exports import boxes_of, images_for, tell_lost
-from dodo_dsl.cli.rec.job import Job, tell
+from dodo_dsl.cli.rec.job import RecJob, tell
 from dodo_dsl.cli.rec.message_sets import messages_for
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.rec import coco, steering
@@ -48,12 +48,12 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
 
 
 @contextmanager
-def _opened(path: Path, options: argparse.Namespace, stderr: TextIO) -> Iterator[Job]:
+def _opened(path: Path, options: argparse.Namespace, stderr: TextIO) -> Iterator[RecJob]:
     with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
         recording = Recording(path, progress)
     with recording:
         _, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
-        yield Job(options, recording, messages, stdout=stderr, stderr=stderr)
+        yield RecJob(options, recording, messages, stdout=stderr, stderr=stderr)
 
 
 def _no_progress(_: int) -> None:
@@ -61,7 +61,7 @@ def _no_progress(_: int) -> None:
 
 
 def _coco(options: argparse.Namespace, folder: Path, files: Sequence[tuple[Path, str]], stderr: TextIO) -> str:
-    export = coco.Export(folder, options.pictures, options.all, _no_progress, lambda text: tell(stderr, text))
+    export = coco.CocoExport(folder, options.pictures, options.all, _no_progress, lambda text: tell(stderr, text))
     for path, name in files:
         with _opened(path, options, stderr) as job:
             images, rows = images_for(job, "choose senders with --camera and --labels")
@@ -76,7 +76,7 @@ def _coco(options: argparse.Namespace, folder: Path, files: Sequence[tuple[Path,
 
 
 def _steering(options: argparse.Namespace, folder: Path, files: Sequence[tuple[Path, str]], stderr: TextIO) -> str:
-    export = steering.Export(folder, options.pictures, _no_progress, lambda text: tell(stderr, text))
+    export = steering.SteeringExport(folder, options.pictures, _no_progress, lambda text: tell(stderr, text))
     for path, name in files:
         with _opened(path, options, stderr) as job:
             images, rows = images_for(job, "choose a sender with --camera")
@@ -92,7 +92,7 @@ def _steering(options: argparse.Namespace, folder: Path, files: Sequence[tuple[P
 
 
 @contextmanager
-def _counted(job: Job, export: "coco.Export | steering.Export", images: int) -> Iterator[None]:
+def _counted(job: RecJob, export: "coco.CocoExport | steering.SteeringExport", images: int) -> Iterator[None]:
     with job.progress(f"decoding {job.recording.path.name}", images) as progress:
         show: Callable[[int], None] = progress
         export.progress = show

@@ -7,7 +7,7 @@ import numpy as np
 
 from dodo_dsl import atomic
 from dodo_dsl.cli.errors import require_extra
-from dodo_dsl.cli.rec.job import Job, tell
+from dodo_dsl.cli.rec.job import RecJob, tell
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.rec import coco, csv_table, labels
 from dodo_dsl.rec.excerpt import NothingSelected
@@ -19,7 +19,7 @@ from dodo_dsl.rec.outputs import refuse_existing
 MOST_TABLES = 1000
 
 
-def _csv(job: Job) -> None:
+def _csv(job: RecJob) -> None:
     recording, messages, folder = job.recording, job.messages, job.folder()
     known, unknown = _known(job)
     names = csv_table.names(recording, messages, known)
@@ -31,7 +31,7 @@ def _csv(job: Job) -> None:
     job.stdout.write(f"{folder}: {len(names)} tables with {len(known) - undecodable.total()} rows\n")
 
 
-def _known(job: Job) -> tuple[Numbers, list[int]]:
+def _known(job: RecJob) -> tuple[Numbers, list[int]]:
     """The selected rows with known messages, and the ids of the unknown ones; raises NothingSelected for none."""
     rows = job.rows()
     types = job.recording.index["data_type"][rows]
@@ -41,13 +41,13 @@ def _known(job: Job) -> tuple[Numbers, list[int]]:
     return known, sorted(set(types.tolist()) - job.messages.ids())
 
 
-def _refuse_many(job: Job, count: int, what: str) -> None:
+def _refuse_many(job: RecJob, count: int, what: str) -> None:
     if count > MOST_TABLES:
         reason = f"would become {count} {what}, expected at most {MOST_TABLES}"
         raise NothingSelected(f"{job.recording.path} {reason}; choose messages with --message")
 
 
-def _tell_skipped(job: Job, undecodable: Mapping[int, int], unknown: list[int]) -> None:
+def _tell_skipped(job: RecJob, undecodable: Mapping[int, int], unknown: list[int]) -> None:
     for id_, count in undecodable.items():
         name = job.messages.name(id_)
         job.tell(f"skipped {count} payload{'s' * (count > 1)} of {name} that cannot be decoded")
@@ -55,7 +55,7 @@ def _tell_skipped(job: Job, undecodable: Mapping[int, int], unknown: list[int]) 
         job.tell(f"skipped unknown messages: {', '.join(map(str, unknown))}")
 
 
-def _coco(job: Job) -> None:
+def _coco(job: RecJob) -> None:
     recording, options, folder = job.recording, job.options, job.folder()
     images, rows = images_for(job, "choose senders with --camera and --labels")
     boxes = boxes_of(job, rows, images)
@@ -63,13 +63,13 @@ def _coco(job: Job) -> None:
         raise NothingSelected(f"{recording.path} has no detections with a box; --all exports frames without them")
     refuse_existing([folder / coco.ANNOTATIONS], options.force)
     with atomic.files_into(folder) as place, job.progress("decoding frames", len(images)) as progress:
-        export = coco.Export(place, options.pictures, options.all, progress, job.tell)
+        export = coco.CocoExport(place, options.pictures, options.all, progress, job.tell)
         result = export.write(recording, images, boxes)
     _tell_lost(job, result.lost, len(images))
     job.stdout.write(f"{folder}: {len(result.images)} frames with {len(result.boxes)} boxes\n")
 
 
-def images_for(job: Job, instead: str) -> tuple[Numbers, Numbers]:
+def images_for(job: RecJob, instead: str) -> tuple[Numbers, Numbers]:
     """The selected frames of one camera, and all selected rows."""
     if job.options.message:
         raise NothingSelected(f"--message does not apply to --{job.options.format}; {instead}")
@@ -77,7 +77,7 @@ def images_for(job: Job, instead: str) -> tuple[Numbers, Numbers]:
     return images_of(job.recording, rows, job.options.camera), rows
 
 
-def boxes_of(job: Job, rows: Numbers, images: Numbers) -> Mapping[int, list[coco.Detection]]:
+def boxes_of(job: RecJob, rows: Numbers, images: Numbers) -> Mapping[int, list[coco.Detection]]:
     """The boxes that label the frames, by sample time; raises NothingSelected."""
     if job.options.truth is None:
         return coco.detections(job.recording, job.messages, rows, job.options.labels)
@@ -86,7 +86,7 @@ def boxes_of(job: Job, rows: Numbers, images: Numbers) -> Mapping[int, list[coco
     return labels.of_truth(job.recording, images, job.options.truth)
 
 
-def _tell_lost(job: Job, lost: int, of: int) -> None:
+def _tell_lost(job: RecJob, lost: int, of: int) -> None:
     if lost:
         job.tell(f"{lost} of {of} packets cannot be decoded")
 
@@ -97,7 +97,7 @@ def tell_lost(stderr: TextIO, lost: int) -> None:
         tell(stderr, f"{lost} packet{'s' * (lost > 1)} cannot be decoded")
 
 
-def _frames(job: Job) -> None:
+def _frames(job: RecJob) -> None:
     recording, options, folder = job.recording, job.options, job.folder()
     images, _ = images_for(job, "choose a sender with --camera")
     names = frame_files.names(recording, images, options.pictures)
@@ -108,7 +108,7 @@ def _frames(job: Job) -> None:
     job.stdout.write(f"{folder}: {written} frames\n")
 
 
-def _video(job: Job) -> None:
+def _video(job: RecJob) -> None:
     output = job.file(".mp4")
     images, _ = images_for(job, "choose a sender with --camera")
     with atomic.replacing(output) as place, job.progress(f"writing {output.name}", len(images)) as progress:
@@ -123,7 +123,7 @@ def _video(job: Job) -> None:
     job.stdout.write(f"{output}: {video.frames} frames of {video.size[0]} x {video.size[1]} pixels, {how}\n")
 
 
-def _mcap(job: Job) -> None:
+def _mcap(job: RecJob) -> None:
     require_extra("--mcap", "mcap")
     from dodo_dsl.rec.export import mcap_file
 
@@ -137,7 +137,7 @@ def _mcap(job: Job) -> None:
     job.stdout.write(f"{output}: {written.messages} messages, and {written.converted} of them for Foxglove, too\n")
 
 
-EXPORTS: Mapping[str, Callable[[Job], None]] = {
+EXPORTS: Mapping[str, Callable[[RecJob], None]] = {
     "csv": _csv,
     "coco": _coco,
     "frames": _frames,

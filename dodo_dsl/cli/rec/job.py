@@ -17,7 +17,7 @@ from dodo_dsl.terminal import printable
 
 
 @dataclass(frozen=True)
-class Job:
+class RecJob:
     """A command line, the recording that it names, opened, and its messages."""
 
     options: argparse.Namespace

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from dodo_dsl.calibration import rig_entry
-from dodo_dsl.calibration.intrinsics import FEWEST_CORNERS, FEWEST_PICTURES, Intrinsics, View, intrinsics, view
+from dodo_dsl.calibration.intrinsics import FEWEST_CORNERS, FEWEST_PICTURES, BoardView, Intrinsics, intrinsics, view
 from dodo_dsl.calibration.problem import CalibrationProblem
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.exits import Exit
@@ -51,7 +51,7 @@ def measure(options: argparse.Namespace, deployment: Deployment, rig: Rig, stdou
     return Exit.OK
 
 
-def _of_folder(folder: Path, say: Callable[[str], None]) -> list[View]:
+def _of_folder(folder: Path, say: Callable[[str], None]) -> list[BoardView]:
     if not folder.is_dir():
         raise UsageError(f"--pictures: {folder} is not a folder")
     files = sorted(file for file in folder.iterdir() if file.suffix.lower() in (".png", ".jpg", ".jpeg"))
@@ -80,11 +80,11 @@ def _of_camera(
     rig: Rig,
     ask: Callable[[str], str],
     say: Callable[[str], None],
-) -> list[View]:
+) -> list[BoardView]:
     snapshot = camera.snapshot(rig, load_manifests(deployment.services)[0], None)
     devices = devices_in(snapshot.words)
     refuse_forbidden(devices, STILL, [deployment.root])
-    views: list[View] = []
+    views: list[BoardView] = []
     say(f"hold the board {HOW}; {FEWEST_PICTURES} pictures are the fewest")
     with (
         tempfile.TemporaryDirectory() as folder,

@@ -14,7 +14,7 @@ from dodo_dsl.run.history import History
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenReport:
     """What became of a report: sentences on ``problems``, and where it is."""
 
     sentence: str
@@ -36,14 +36,16 @@ def write(
     others: Sequence[Outcome],
     circumstances: results.Circumstances,
     drawn: Mapping[str, Sequence[str]],
-) -> Written:
+) -> WrittenReport:
     """Puts the report of these jobs in its place, which is ``shown`` to users; ``others`` are of an earlier run.
 
     ``drawn`` are the slugs of tests that are drawn already, with sentences on problems. Where no test began, the report
     before stays.
     """
     if not outcomes and circumstances.not_run and (target.place / results.FILE_NAME).is_file():
-        return Written(f"report: no test of this run began, so {shown / 'index.html'} is still that of the run before")
+        return WrittenReport(
+            f"report: no test of this run began, so {shown / 'index.html'} is still that of the run before"
+        )
     tests = {job.plan.slug: job.test for job in jobs}
     history = History()
     history.add((tests[outcome.slug], outcome) for outcome in outcomes)
@@ -59,8 +61,8 @@ def write(
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
         target.stays = True
         left = "" if target.folder == target.place else f"what it has until the next run is in {target.folder}\n"
-        return Written(f"'{shown}' cannot take the whole report: {why}\n{left}".rstrip("\n"), is_whole=False)
+        return WrittenReport(f"'{shown}' cannot take the whole report: {why}\n{left}".rstrip("\n"), is_whole=False)
     finally:
         history.save()
     instead = f"; it replaces an earlier one with {count(gone, 'other test')}" if gone else ""
-    return Written(f"report: {shown / 'index.html'}{instead}", problems)
+    return WrittenReport(f"report: {shown / 'index.html'}{instead}", problems)

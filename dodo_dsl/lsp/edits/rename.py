@@ -8,8 +8,8 @@ from pygls.exceptions import JsonRpcInvalidParams
 
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.lsp.documents import uri_of
-from dodo_dsl.lsp.scene import Scene
-from dodo_dsl.lsp.tree import Place, below, find
+from dodo_dsl.lsp.scene import DocumentContext
+from dodo_dsl.lsp.tree import DocumentPlace, below, find
 from dodo_dsl.source import Mapping, Scalar, walk
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.model import LAYERS
@@ -19,13 +19,13 @@ _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 _LONGEST = 40
 
 
-def prepare(scene: Scene, position: types.Position) -> types.Range | None:
+def prepare(scene: DocumentContext, position: types.Position) -> types.Range | None:
     """The range of the name at a position; None where nothing can be renamed."""
     name = _name(scene, position)
     return _within(scene, name.span, name.steps[1]) if name else None
 
 
-def rename(scene: Scene, position: types.Position, new: str) -> types.WorkspaceEdit:
+def rename(scene: DocumentContext, position: types.Position, new: str) -> types.WorkspaceEdit:
     """All edits of the file; raises JsonRpcInvalidParams with a sentence on why the name cannot become ``new``."""
     name = _name(scene, position)
     if name is None:
@@ -43,7 +43,7 @@ def rename(scene: Scene, position: types.Position, new: str) -> types.WorkspaceE
     return types.WorkspaceEdit(changes={uri_of(scene.path): edits})
 
 
-def _name(scene: Scene, position: types.Position) -> Place | None:
+def _name(scene: DocumentContext, position: types.Position) -> DocumentPlace | None:
     """The key at a position, if it names a service that this file adds, or a part of its matrix or ranges."""
     place = find(scene.root, *scene.lines.place(position)) if scene.root else None
     if place is None or scene.schema != "dodo" or not place.is_key or len(place.steps) != 2:
@@ -52,7 +52,7 @@ def _name(scene: Scene, position: types.Position) -> Place | None:
     return place if is_service or place.steps[0] in _KEYS else None
 
 
-def _placeholders(scene: Scene, kind: str, old: str) -> Iterator[types.Range]:
+def _placeholders(scene: DocumentContext, kind: str, old: str) -> Iterator[types.Range]:
     """The places of the name in ``${matrix.name}`` and its like."""
     if kind not in _KEYS or scene.root is None:
         return
@@ -64,7 +64,7 @@ def _placeholders(scene: Scene, kind: str, old: str) -> Iterator[types.Range]:
                 yield types.Range(scene.lines.position(found.start(1)), scene.lines.position(found.end(1)))
 
 
-def _within(scene: Scene, span: Span, name: object) -> types.Range | None:
+def _within(scene: DocumentContext, span: Span, name: object) -> types.Range | None:
     """The range of a name in its span, without quotes; None where it is written otherwise."""
     start = scene.lines.offset(span.line, span.column)
     found = scene.lines.text.find(str(name), start, start + span.length)

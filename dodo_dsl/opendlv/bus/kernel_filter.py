@@ -9,6 +9,7 @@ import struct
 from collections.abc import Iterable, Iterator
 
 from dodo_dsl.opendlv.bus.address import Address
+from dodo_dsl.opendlv.messages.wire import varint, zigzag
 
 _SO_ATTACH_FILTER = 26  # Linux: asm-generic/socket.h
 _LOAD = {1: 0x30, 2: 0x28, 4: 0x20}  # BPF_LD | BPF_ABS, a byte, two or four
@@ -50,7 +51,7 @@ def _program(ids: Iterable[int], of_others: Iterable[int], than: Iterable[Addres
     yield _IF_EQUAL, 1, 0, _ID_TAG
     yield _RETURN, 0, 0, _ALL
     for id_ in sorted(ids):
-        yield from _passing(_varint(id_))
+        yield from _passing(varint(zigzag(id_)))
     for host, port in sorted(than):
         yield _LOAD[2], 0, 0, _SOURCE_PORT
         yield _IF_EQUAL, 0, 3, port
@@ -58,7 +59,7 @@ def _program(ids: Iterable[int], of_others: Iterable[int], than: Iterable[Addres
         yield _IF_EQUAL, 0, 1, int.from_bytes(socket.inet_aton(host), "big")
         yield _RETURN, 0, 0, _NOTHING
     for id_ in sorted(of_others):
-        yield from _passing(_varint(id_))
+        yield from _passing(varint(zigzag(id_)))
     yield _RETURN, 0, 0, _NOTHING
 
 
@@ -69,13 +70,3 @@ def _passing(encoded: bytes) -> Iterator[Instruction]:
         yield _LOAD[len(piece)], 0, 0, _TAG + 1 + 2 * number
         yield _IF_EQUAL, 0, 2 * (len(pieces) - number) - 1, int.from_bytes(piece, "big")
     yield _RETURN, 0, 0, _ALL
-
-
-def _varint(id_: int) -> bytes:
-    """An id as the envelope has it: zigzag, seven bits a byte, the lowest first."""
-    value = (id_ << 1) ^ (id_ >> 31)
-    encoded = bytearray()
-    while value > 0x7F:
-        encoded.append(value & 0x7F | 0x80)
-        value >>= 7
-    return bytes([*encoded, value])

@@ -16,6 +16,7 @@ from google.protobuf.message import Message
 from dodo_dsl.opendlv.bus import kernel_filter
 from dodo_dsl.opendlv.bus.address import RECEIVE_BUFFER, Address, group
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, decode_frame, encode_frame
+from dodo_dsl.opendlv.messages import wire
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 
 MAX_DATAGRAM_BYTES = 65_507
@@ -231,14 +232,11 @@ def _datagram(envelope: Envelope) -> bytes:
 
 
 def _id(frame: bytearray) -> int:
-    """The id of the message in a frame that begins with it: a zigzag varint."""
-    value = shift = 0
-    for byte in frame[_ID_PLACE + 1 : _ID_PLACE + 6]:
-        value |= (byte & 0x7F) << shift
-        shift += 7
-        if byte < 0x80:
-            break
-    return (value >> 1) ^ -(value & 1)
+    """The id of the message in a frame that begins with it, 0 for damage."""
+    try:
+        return wire.unzigzag(wire.read_varint(frame, _ID_PLACE + 1)[0])
+    except wire.WireError:
+        return 0
 
 
 def _received(ancillary: list[tuple[int, int, bytes]]) -> int:

@@ -11,7 +11,7 @@ from typing import BinaryIO
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.bus.frame_header import HEADER_BYTES, MAGIC, FrameError, body_length
 from dodo_dsl.opendlv.inputs.problem import InputError
-from dodo_dsl.opendlv.messages.wire import DELIMITED, VARINT, WireError, read_varint
+from dodo_dsl.opendlv.messages.wire import first_message, first_number, unzigzag
 
 MOST_BYTES = 64 << 20
 """Of a recording that is looked through."""
@@ -28,7 +28,7 @@ _HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder wri
 
 
 @dataclass
-class Contents:
+class LookedThrough:
     """The senders of one message, up to the one that is looked for.
 
     ``ends_at`` is the byte behind the last whole message that was looked at; ``is_whole`` says that no
@@ -42,13 +42,13 @@ class Contents:
     senders: set[int] = field(default_factory=set)
 
 
-def look(path: Path, message: int, sender: int) -> Contents:
+def look(path: Path, message: int, sender: int) -> LookedThrough:
     """Looks for a message of a sender, from the begin to the first bytes that are no message; raises OSError."""
     with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
-        found = Contents(os.fstat(stream.fileno()).st_size)
+        found = LookedThrough(os.fstat(stream.fileno()).st_size)
         for body in _bodies(stream, found):
             if _type(body) == message:
-                found.senders.add(_number(body, _STAMP_FIELD))
+                found.senders.add(first_number(body, _STAMP_FIELD))
                 if sender in found.senders:
                     found.is_whole = found.size > SMALL_BYTES or _end(stream.read()) + found.ends_at == found.size
                     return found
@@ -100,7 +100,7 @@ def _fault(path: Path, _changed_ns: int) -> str:
     """What is wrong with the times of messages; the libraries for that are loaded only where something may be."""
     try:
         with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
-            if not _is_doubtful(_bodies(stream, Contents(0))):
+            if not _is_doubtful(_bodies(stream, LookedThrough(0))):
                 return ""
         from dodo_dsl.opendlv.recordings import timing
         from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
@@ -121,7 +121,7 @@ def _is_doubtful(bodies: Iterator[bytes]) -> bool:
         if id_ < _FIRST or _OWN <= id_ < _OWN + 100:
             continue
         time = next((time for number in _TIMES if (time := _time(body, number))), 0)
-        key = id_, _number(body, _STAMP_FIELD)
+        key = id_, first_number(body, _STAMP_FIELD)
         before, other = last.get(key, (0, b""))
         if not time or time < before or body == other:
             return True
@@ -132,21 +132,11 @@ def _is_doubtful(bodies: Iterator[bytes]) -> bool:
 
 def _time(body: bytes, wanted: int) -> int:
     """A time of an envelope in us."""
-    at = 0
-    try:
-        while at < len(body):
-            key, at = read_varint(body, at)
-            value, at = read_varint(body, at)
-            if key == wanted << 3 | DELIMITED:
-                inner = body[at : at + value]
-                return _number(inner, 1) * 1_000_000 + _number(inner, 2)
-            at += value if key & 7 == DELIMITED else 0
-    except WireError:
-        pass
-    return 0
+    time = first_message(body, wanted)
+    return first_number(time, 1) * 1_000_000 + first_number(time, 2)
 
 
-def _read_by_index(path: Path, message: int, found: Contents) -> Iterator[InputError]:
+def _read_by_index(path: Path, message: int, found: LookedThrough) -> Iterator[InputError]:
     """What services make of a recording with damage; the libraries for that are loaded here only."""
     from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
 
@@ -164,7 +154,7 @@ def _read_by_index(path: Path, message: int, found: Contents) -> Iterator[InputE
             yield InputError(path, what, hint="'dodo rec cut' writes a part without it", is_slip=True)
 
 
-def _bodies(stream: BinaryIO, found: Contents) -> Iterator[bytes]:
+def _bodies(stream: BinaryIO, found: LookedThrough) -> Iterator[bytes]:
     """The encoded envelopes from the begin to the first that is not whole."""
     while found.ends_at < MOST_BYTES:
         header = stream.read(HEADER_BYTES)
@@ -184,21 +174,5 @@ def _bodies(stream: BinaryIO, found: Contents) -> Iterator[bytes]:
 
 
 def _type(body: bytes) -> int:
-    """The id, which is a zigzag number."""
-    number = _number(body, _TYPE_FIELD)
-    return number >> 1 ^ -(number & 1)
-
-
-def _number(body: bytes, wanted: int) -> int:
-    """A number of an envelope, 0 where it has none or is damaged."""
-    at = 0
-    try:
-        while at < len(body):
-            key, at = read_varint(body, at)
-            value, at = read_varint(body, at)
-            if key == wanted << 3 | VARINT:
-                return value
-            at += value if key & 7 == DELIMITED else 0
-    except WireError:
-        pass
-    return 0
+    """The id."""
+    return unzigzag(first_number(body, _TYPE_FIELD))

@@ -34,7 +34,7 @@ class TruthFileError(InputError):
 
 
 @dataclass(frozen=True)
-class Place:
+class FileEntry:
     """An entry of a file."""
 
     path: Path
@@ -134,18 +134,18 @@ def _document(path: Path) -> Any:
         raise TruthFileError(path, what, sentence=f"{path}: {what}") from None
 
 
-def _entries(document: Any, name: str, path: Path) -> Sequence[tuple[dict[str, Any], Place]]:
+def _entries(document: Any, name: str, path: Path) -> Sequence[tuple[dict[str, Any], FileEntry]]:
     entries = document.get(name) if isinstance(document, dict) else None
     if not isinstance(entries, list):
         raise TruthFileError(path, f"expected an object with a list '{name}'")
-    places = [Place(path, f"{name}[{index}]") for index in range(len(entries))]
+    places = [FileEntry(path, f"{name}[{index}]") for index in range(len(entries))]
     for entry, place in zip(entries, places, strict=True):
         if not isinstance(entry, dict):
             place.fail("expected an object")
     return list(zip(entries, places, strict=True))
 
 
-def _keys(images: Mapping[int, tuple[Any, Place]], frames: Frames, path: Path) -> dict[int, int]:
+def _keys(images: Mapping[int, tuple[Any, FileEntry]], frames: Frames, path: Path) -> dict[int, int]:
     """Each image's key, by its id."""
     if frames == "number":
         return {number: number for number in images}
@@ -164,7 +164,7 @@ def _keys(images: Mapping[int, tuple[Any, Place]], frames: Frames, path: Path) -
     return dict.fromkeys(images, 0)
 
 
-def _box(entry: dict[str, Any], image: tuple[dict[str, Any], Place], place: Place) -> Area:
+def _box(entry: dict[str, Any], image: tuple[dict[str, Any], FileEntry], place: FileEntry) -> Area:
     """The box as fractions of its image."""
     if entry.get("iscrowd"):
         place.fail("iscrowd is set, expected the box of one object")
@@ -180,21 +180,21 @@ def _box(entry: dict[str, Any], image: tuple[dict[str, Any], Place], place: Plac
     return (x / width, y / height, wide / width, high / height)
 
 
-def _name(entry: dict[str, Any], place: Place) -> str:
+def _name(entry: dict[str, Any], place: FileEntry) -> str:
     name = entry.get("name")
     if not isinstance(name, str) or not plain(name):
         place.fail("expected a string", ".name")
     return plain(name)
 
 
-def _known(entry: dict[str, Any], key: str, known: Mapping[int, object], place: Place) -> int:
+def _known(entry: dict[str, Any], key: str, known: Mapping[int, object], place: FileEntry) -> int:
     number = _whole(entry, key, place)
     if number not in known:
         place.fail(f"no entry has the id {number}", f".{key}")
     return number
 
 
-def _whole(entry: dict[str, Any], key: str, place: Place, least: int = 0) -> int:
+def _whole(entry: dict[str, Any], key: str, place: FileEntry, least: int = 0) -> int:
     value = entry.get(key)
     if not isinstance(value, int) or isinstance(value, bool) or not least <= value < LARGEST:
         place.fail(f"expected a whole number, {least} or more", f".{key}")

@@ -12,6 +12,7 @@ from google.protobuf.message import Message
 from dodo_dsl.opendlv.messages import codec
 from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.protobuf_classes import Layout, build
+from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.odvd import STANDARD, parser
 from dodo_dsl.opendlv.odvd.parser import Definition
 from dodo_dsl.opendlv.odvd.tokens import OdvdError
@@ -65,6 +66,16 @@ class MessageSet:
         """The id of a message, of its class or of its full name; raises UnknownMessage."""
         name = key if isinstance(key, str) else key.DESCRIPTOR.full_name
         return self.layout(name).definition.id
+
+    def key(self, text: str) -> tuple[int, int | None]:
+        """Id and sender stamp of a name or an id as people write them, with ``/senderStamp`` or for any stamp (None).
+
+        Raises UnknownMessage.
+        """
+        name, slash, stamp = text.partition("/")
+        if slash and not is_whole(stamp):
+            raise UnknownMessage(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
+        return whole(name) if is_whole(name) else self.id(name), whole(stamp) if slash else None
 
     def ids(self) -> frozenset[int]:
         """All ids."""

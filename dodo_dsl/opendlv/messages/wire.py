@@ -51,7 +51,7 @@ def chunks(data: bytes) -> Iterator[Chunk]:
         position = end
 
 
-def read_varint(data: bytes, position: int) -> tuple[int, int]:
+def read_varint(data: bytes | bytearray | memoryview, position: int) -> tuple[int, int]:
     """The number at ``position`` and the position after it."""
     value = shift = 0
     for index in range(position, min(position + MAX_VARINT_BYTES, len(data))):
@@ -61,6 +61,42 @@ def read_varint(data: bytes, position: int) -> tuple[int, int]:
             return value, index + 1
         shift += 7
     raise WireError(f"the number at byte {position} has no end")
+
+
+def first_number(data: bytes, number: int) -> int:
+    """The first number in a field of a message without fixed sizes; 0 where there is none before damage."""
+    return _first(data, number << 3 | VARINT)[0]
+
+
+def first_message(data: bytes, number: int) -> bytes:
+    """The first message in a field, likewise; empty where there is none."""
+    length, start = _first(data, number << 3 | DELIMITED)
+    return data[start : start + length]
+
+
+def _first(data: bytes, wanted: int) -> tuple[int, int]:
+    """The number or length behind the first of these keys, and the position behind it; fields later are not read."""
+    at = 0
+    try:
+        while at < len(data):
+            key, at = read_varint(data, at)
+            value, at = read_varint(data, at)
+            if key == wanted:
+                return value, at
+            at += value if key & 7 == DELIMITED else 0
+    except WireError:
+        pass
+    return 0, 0
+
+
+def zigzag(value: int) -> int:
+    """A number of 32 bits with a sign as one without."""
+    return value << 1 ^ value >> 31
+
+
+def unzigzag(value: int) -> int:
+    """The number with a sign."""
+    return value >> 1 ^ -(value & 1)
 
 
 def varint(value: int) -> bytes:

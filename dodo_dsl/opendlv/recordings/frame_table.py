@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.bus.envelope import HEADER_BYTES, MAGIC, FrameError, decode_body, decode_parts, encode_body
-from dodo_dsl.opendlv.messages import varints
+from dodo_dsl.opendlv.messages import varints, wire
 from dodo_dsl.opendlv.messages.varints import Marks, Numbers
 
 PADDING = bytes(128)  # what a reader of the last frame may look at beyond it
@@ -125,28 +125,20 @@ def _is_doubtful(data: bytes, start: int, end: int) -> bool:
 
 def _begins_well(data: bytes, at: int, end: int) -> bool:
     """Whether the first fields are within bounds: a false header may claim 16 MiB, and those are not copied."""
-    for _ in range(FEW):
-        if at >= end:
-            return at == end
-        key, at = _number(data, at, end)
-        wire_type = key & 7
-        if key < 8 or wire_type in (3, 4, 6, 7):
-            return False
-        if wire_type == 0:
-            _, at = _number(data, at, end)
-        elif wire_type == 2:
-            size, at = _number(data, at, end)
-            at += size
-        else:
-            at += 8 if wire_type == 1 else 4
+    body = memoryview(data)[:end]
+    try:
+        for _ in range(FEW):
+            if at >= end:
+                return at == end
+            key, at = wire.read_varint(body, at)
+            wire_type = key & 7
+            if key < 8 or wire_type in (3, 4, 6, 7):
+                return False
+            if wire_type in (wire.VARINT, wire.DELIMITED):
+                value, at = wire.read_varint(body, at)
+                at += value if wire_type == wire.DELIMITED else 0
+            else:
+                at += 8 if wire_type == wire.EIGHT_BYTES else 4
+    except wire.WireError:
+        return False
     return at <= end
-
-
-def _number(data: bytes, at: int, end: int) -> tuple[int, int]:
-    value = shift = 0
-    for index in range(at, min(at + 10, end)):
-        value |= (data[index] & 0x7F) << shift
-        if data[index] < 0x80:
-            return value, index + 1
-        shift += 7
-    return 0, end + 1

@@ -27,7 +27,7 @@ _PROTOBUF = "protobuf"
 
 
 @dataclass
-class Written:
+class McapCounts:
     """OpenDLV messages, those in schemas of Foxglove beside them, and payloads that are none by id."""
 
     messages: int = 0
@@ -37,14 +37,14 @@ class Written:
 
 def write(
     recording: Recording, messages: MessageSet, rows: Numbers, place: Path, progress: Callable[[int], None]
-) -> Written:
+) -> McapCounts:
     """Write the known messages among ``rows`` in the order of their times; ``progress`` gets the number of rows done.
 
     The log time is the sample time, or where that is zero when the message was received, or else sent; the publish
     time is when it was sent. Times before 1970 become 1970. Memory is bounded by what ``Recording.batches`` holds and
     the file's index. Raises OSError and RecordingError.
     """
-    result = Written()
+    result = McapCounts()
     ordered = rows[np.argsort(recording.index["time"][rows], kind="stable")]
     with place.open("wb") as stream:
         writer = Writer(stream)
@@ -62,7 +62,7 @@ def topic(message: str, sender_stamp: int) -> str:
     return f"/{message.replace('.', '/')}/{sender_stamp}"
 
 
-def _write_one(channels: "_Channels", envelope: Envelope, result: Written) -> None:
+def _write_one(channels: "_Channels", envelope: Envelope, result: McapCounts) -> None:
     id_, stamp = envelope.data_type, envelope.sender_stamp
     time = envelope.sample_time or envelope.received or envelope.sent
     try:

@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
 from dodo_dsl.opendlv.video.decoder import CODECS, VideoError, has_key_frame, refuse_large
 from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder
-from dodo_dsl.rec.export.video_times import Times, timed
+from dodo_dsl.rec.export.video_times import VideoTimes, timed
 from dodo_dsl.rec.frames import FramesError, decoded, packets
 
 _MICROSECOND = Fraction(1, 1_000_000)
@@ -22,7 +22,7 @@ _CHOOSE = ", and both do not fit into one video; choose a part with --start and 
 
 
 @dataclass(frozen=True)
-class Video:
+class VideoFile:
     """What became of the packets: ``frames`` of ``size`` in the file, ``late`` of them later than they were taken,
     ``gaps`` shortened, and whether they were ``encoded`` again.
     """
@@ -40,7 +40,7 @@ def write(
     place: Path,
     progress: Callable[[int], None],
     problem: Callable[[str], None],
-) -> Video:
+) -> VideoFile:
     """Write the image messages of one camera, from the first key frame on, with their sample times.
 
     ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all. Raises
@@ -49,7 +49,7 @@ def write(
     format_ = next((packet.format for packet in packets(recording, images) if packet.format), "")
     is_h264 = CODECS.get(format_) == FORMAT
     found = _recorded(recording, images) if is_h264 else _encoded(recording, images, problem)
-    times, mp4, frames = Times(), None, 0
+    times, mp4, frames = VideoTimes(), None, 0
     with _readable_errors(recording.path), ExitStack() as files:
         for number, data, shown, lasting in timed(found, recording.index["time"][images], times):
             mp4 = mp4 or _Mp4(files, place, data, times.begin)
@@ -58,7 +58,7 @@ def write(
             progress(number + 1)
     if mp4 is None:
         raise FramesError(f"no frame of {recording.path} can be decoded")
-    return Video(frames, mp4.size, times.late, times.gaps, not is_h264)
+    return VideoFile(frames, mp4.size, times.late, times.gaps, not is_h264)
 
 
 @contextmanager

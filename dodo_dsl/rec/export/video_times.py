@@ -12,7 +12,7 @@ DEFAULT_LASTING = 100_000
 
 
 @dataclass
-class Times:
+class VideoTimes:
     """When frames are shown, in us since the first, which was taken at ``begin``.
 
     Each is at least 1 us and at most MOST_GAP after the one before; ``late`` of them are so, and ``gaps`` shortened.
@@ -37,7 +37,9 @@ class Times:
         return self._shown
 
 
-def timed(found: Iterator[tuple[int, bytes]], taken: Numbers, times: Times) -> Iterator[tuple[int, bytes, int, int]]:
+def timed(
+    found: Iterator[tuple[int, bytes]], taken: Numbers, times: VideoTimes
+) -> Iterator[tuple[int, bytes, int, int]]:
     """Number, packet, when it is shown and for how long, in us; the last as long as the one before."""
     waiting, lasting = None, DEFAULT_LASTING
     for number, data in found:

@@ -24,7 +24,7 @@ class Ground:
 
 
 @dataclass(frozen=True)
-class Drive:
+class DrivenPath:
     """A path in the world frame: x and y in metres, heading in radians, and seconds since its begin."""
 
     path: list[tuple[float, float, float, float]]
@@ -34,7 +34,7 @@ class Drive:
     goal: str = ""
 
 
-def read_drive(plan: Plan, folder: Path, recording: Path) -> Drive | None:
+def read_drive(plan: Plan, folder: Path, recording: Path) -> DrivenPath | None:
     """The drive of a test, or None when its recording holds no Frame."""
     path = list(_path(recording)) if recording.is_file() else []
     if not path:
@@ -42,7 +42,7 @@ def read_drive(plan: Plan, folder: Path, recording: Path) -> Drive | None:
     flags = {f.name: f.value for s in plan.services for f in s.flags if s.judge or f.name == "map-path"}
     ground = read_ground(folder / FILES / flags["map-path"]) if "map-path" in flags else Ground()
     length, width = (float(flags.get(name, 0.0)) for name in ("length", "width"))
-    return Drive(path, ground, length, width, flags.get("goal", ""))
+    return DrivenPath(path, ground, length, width, flags.get("goal", ""))
 
 
 def _path(path: Path) -> Iterator[tuple[float, float, float, float]]:

@@ -7,7 +7,7 @@ import cv2
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.pictures.canvas import Axes, Canvas, Colour, Point, thinned
-from dodo_dsl.report.pictures.trajectory import Drive
+from dodo_dsl.report.pictures.trajectory import DrivenPath
 from dodo_dsl.terminal import printable
 
 _COLOURS: dict[str, Colour] = {"passed": (26, 127, 55), "failed": (207, 34, 46), "error": (154, 103, 0)}
@@ -28,7 +28,7 @@ _CLOSE = 0.5
 """Pixels between points of the path that are worth a line."""
 
 
-def draw(drive: Drive, outcome: Outcome, target: Path) -> None:
+def draw(drive: DrivenPath, outcome: Outcome, target: Path) -> None:
     """Cones, walls and goal, the path and the vehicle's rectangle each second and at the end."""
     first, last = _corners(drive)
     wide, high = last[0] - first[0], last[1] - first[1]
@@ -51,7 +51,7 @@ def draw(drive: Drive, outcome: Outcome, target: Path) -> None:
     target.write_bytes(canvas.png())
 
 
-def _corners(drive: Drive) -> tuple[Point, Point]:
+def _corners(drive: DrivenPath) -> tuple[Point, Point]:
     """Lower left and upper right of path and lines; far cones may fall outside."""
     points = [(x, y) for x, y, _, _ in drive.path]
     points += [(x, y) for _, lines in drive.ground.lines for a, b, c, d in lines for x, y in ((a, b), (c, d))]
@@ -59,7 +59,7 @@ def _corners(drive: Drive) -> tuple[Point, Point]:
     return (min(xs) - _MARGIN, min(ys) - _MARGIN), (max(xs) + _MARGIN, max(ys) + _MARGIN)
 
 
-def _ground(axes: Axes, drive: Drive) -> None:
+def _ground(axes: Axes, drive: DrivenPath) -> None:
     for name, lines in drive.ground.lines:
         for x1, y1, x2, y2 in lines:
             if name == drive.goal:
@@ -72,7 +72,7 @@ def _ground(axes: Axes, drive: Drive) -> None:
             axes.dot(point, _DOT, colour, _EDGE)
 
 
-def _vehicles(axes: Axes, drive: Drive, colour: Colour) -> None:
+def _vehicles(axes: Axes, drive: DrivenPath, colour: Colour) -> None:
     if not (drive.length and drive.width):
         return
     due = 0.0
@@ -93,7 +93,7 @@ def _rectangle(a: float, b: float) -> list[Point]:
     return [(-a, -b), (a, -b), (a, b), (-a, b)]
 
 
-def _labels(axes: Axes, drive: Drive, colour: Colour) -> None:
+def _labels(axes: Axes, drive: DrivenPath, colour: Colour) -> None:
     """The frame with its names, and what the lines mean."""
     axes.frame()
     canvas, middle, bottom = axes.canvas, axes.left + axes.width // 2, axes.top + axes.height

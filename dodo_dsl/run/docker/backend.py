@@ -20,7 +20,7 @@ from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ContainerUse
-from dodo_dsl.run.docker.events import Watch
+from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.processes import ELSEWHERE, ContainerProcesses
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.docker.teardown import take_down, writers
@@ -84,7 +84,7 @@ class DockerBackend:
         self._addresses: dict[str, Address] = {}
         """Where services of the test hear what the bus must not carry."""
         self._out_of_memory: set[str] = set()
-        self._watch = Watch(self._take, lambda why: self._events.put_nowait(Lost(why)))
+        self._watch = EventWatch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self._copied, self._copy_problem = asyncio.Event(), ""
         self._conditions = Conditions(plan.application.services)
         self._may_be_ill = one_off(plan.application.services) | optional(plan.application.services)

@@ -10,7 +10,7 @@ from dodo_dsl.run.docker.processes import is_of
 from dodo_dsl.run.load import control_group
 from dodo_dsl.run.load.control_group import ControlGroup
 from dodo_dsl.run.load.process_memory import PROC
-from dodo_dsl.run.load.service_use import ServiceUse, Used
+from dodo_dsl.run.load.service_use import Used, UseReader
 
 
 class ContainerUse:
@@ -27,7 +27,7 @@ class ContainerUse:
         self._groups: dict[str, ControlGroup] = {}
         self._roots: dict[int, str] = {}
         self._elsewhere: list[str] = []
-        self._processes = ServiceUse(proc)
+        self._processes = UseReader(proc)
         self._last: dict[str, Used] = {}
         self._lock = threading.Lock()
 

@@ -9,7 +9,7 @@ from typing import Any
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 
 
-class Watch:
+class EventWatch:
     """Calls ``on_event`` with a service's name, action and attributes, and ``on_lost`` with the reason at the end.
 
     Both are called in the event loop of the creator, and not after ``ignores`` was set, as during teardown.

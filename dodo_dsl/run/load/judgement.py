@@ -18,14 +18,14 @@ WAY_OUT = "run it with --clock lockstep, or fewer tests at once (-j 1)"
 
 
 @dataclass(frozen=True)
-class Judged:
+class FindingUnderLoad:
     """A finding, and the load with which it was made."""
 
     finding: Finding
     load: MachineLoad | None
 
 
-def consider(finding: Finding, load: MachineLoad | None) -> Judged:
+def consider(finding: Finding, load: MachineLoad | None) -> FindingUnderLoad:
     """An error in place of a failure that may be due to a busy machine; anything else as it is.
 
     Only findings that depend on time can turn. An application that waits for a tenth of the time answers each picture
@@ -38,10 +38,10 @@ def consider(finding: Finding, load: MachineLoad | None) -> Judged:
     to be late at all is another machine than the rig, whatever else was measured.
     """
     if load is None or finding.result != "failed" or not finding.is_timed or not (why := too_busy(load)):
-        return Judged(finding, load)
+        return FindingUnderLoad(finding, load)
     found = finding.reason if len(finding.reason) <= _MAX_FOUND else f"{finding.reason[:_MAX_FOUND]}..."
     reason = f"the machine was too busy to judge: {why}; it found: {found}; {WAY_OUT}"
-    return Judged(replace(finding, result="error", reason=reason), replace(load, undecided=True))
+    return FindingUnderLoad(replace(finding, result="error", reason=reason), replace(load, undecided=True))
 
 
 def too_busy(load: MachineLoad) -> str:

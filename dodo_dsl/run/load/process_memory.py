@@ -18,7 +18,7 @@ _MEMFD = "/memfd:"
 _BLOCK = 512
 
 
-class Segment(NamedTuple):
+class SegmentUse(NamedTuple):
     """A System V memory; ``creator`` is the process that made it, 0 for one of another namespace."""
 
     creator: int
@@ -49,17 +49,17 @@ def held(pids: Iterable[int], proc: Path = PROC) -> int:
     return sum(sizes.values())
 
 
-def segments(proc: Path = PROC) -> list[Segment]:
+def segments(proc: Path = PROC) -> list[SegmentUse]:
     """The System V memories of this process's IPC namespace, with bytes in memory and swap (proc_pid_sysvipc(5))."""
     with contextlib.suppress(OSError):
         with open(f"{proc}/sysvipc/shm", "rb", buffering=0) as file:  # noqa: PTH123
             names, *rows = [line.split() for line in file.readall().splitlines()]
         creator, attached, resident_, swapped = (names.index(name) for name in (b"cpid", b"nattch", b"rss", b"swap"))
-        return [Segment(int(r[creator]), int(r[resident_]) + int(r[swapped]), int(r[attached]) > 0) for r in rows]
+        return [SegmentUse(int(r[creator]), int(r[resident_]) + int(r[swapped]), int(r[attached]) > 0) for r in rows]
     return []
 
 
-def of_service(found: Iterable[Segment], pids: Collection[int], proc: Path = PROC) -> tuple[int, int]:
+def of_service(found: Iterable[SegmentUse], pids: Collection[int], proc: Path = PROC) -> tuple[int, int]:
     """Bytes of System V memories of a service: those with processes attached, and others.
 
     They are of the service whose process created them. Where the creator has ended, they are of every service, if this

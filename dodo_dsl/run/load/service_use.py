@@ -48,7 +48,7 @@ class _Sharing(NamedTuple):
     until_s: float
 
 
-class ServiceUse:
+class UseReader:
     """Measures from call to call. ``take`` costs a tenth of a millisecond a service; use it from one thread."""
 
     def __init__(self, proc: Path = process_memory.PROC) -> None:

@@ -3,9 +3,9 @@
 import os
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from dodo_dsl.run.load.thread_times import ThreadTimes
 
@@ -76,13 +76,3 @@ def busy_s(text: str, cores: Iterable[int]) -> float | None:
             return None
         ticks += sum(int(row[column]) for column in _BUSY)
     return ticks / os.sysconf("SC_CLK_TCK")
-
-
-def to_json(snapshot: Snapshot | None) -> dict[str, Any] | None:
-    return None if snapshot is None else asdict(snapshot)
-
-
-def from_json(text: Mapping[str, Any] | None) -> Snapshot | None:
-    if text is None:
-        return None
-    return Snapshot(**{**text, "services": {name: Times(*sums) for name, sums in text["services"].items()}})

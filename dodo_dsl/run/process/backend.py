@@ -5,16 +5,17 @@ import contextlib
 import functools
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths, hidden_paths
 from dodo_dsl.run.files_of_tests import Found, files_of_tests, in_few
-from dodo_dsl.run.load import snapshot
 from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes, import_paths
@@ -225,7 +226,7 @@ class ProcessBackend:
         application = self.plan.application
         hidden = [] if self.is_on_host else self._hidden
         confined = confinement(command.folder, self.isolation, self.cid, application.limits, hidden)
-        return replace(confined, masked=command.masked).to_json()
+        return asdict(replace(confined, masked=command.masked))
 
     @functools.cached_property
     def _hidden(self) -> list[Path]:
@@ -257,7 +258,7 @@ class ProcessBackend:
 
     async def load(self) -> Snapshot | None:
         """What the sandbox sees of its processes; None when it does not answer."""
-        return snapshot.from_json(await self._ask("load"))
+        return msgspec.convert(await self._ask("load"), Snapshot | None)
 
     async def listeners(self) -> Collection[str] | None:
         """As the sandbox sees them; None when it does not answer."""

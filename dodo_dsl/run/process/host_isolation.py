@@ -29,7 +29,7 @@ PROBE_S = 0.3
 
 
 @dataclass(frozen=True)
-class Refusal:
+class IsolationRefusal:
     """Why applications cannot be isolated; ``missing`` is what was found missing by a trial of its own, or empty."""
 
     why: str
@@ -50,7 +50,7 @@ class Refusal:
         return f"a trial, to run 'true' in a sandbox as applications have it, ended with: {self.why}"
 
 
-def isolation_refusal(fork_server: ForkServer | None = None) -> Refusal | None:
+def isolation_refusal(fork_server: ForkServer | None = None) -> IsolationRefusal | None:
     """Why tests and applications cannot have namespaces of their own on this machine; None when they can.
 
     A sandbox tries it, which the fork server forks, where there is one.
@@ -61,7 +61,7 @@ def isolation_refusal(fork_server: ForkServer | None = None) -> Refusal | None:
             answer = _probe(fork_server.fork)
     answer = answer or _probe(_start)
     why = str(answer.get("probe", answer.get("down", "the sandbox ended at once")))
-    return Refusal(why, str(answer.get("missing", ""))) if why else None
+    return IsolationRefusal(why, str(answer.get("missing", ""))) if why else None
 
 
 def _probe(start: Callable[[socket.socket, int, str], "subprocess.Popen[bytes] | None"]) -> dict[str, Any]:

@@ -35,8 +35,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from dodo_dsl.run.load import snapshot
-from dodo_dsl.run.load.service_use import ServiceUse
+from dodo_dsl.run.load.service_use import UseReader
 from dodo_dsl.run.load.thread_times import ThreadTimes
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.children import Children
@@ -63,7 +65,7 @@ class Sandbox:
         self.isolation = isolation
         self.forks = forks
         umask = UMASK if isolation == "network" else -1
-        self.use = ServiceUse()
+        self.use = UseReader()
         self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), self.use.note_end, umask)
         self.places: Places | None = None
         self.times = ThreadTimes()
@@ -140,7 +142,7 @@ class Sandbox:
         start = self.children.fork if is_fork else functools.partial(self.children.start, masked=command["masked"])
         try:
             if command["confined"] is not None:
-                pid = self._confine(name, words, environment, output, Confinement.from_json(command["confined"]))
+                pid = self._confine(name, words, environment, output, msgspec.convert(command["confined"], Confinement))
             else:
                 pid = start(name, words, environment, command["cwd"], output)
             self.send(started=name, pid=pid)
@@ -169,7 +171,7 @@ class Sandbox:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
         names, took = {**self.children.names, os.getpid(): ""}, self.children.took_s()
         taken = snapshot.take(self.times, names) if _has_own_proc() else None
-        self.send(load=snapshot.to_json(taken and snapshot.with_ended(taken, took, self.times.ended)))
+        self.send(load=taken and asdict(snapshot.with_ended(taken, took, self.times.ended)))
 
     def _do_use(self, _descriptors: list[int], names: list[str]) -> None:
         """Reports what some services have used so far."""

@@ -15,7 +15,7 @@ from dodo_dsl.opendlv.messages.message_set import MessageSet
 _log = logging.getLogger(__name__)
 
 
-class Channel:
+class ClockChannel:
     """Sends messages in OpenDLV's frames to one address, or to all on the bus, and receives the replies.
 
     All of them prove that their sender has the key of the test; what does not is no reply.

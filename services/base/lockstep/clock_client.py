@@ -10,7 +10,7 @@ from dodo_dsl.opendlv.bus.address import Address
 from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.codec import MessageError
-from services.base.lockstep.channel import Channel
+from services.base.lockstep.channel import ClockChannel
 from services.base.lockstep.datagrams import STEP, STEP_DONE, Reassembly, decode
 
 Reply = list[Message]
@@ -39,7 +39,7 @@ class ClockClient:
 
     def __init__(self, session: Session, name: str, key: bytes = b"") -> None:
         self._session, self._name = session, name
-        self._channel = Channel(session.cid, session.messages, key)
+        self._channel = ClockChannel(session.cid, session.messages, key)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._ignored = {self._step_id, self._done_id, session.messages.id("dodo.TestBegin")}
         self._clock: Address | None = None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.pictures.canvas import Axes, Canvas, thinned
-from dodo_dsl.report.pictures.trajectory import Drive, Ground
+from dodo_dsl.report.pictures.trajectory import DrivenPath, Ground
 from dodo_dsl.report.pictures.trajectory_plot import draw
 
 OUTCOME = Outcome("test", "test", "t.dodo.yml", "sil", "closed-loop", "passed", "all", 130, 0, "lockstep", "process")
@@ -52,14 +52,14 @@ def test_a_line_is_thinned_to_its_ends() -> None:
     assert set(thinned(points[:1], 0.3)) == set(points[:1])
 
 
-def picture(tmp_path: Path, drive: Drive, outcome: Outcome = OUTCOME) -> NDArray[np.uint8]:
+def picture(tmp_path: Path, drive: DrivenPath, outcome: Outcome = OUTCOME) -> NDArray[np.uint8]:
     draw(drive, outcome, tmp_path / "drive.png")
     return np.asarray(cv2.imread(str(tmp_path / "drive.png")), np.uint8)
 
 
 def test_the_plot_shows_the_drive_over_its_map(tmp_path: Path) -> None:
     cones, goal = ((1.0, 1.0, 0.0), [(-0.5, 1.0), (90.0, 90.0)]), ("finish", [(-0.5, 2.0, 0.5, 2.0)])
-    drive = Drive([(0.0, n / 10, 1.57, n / 10) for n in range(20)], Ground([cones], [goal]), 0.4, 0.2, "finish")
+    drive = DrivenPath([(0.0, n / 10, 1.57, n / 10) for n in range(20)], Ground([cones], [goal]), 0.4, 0.2, "finish")
     shown = picture(tmp_path, drive)
     assert shown.shape == (770, 770, 3)
     for colour in ((55, 127, 26), (235, 111, 31), (0, 255, 255)):  # path, goal, cone
@@ -70,4 +70,4 @@ def test_the_plot_shows_the_drive_over_its_map(tmp_path: Path) -> None:
 @pytest.mark.parametrize("reason", ["", "x" * 5000, "word " * 2000, "naïve 日本 \ud800 \x1b[31m"])
 def test_any_drive_can_be_drawn(tmp_path: Path, path: list[tuple[float, float, float, float]], reason: str) -> None:
     outcome = Outcome(**{**vars(OUTCOME), "reason": reason})
-    assert picture(tmp_path, Drive(path, Ground(), 0.4, 0.2), outcome).shape[:2] <= (770, 770)
+    assert picture(tmp_path, DrivenPath(path, Ground(), 0.4, 0.2), outcome).shape[:2] <= (770, 770)

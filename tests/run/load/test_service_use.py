@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run.load import service_use
-from dodo_dsl.run.load.service_use import ServiceUse, Used
+from dodo_dsl.run.load.service_use import Used, UseReader
 
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 MB = 1 << 20
@@ -48,13 +48,13 @@ def test_all_processes_of_a_service_add_up(tmp_path: Path) -> None:
     put(tmp_path, 11, 10, (20, 0), 2)
     put(tmp_path, 12, 11, (4, 0), 1)
     put(tmp_path, 20, 1, (999, 0), 500)
-    found = ServiceUse(tmp_path).take({10: "app"})
+    found = UseReader(tmp_path).take({10: "app"})
     assert found == {"app": Used(pytest.approx(174 * TICK), 6 * MB)}
 
 
 def test_a_process_that_was_waited_for_counts_once(tmp_path: Path) -> None:
     """Whether or not its parent has already been told its time; also one that is not waited for."""
-    use = ServiceUse(tmp_path)
+    use = UseReader(tmp_path)
     put(tmp_path, 10, 1, (100, 0))
     put(tmp_path, 11, 10, (50, 0))
     put(tmp_path, 12, 10, (7, 0))
@@ -75,13 +75,13 @@ def test_what_processes_share_counts_once(tmp_path: Path) -> None:
     put(tmp_path, 10, 1, megabytes=100, proportional=40)
     put(tmp_path, 11, 10, megabytes=100, proportional=50)
     put(tmp_path, 12, 10, megabytes=2)
-    assert ServiceUse(tmp_path).take({10: "app"})["app"].memory == pytest.approx(92 * MB, abs=2)
+    assert UseReader(tmp_path).take({10: "app"})["app"].memory == pytest.approx(92 * MB, abs=2)
     (tmp_path / "11" / "smaps_rollup").unlink()
-    assert ServiceUse(tmp_path).take({10: "app"})["app"].memory == 202 * MB, "not everybody may know"
+    assert UseReader(tmp_path).take({10: "app"})["app"].memory == 202 * MB, "not everybody may know"
 
 
 def test_new_forks_count_when_it_is_known_what_they_share(tmp_path: Path) -> None:
-    use = ServiceUse(tmp_path)
+    use = UseReader(tmp_path)
     for pid in (10, 11):
         put(tmp_path, pid, 1 if pid == 10 else 10, megabytes=100, proportional=50)
     assert use.take({10: "app"})["app"].memory == 100 * MB
@@ -95,7 +95,7 @@ def test_new_forks_count_when_it_is_known_what_they_share(tmp_path: Path) -> Non
 
 
 def test_a_service_that_has_ended_keeps_its_time(tmp_path: Path) -> None:
-    use = ServiceUse(tmp_path)
+    use = UseReader(tmp_path)
     put(tmp_path, 10, 1, (100, 5), 3)
     use.take({10: "app"})
     put(tmp_path, 10, 1, (130, 9), state="Z")
@@ -132,7 +132,7 @@ BUSY = "end = time.process_time() + 0.3\nwhile time.process_time() < end: pass\n
 def test_the_kernel_s_own(code: str, processor_s: float, megabytes: int) -> None:
     with started("") as plain, started(code) as process:
         time.sleep(0.05)  # forks go to sleep
-        use = ServiceUse().take({plain.pid: "plain", process.pid: "app"})
+        use = UseReader().take({plain.pid: "plain", process.pid: "app"})
         for child in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
             os.kill(int(child), 9)
     assert use["app"].processor_s - use["plain"].processor_s >= processor_s - 0.05
@@ -154,7 +154,7 @@ def test_a_process_that_begins_after_the_first_look_counts_at_once(monkeypatch: 
     words = [sys.executable, "-c", CHILD_LATER]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None and process.stdout is not None
-        use = ServiceUse()
+        use = UseReader()
         assert use.take({process.pid: "app"})["app"].memory < 50_000_000
         process.stdin.write("\n")
         process.stdin.flush()
@@ -169,4 +169,4 @@ def test_system_v_memories_count_beside_what_is_mapped(tmp_path: Path) -> None:
     rows = ((10, 0, 50), (10, 1, 7), (1, 0, 900))
     text = "".join(f"{pid} {users} {size * MB} {MB}\n" for pid, users, size in rows)
     (tmp_path / "sysvipc" / "shm").write_text(f"cpid nattch rss swap\n{text}")
-    assert ServiceUse(tmp_path).take({10: "app"})["app"].memory == 62 * MB
+    assert UseReader(tmp_path).take({10: "app"})["app"].memory == 62 * MB

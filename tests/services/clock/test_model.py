@@ -87,9 +87,9 @@ def test_who_watches_sees_each_picture(toys: Toys, monkeypatch: pytest.MonkeyPat
 def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """A third of what clock and services tell each other is lost, some comes twice, some after the next."""
     chance = random.Random(seed)
-    plain, held = channel.Channel.send, []
+    plain, held = channel.ClockChannel.send, []
 
-    def send(self: channel.Channel, message: Any, to: Any) -> None:
+    def send(self: channel.ClockChannel, message: Any, to: Any) -> None:
         fate = chance.random()
         if fate < 0.3:
             return
@@ -103,7 +103,7 @@ def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch:
             if late._socket.fileno() >= 0:
                 plain(late, what, whom)
 
-    monkeypatch.setattr(channel.Channel, "send", send)
+    monkeypatch.setattr(channel.ClockChannel, "send", send)
     monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
     monkeypatch.setattr(exchange, "_SLICE", 0.01)
     monkeypatch.setattr(clock_client, "SLICE_MS", 10)
@@ -205,9 +205,9 @@ def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest
 @pytest.mark.slow
 def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each burst the first three get through only, as where the receive buffer is small."""
-    plain, sent = channel.Channel.send, dict[int, tuple[float, int]]()
+    plain, sent = channel.ClockChannel.send, dict[int, tuple[float, int]]()
 
-    def send(self: channel.Channel, message: Any, to: Any) -> None:
+    def send(self: channel.ClockChannel, message: Any, to: Any) -> None:
         began, count = sent.get(id(self), (0.0, 0))
         now = time.monotonic()
         began, count = (began, count + 1) if now - began < 0.003 else (now, 1)
@@ -216,7 +216,7 @@ def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: p
             plain(self, message, to)
 
     monkeypatch.setattr("services.base.lockstep.datagrams.PART_BYTES", 150)
-    monkeypatch.setattr(channel.Channel, "send", send)
+    monkeypatch.setattr(channel.ClockChannel, "send", send)
     monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
     monkeypatch.setattr(exchange, "_SLICE", 0.01)
     toys.evaluator = ToyEvaluator(0.5)
@@ -255,7 +255,7 @@ def test_the_stepper_goes_to_the_time_that_a_source_tells() -> None:
 
 def test_messages_on_the_channel_wake_nobody_else(cid: int) -> None:
     with Session(cid) as other:
-        ours, theirs = (channel.Channel(cid, other.messages) for _ in range(2))
+        ours, theirs = (channel.ClockChannel(cid, other.messages) for _ in range(2))
         address = ("127.0.0.1", theirs._socket.getsockname()[1])
         ours.send(other.messages.type("dodo.Step")(number=3), address)
         assert other.receive(0.2) is None

@@ -8,7 +8,7 @@ import pytest
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base.lockstep.channel import Channel
+from services.base.lockstep.channel import ClockChannel
 from services.base.lockstep.datagrams import encode
 from services.clock import model
 from services.clock.answers import Answers
@@ -20,7 +20,7 @@ STEP = Fraction(100_000)
 
 
 def driven(session: Session, roles: Roles, stopped: bool = False) -> None:
-    channel = Channel(session.cid, session.messages)
+    channel = ClockChannel(session.cid, session.messages)
     service = ClockService(session, channel, roles, Answers(()), STEP, 1_000_000, Patience(1.0, 1.0))
     assert service.drive is not None
     service.drive(lambda: stopped)
@@ -80,7 +80,7 @@ def test_what_an_application_that_starts_late_must_not_hear_is_not_sent_again(
     reading = "opendlv.proxy.DistanceReading"
     names = ("opendlv.sim.Frame", "opendlv.logic.perception.DetectionBoundingBox", reading)
     with Session(cid) as session, Session(cid) as application:
-        channel = Channel(cid, session.messages)
+        channel = ClockChannel(cid, session.messages)
         Exchange(session, channel, lambda _: None).repeat_on_bus(encode(enveloped(name)) for name in names)
         channel.close()
         envelope = application.receive(5.0)

@@ -14,7 +14,7 @@ from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
 from services.base import Service, Verdict
-from services.base.lockstep.channel import Channel
+from services.base.lockstep.channel import ClockChannel
 from services.base.lockstep.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, filters
@@ -192,7 +192,7 @@ class Forger:
 
     def run(self, stopped: Callable[[], bool]) -> None:
         with Session(self.cid) as session:
-            channel = Channel(self.cid, session.messages, self.key)
+            channel = ClockChannel(self.cid, session.messages, self.key)
             step, done = (session.messages.type(f"dodo.{name}") for name in ("Step", "StepDone"))
             frames = encode_frame(Envelope(session.messages.id(PLACE), b"", 0, 0, EPOCH, 0))
             lines = Path("/proc/net/udp").read_text().splitlines()[1:]
@@ -257,7 +257,7 @@ class Toys:
                 for app in apps:
                     app.start()
                     started.append(app)
-                channel = Channel(self.cid, session.messages, KEY)
+                channel = ClockChannel(self.cid, session.messages, KEY)
                 ids = {name: session.messages.id(name) for name in session.messages.names()}
                 answers = Answers(filters(self.answers, ids), filters(self.relayed, ids))
                 exchange = Exchange(session, channel, answers.take)

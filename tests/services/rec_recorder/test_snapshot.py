@@ -8,7 +8,7 @@ import pytest
 from dodo_dsl.opendlv.memory import pixels
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from services.rec_recorder.snapshot import SnapshotWriter
-from services.rec_recorder.source import MemorySpec, Source
+from services.rec_recorder.source import MemorySpec, PictureSource
 from tests.services.built import built, refusal
 from tests.services.rec_recorder.test_pictures import HEIGHT, WIDTH, CameraMemory, scene
 
@@ -30,7 +30,7 @@ def taken(path: Path) -> list[int]:
 
 def test_the_first_picture_and_then_that_of_the_begin(camera: CameraMemory, tmp_path: Path) -> None:
     path, seen = tmp_path / "snapshot.png", []
-    snapshot = SnapshotWriter(Source(MemorySpec(camera.name, WIDTH, HEIGHT), 1), path)
+    snapshot = SnapshotWriter(PictureSource(MemorySpec(camera.name, WIDTH, HEIGHT), 1), path)
     for number in range(6):
         snapshot.update(number)
         seen.append(taken(path))
@@ -52,7 +52,9 @@ def test_the_first_picture_and_then_that_of_the_begin(camera: CameraMemory, tmp_
 def test_what_cannot_be_written_is_told(
     camera: CameraMemory, tmp_path: Path, caplog: pytest.LogCaptureFixture, width: int, place: str, words: str
 ) -> None:
-    snapshot = SnapshotWriter(Source(MemorySpec(camera.name, width, HEIGHT), 1), tmp_path / place / "snapshot.png")
+    snapshot = SnapshotWriter(
+        PictureSource(MemorySpec(camera.name, width, HEIGHT), 1), tmp_path / place / "snapshot.png"
+    )
     snapshot.update(0)
     camera.show(1)
     snapshot.update(1)

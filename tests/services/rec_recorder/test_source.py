@@ -4,7 +4,7 @@ from collections.abc import Iterator
 import pytest
 
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from services.rec_recorder.source import MemorySpec, Source, SourceError, parse
+from services.rec_recorder.source import MemorySpec, PictureSource, SourceError, parse
 
 PERIOD = 100_000
 
@@ -21,7 +21,7 @@ def put(memory: SharedMemory, byte: int, time: int) -> None:
         memory.stamp(time)
 
 
-def taken(source: Source, memory: SharedMemory, times: list[int]) -> list[int]:
+def taken(source: PictureSource, memory: SharedMemory, times: list[int]) -> list[int]:
     got = []
     for number, time in enumerate(times):
         put(memory, number, time)
@@ -46,14 +46,14 @@ def taken(source: Source, memory: SharedMemory, times: list[int]) -> list[int]:
     ],
 )
 def test_pictures_at_a_rate(memory: SharedMemory, times_ms: list[int], wanted_ms: list[int]) -> None:
-    source = Source(MemorySpec(memory.name), PERIOD)
+    source = PictureSource(MemorySpec(memory.name), PERIOD)
     assert source.take(0) is None  # what was there before
     assert taken(source, memory, [t * 1000 for t in times_ms]) == wanted_ms
     source.close()
 
 
 def test_in_lockstep_the_first_picture_is_taken_and_nothing_before(memory: SharedMemory) -> None:
-    source = Source(MemorySpec(memory.name), PERIOD, is_stepped=True)
+    source = PictureSource(MemorySpec(memory.name), PERIOD, is_stepped=True)
     assert source.take(1_000_000) is None  # its file is of today
     put(memory, 7, 2_000_000)
     assert source.take(2_000_000) == (bytes([7]) * memory.size, 2_000_000)
@@ -62,7 +62,7 @@ def test_in_lockstep_the_first_picture_is_taken_and_nothing_before(memory: Share
 
 def test_a_memory_that_comes_and_goes(memory: SharedMemory) -> None:
     name = f"{memory.name}.late"
-    source = Source(MemorySpec(name), PERIOD)
+    source = PictureSource(MemorySpec(name), PERIOD)
     assert source.take(0) is None
     for start in (1, 3):
         with SharedMemory.create(name, 6) as late:
@@ -72,7 +72,7 @@ def test_a_memory_that_comes_and_goes(memory: SharedMemory) -> None:
 
 
 def test_it_never_stands_in_line(memory: SharedMemory) -> None:
-    source = Source(MemorySpec(memory.name), PERIOD)
+    source = PictureSource(MemorySpec(memory.name), PERIOD)
     taken(source, memory, [1, 2])
     assert memory.readers_waiting() == 0
     source.close()
@@ -113,7 +113,7 @@ def test_memories_written_wrongly(text: str) -> None:
 
 
 def test_a_camera_that_keeps_the_lock_is_waited_for(memory: SharedMemory) -> None:
-    source = Source(MemorySpec(memory.name), PERIOD)
+    source = PictureSource(MemorySpec(memory.name), PERIOD)
     assert source.take(0) is None
     with SharedMemory.attach(memory.name) as other, other.lock():
         assert source.take(0) is None

@@ -3,10 +3,9 @@
 import functools
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -35,15 +34,6 @@ class Confinement:
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     masked: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, raw: Mapping[str, Any]) -> "Confinement":
-        lists = {name: tuple(raw[name]) for name in ("reads", "hidden", "masked")}
-        limits = SandboxLimits(**{**raw["limits"], "reads": tuple(raw["limits"]["reads"])})
-        return cls(**{**raw, **lists, "limits": limits})
 
 
 def confinement(folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
