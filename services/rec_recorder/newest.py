@@ -1,6 +1,7 @@
 """A recording of pictures that keeps the newest ones."""
 
 import logging
+import os
 from collections import deque
 from pathlib import Path
 
@@ -65,7 +66,7 @@ class NewestPictures:
         part = self._path.with_name(f".{self._path.name}.part")
         part.unlink(missing_ok=True)
         shorter = RecordingWriter(part)
-        with self._path.open("rb") as old:
+        with os.fdopen(os.open(self._path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC), "rb") as old:
             old.seek(gone)
             shorter.write_frames(iter(lambda: old.read(_PIECE), b""))
         self._writer.close()
