@@ -14,6 +14,7 @@ FAULTS = (
     "The engine goes away in the middle of a test",
     "The application is killed",
     "The application takes more memory than it may",
+    "A child of the application takes more memory than it may",
     "A service of DoDo's is killed",
     "An evaluator ends without a verdict",
     "An evaluator gives two verdicts",

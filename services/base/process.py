@@ -157,9 +157,12 @@ def _membership(session: Session, role: str, key: bytes, world: World) -> Iterat
 
 @contextmanager
 def _readiness(file: Path, session: Session) -> Iterator[None]:
-    """Report that the service is ready, and where it listens; the ready file exists as long as it is."""
+    """Report that the service is ready, and where it listens; the ready file exists as long as it is.
+
+    Raises OSError for a link in its place: its folder may be the application's, too.
+    """
     address = {"address": f"{session.address[0]}:{session.port}"} if session.hears_directly else {}
-    file.touch()
+    os.close(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666))
     try:
         print(json.dumps({"dodo": "ready", **address}), flush=True)
         yield

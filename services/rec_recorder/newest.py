@@ -1,6 +1,7 @@
 """A recording of pictures that keeps the newest ones."""
 
 import logging
+import os
 from collections import deque
 from pathlib import Path
 
@@ -63,9 +64,9 @@ class NewestPictures:
         while self._sizes and self._writer.size - gone + needed > self._max_size * 3 // 4:
             gone += self._sizes.popleft()
         part = self._path.with_name(f".{self._path.name}.part")
-        part.unlink(missing_ok=True)
-        shorter = RecordingWriter(part)
-        with self._path.open("rb") as old:
+        with os.fdopen(os.open(self._path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC), "rb") as old:
+            part.unlink(missing_ok=True)
+            shorter = RecordingWriter(part)
             old.seek(gone)
             shorter.write_frames(iter(lambda: old.read(_PIECE), b""))
         self._writer.close()

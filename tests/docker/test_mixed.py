@@ -19,6 +19,7 @@ from tests.docker.compose import SUBNETS, Crate
 from tests.faults import Book
 from tests.run.desk import ROOT
 from tests.run.faults import Fault, as_told, faults_on
+from tests.run.helpers import AFTER_START, PASS, READY, WAIT
 
 TEST = "sil-closed-straight"
 
@@ -51,6 +52,30 @@ def test_faults_beside_processes_of_dodo(faults: dict[str, Fault], crate: Crate,
     outcomes = {o.slug.removeprefix(f"{crate.mark}-"): o for o in asyncio.run(runner.run(jobs))}
     as_told(faults, outcomes, "mixed", book)
     assert "memory video0.argb" in crate.log("neighbour")
+
+
+TAKES = """
+for name in [name for name in os.listdir("/tmp") if os.path.isdir(f"/tmp/{name}")]:
+    for remove in (os.rmdir, lambda path: os.rename(path, path + "-gone")):
+        try:
+            remove(f"/tmp/{name}")
+            os.symlink("/etc", f"/tmp/{name}")
+            print("replaced", name, flush=True)
+        except OSError as error:
+            print(error.strerror, name, flush=True)
+"""
+
+
+def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate) -> None:
+    """They are mounted in the ``/tmp`` that the application shares with them."""
+    judge = READY + AFTER_START + f"time.sleep(1)\nos.stat({str(crate.bench.folder)!r})\n" + PASS
+    job = separate(crate.job("takes", judge, TAKES + WAIT, user="0:0"), crate.bench.folder)
+    runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(1, lambda job: 1.0), Policy())
+    (outcome,) = asyncio.run(runner.run([job]))
+    assert outcome.outcome == "passed", outcome.reason
+    names, lines = {path.parts[2] for path in (crate.bench.folder, job.folder)}, crate.log("takes").splitlines()
+    assert names and all(lines.count(f"Device or resource busy {name}") == 2 for name in names), lines
+    assert not [line for line in lines if line.startswith("replaced")]
 
 
 def test_default_without_images_of_dodo(tmp_path: Path) -> None:

@@ -33,6 +33,8 @@ _CALLS = {  # name: numbers on x86-64 and on 64-bit Arm (include/uapi/asm-generi
     "acct": (163, 89), "chroot": (161, 51), "clone3": (435, 435),
 }  # fmt: skip
 INHERITED = [number for number in range(3, 1000) if os.path.exists(f"/proc/self/fd/{number}")]
+FOLDERS = [path for path in Path("/tmp").iterdir() if path.is_dir() and not path.is_symlink()]
+"""Where something is mounted for services of DoDo, which share this ``/tmp``."""
 Attack = Callable[[], object]
 ATTACKS: dict[str, Attack] = {}
 PLACES: dict[str, str] = json.loads(os.environ.get("ATTACKED", "{}"))
@@ -409,6 +411,32 @@ def secrets_in_its_arguments_neighbours() -> object:
     return [
         p for p in filter(str.isdigit, os.listdir("/proc")) if b"DODO_KEY" in Path(f"/proc/{p}/environ").read_bytes()
     ]
+
+
+@attack
+def takes_the_place_of_folders_of_services() -> object:
+    """What is mounted there would go in all namespaces, and a link of its own be what services find."""
+    through = [] if FOLDERS else ["there is none"]
+    for path in FOLDERS:
+        other, exchange = Path(f"{path}-other"), 2
+        other.mkdir()
+        renamed = (-100, os.fsencode(path), -100, os.fsencode(other), exchange)
+        if _libc.syscall(ctypes.c_long(316 if _X86 else 276), *renamed) == 0:
+            through.append(f"{path} exchanged")
+        for remove in (os.rmdir, os.unlink, lambda path: os.rename(path, f"{path}-gone")):
+            try:
+                remove(path)
+                os.symlink(PLACES["results"], path)
+                through.append(f"{path} replaced")
+                break
+            except OSError:
+                pass
+    return through
+
+
+@attack
+def sees_names_of_the_machines_folders() -> object:
+    return os.path.lexists(PLACES["folder"])
 
 
 @attack

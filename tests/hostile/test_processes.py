@@ -27,6 +27,7 @@ OF_PLACES = (
     "neighbour",
     "compiled",
     "secret",
+    "folder",
 )
 NAMES = sorted({*attacks.ATTACKS, *(f"{verb}-{place}" for place in OF_PLACES for verb in ("read", "write"))})
 
@@ -44,6 +45,7 @@ def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
         listener.listen()
         memory = Path("/dev/shm", secret.name)
         memory.write_text("of another test")
+        of_others = Path(tempfile.mkdtemp(prefix="dodo-test-folder-"))
         (folder / "state").mkdir(mode=0o777)
         (folder / "neighbour").write_text("a recording")
         places = {
@@ -52,6 +54,7 @@ def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
             "neighbour": str(folder / "neighbour"),
             "compiled": str(folder / "compiled"),
             "secret": str(secret),
+            "folder": str(of_others),
         }
         as_user = words_as_user(folder) if request.param == "user" and os.getuid() == 0 else []
         words = [*as_user, sys.executable, "-m", "tests.hostile.run_attacks", name]
@@ -60,6 +63,7 @@ def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
             words, input=json.dumps(places), capture_output=True, text=True, check=False, cwd=ROOT, env=environment
         )
         secret.unlink()
+        of_others.rmdir()
         memory.unlink()
         assert done.returncode == 0, done.stdout + done.stderr
         yield json.loads(done.stdout.splitlines()[-1])

@@ -82,6 +82,14 @@ FAULTS = {
         application=HUNGRY,
         app={"mem_limit": "64m", "memswap_limit": "64m"},
     ),
+    "hungry-child": Fault(
+        "A child of the application takes more memory than it may",
+        "failed",
+        "application service 'app' ran out of memory after ",
+        {"docker": SHORT, "mixed": LONG},
+        application="if os.fork() == 0:\n    " + HUNGRY.strip().replace("\n", "\n    ") + "\n" + WAIT,
+        app={"mem_limit": "64m", "memswap_limit": "64m"},
+    ),
     "service-killed": Fault(
         "A service of DoDo's is killed",
         "error",

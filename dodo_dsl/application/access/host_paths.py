@@ -122,7 +122,8 @@ class HostPaths:
             return f"'{text}' holds the whole repository and more", "mount the folders that the service needs"
         if not text.startswith(("/", "~")):
             return f"'{text}' {self._where(text)}", ASK
-        return f"'{text}' belongs to the host, so tests would share it", ASK
+        written = f"/{text.lstrip('/')}" if text.startswith("//") else text  # as of ${HOME}/x where that is /
+        return f"'{written}' belongs to the host, so tests would share it", ASK
 
     @property
     def _places(self) -> tuple[Path, ...]:

@@ -84,6 +84,7 @@ class DockerBackend:
         self._addresses: dict[str, Address] = {}
         """Where services of the test hear what the bus must not carry."""
         self._out_of_memory: set[str] = set()
+        self._kills: set[asyncio.Future[None]] = set()
         self._watch = EventWatch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self._copied, self._copy_problem = asyncio.Event(), ""
         self._conditions = Conditions(plan.application.services)
@@ -152,7 +153,7 @@ class DockerBackend:
 
     def _take(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
         if action == "oom":
-            self._out_of_memory.add(name)
+            self._take_memory_kill(name)
         elif name == FILES:
             self._take_of_copies(action)
         elif action == "health_status: healthy":
@@ -165,6 +166,18 @@ class DockerBackend:
             task.add_done_callback(lambda t: t.exception())
         elif action == "die":
             self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+
+    def _take_memory_kill(self, name: str) -> None:
+        """Ends a service of which the kernel killed a process for memory, as it may have been a child."""
+        if name in self._outputs and name not in self._out_of_memory:
+            self._kills.add(asyncio.ensure_future(asyncio.to_thread(self._kill, name)))
+        self._out_of_memory.add(name)
+
+    def _kill(self, name: str) -> None:
+        from docker.errors import DockerException
+
+        with contextlib.suppress(DockerException, OSError):  # it has ended
+            self._containers[name].kill()
 
     def _take_of_copies(self, action: str) -> None:
         if action == "health_status: healthy":

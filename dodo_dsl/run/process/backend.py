@@ -18,7 +18,7 @@ from dodo_dsl.run.application_files import application_paths, hidden_paths
 from dodo_dsl.run.files_of_tests import Found, files_of_tests, in_few
 from dodo_dsl.run.load.service_use import Used
 from dodo_dsl.run.load.snapshot import Snapshot
-from dodo_dsl.run.process.commands import Command, Commands, changes, import_paths
+from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
 from dodo_dsl.run.process.confined import bubblewrap
 from dodo_dsl.run.process.confined.confinement import confinement
 from dodo_dsl.run.process.entered import Entered
@@ -93,8 +93,8 @@ class ProcessBackend:
 
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
-        shown = (self._folder, self.report, *import_paths(self.plan, self._folder))
-        entered = Entered.with_own(container, *shown) if container else None
+        needed = needed_paths(self.plan, self._folder, self.report)
+        entered = None if self.is_on_host else Entered.with_own(container, *needed)
         await self._sandbox.open(self.slot, self.report, entered)
 
     def _take(self, message: dict[str, Any]) -> None:

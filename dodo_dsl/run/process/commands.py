@@ -13,6 +13,7 @@ from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
 from dodo_dsl.plan.model import ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths
+from dodo_dsl.run.process.entered import named_paths
 from dodo_dsl.run.process.environment import (
     application_environment,
     base_environment,
@@ -111,6 +112,17 @@ class Commands:
 def import_paths(plan: Plan, folder: Path) -> list[Path]:
     """The folders of the packages of the deployment's own services; ``folder`` is the compiled test's."""
     return [(folder / path).resolve() for path in plan.import_paths]
+
+
+def needed_paths(plan: Plan, folder: Path, report: Path) -> list[Path]:
+    """What a test's processes are given, and may find in the machine's ``/tmp``: folders, programs, variables."""
+    paths = application_paths(plan.application, folder)
+    words = [word for service in plan.services for word in (*service.process, *(flag.value for flag in service.flags))]
+    words += [word for service in plan.application.services for word in service.process or ()]
+    words += [*plan.variables.values()]
+    words += [value for service in plan.application.services for value in service.environment.values() if value]
+    reads = [paths.folder / Path(path).expanduser() for path in plan.application.limits.reads]
+    return [folder, report, *import_paths(plan, folder), paths.folder, *paths.roots, *reads, *named_paths(words)]
 
 
 def own_modules(plans: Iterable[Plan]) -> set[str]:

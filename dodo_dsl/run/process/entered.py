@@ -1,27 +1,35 @@
-"""What a sandbox enters instead of namespaces of its own: those of a container, which the application shares."""
+"""What a sandbox enters: namespaces of its own, or those of a container, which the application shares."""
 
 import json
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
+
+from dodo_dsl.run.process import namespaces
 
 _FLAG = "--enter="
 
 
 @dataclass(frozen=True)
 class Entered:
-    """A process of the container on this machine, and folders of the host that services need, also below ``/tmp``."""
+    """A process of the container on this machine, 0 for own namespaces, and folders of ``/tmp`` that the test needs."""
 
     process: int
     shown: tuple[Path, ...] = ()
 
     @classmethod
-    def with_own(cls, process: int, *folders: Path) -> Self:
-        """With the folders of Python and of DoDo as this process has them."""
+    def with_own(cls, process: int, *needed: Path) -> Self:
+        """With what in ``/tmp`` and ``/dev/shm`` holds ``needed`` paths, Python, DoDo, or paths in variables."""
         own = (Path(sys.prefix), Path(sys.base_prefix), *(Path(place) for place in sys.path if place))
-        return cls(process, tuple(dict.fromkeys(path.resolve() for path in (*folders, *own))))
+        given = named_paths(os.environ.values())
+        every = (*needed, *own, *given)
+        names = {name for path in every for name in (os.path.abspath(path), os.path.realpath(path))}  # noqa: PTH100
+        inside = ((folder, name.relative_to(folder).parts) for folder in namespaces.SHARED for name in map(Path, names)
+                  if name.is_relative_to(folder))  # fmt: skip
+        return cls(process, tuple(sorted({folder / parts[0] for folder, parts in inside if parts})))
 
     def word(self) -> str:
         """The word of a sandbox's command line."""
@@ -35,3 +43,8 @@ class Entered:
                 process, *shown = json.loads(word.removeprefix(_FLAG))
                 return cls(process, tuple(map(Path, shown)))
         return None
+
+
+def named_paths(words: Iterable[str]) -> list[Path]:
+    """The whole paths among words, each of which may have several, as ``PATH`` does."""
+    return [Path(name) for word in words for name in word.split(os.pathsep) if name.startswith("/")]

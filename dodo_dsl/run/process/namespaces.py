@@ -1,7 +1,7 @@
 """An own network, IPC, process and ``/tmp`` for a test, by Linux namespaces; no other program is needed.
 
-Inside, ``lo`` is up and carries multicast, ``/tmp`` and ``/dev/shm`` are empty and private, and the folders that lay
-in them stay visible, so that programs and specs kept there still run.
+Inside, ``lo`` is up and carries multicast, ``/tmp`` and ``/dev/shm`` are empty and private, and of the folders that lay
+in them those stay visible that the test needs, so that programs and specs kept there still run.
 """
 
 import contextlib
@@ -10,8 +10,9 @@ import errno
 import os
 import signal
 import socket
+import stat
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 _CLONE_NEWNS, _CLONE_NEWIPC, _CLONE_NEWUSER = 0x00020000, 0x08000000, 0x10000000
@@ -143,32 +144,33 @@ def _join(process: int, kind: str, flag: int) -> None:
         os.close(descriptor)
 
 
-def furnish_entered(trees: Mapping[Path, int], shown: Iterable[Path]) -> None:
+def furnish_entered(trees: Mapping[Path, int], shown: Collection[Path]) -> None:
     """Mounts the folders of ``enter``; to be called by the new process 1.
 
-    Of the host's ``SHARED`` only what holds ``shown`` paths stays, as an empty folder to the other process.
+    Of the host's ``SHARED`` only the folders ``shown`` stay, which are empty to the other process.
     """
     _keep_mounts_private()
     _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
-    places = tuple(shown)
     for folder, tree in trees.items():
-        names = sorted({p.relative_to(folder).parts[0] for p in places if p.is_relative_to(folder) and p != folder})
         old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
         _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(folder), _MOVE_MOUNT_F_EMPTY_PATH)
         os.close(tree)
-        for name in names:
-            _bind_old(old, folder / name)
-        os.close(old)
+        _bind_old(old, folder, shown)
 
 
-def furnish() -> None:
-    """Mounts and network of the new namespaces; to be called by their process 1."""
+def furnish(shown: Collection[Path]) -> None:
+    """Mounts and network of the new namespaces; to be called by their process 1.
+
+    Of the folders in ``SHARED`` those stay that are ``shown``, but no files: they may be another test's tokens.
+    """
     _keep_mounts_private()
     with contextlib.suppress(OSError):  # containers may mask /proc; only tools like ps would miss it
         _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
     for folder in SHARED:
         if folder.is_dir():
-            _make_private(folder)
+            old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+            mount_tmpfs(folder, _SHARED_SIZE)
+            _bind_old(old, folder, shown)
     _loopback_up()
     _multicast_route()
 
@@ -235,25 +237,18 @@ def overlay(lower: Path, upper: Path, work: Path, target: Path) -> None:
     _call("mount", b"overlay", bytes(target), b"overlay", _MS_NOSUID | _MS_NODEV, options.encode())
 
 
-def _make_private(folder: Path) -> None:
-    """An empty folder with the old one's folders, but not its files: those may be another test's tokens."""
-    old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
-    names = [entry.name for entry in os.scandir(folder) if entry.is_dir(follow_symlinks=False)]
-    mount_tmpfs(folder, _SHARED_SIZE)
-    for name in names:
-        _bind_old(old, folder / name)
-    os.close(old)
-
-
-def _bind_old(old: int, target: Path) -> None:
-    """Shows a folder of an old one, of which ``old`` is a descriptor, in the new one that took its place.
+def _bind_old(old: int, folder: Path, shown: Collection[Path]) -> None:
+    """Shows what is ``shown`` of an old folder in the new one that took its place, and closes the ``old`` descriptor.
 
     The application, which sees it without what is mounted there, has to get through to its own folder.
     """
-    target.mkdir(exist_ok=True)
-    target.chmod(_ENTERED)
-    with contextlib.suppress(FileNotFoundError):  # it was removed meanwhile
-        bind(Path(f"/proc/self/fd/{old}", target.name), target, deep=True)
+    for target in (path for path in shown if path.parent == folder):
+        with contextlib.suppress(FileNotFoundError):
+            if stat.S_ISDIR(os.stat(target.name, dir_fd=old, follow_symlinks=False).st_mode):
+                target.mkdir(exist_ok=True)
+                target.chmod(_ENTERED)
+                bind(Path(f"/proc/self/fd/{old}", target.name), target, deep=True)
+    os.close(old)
 
 
 def _loopback_up() -> None:

@@ -211,18 +211,18 @@ def _has_own_proc() -> bool:
     return Path("/proc/self").readlink().name == str(os.getpid())
 
 
-def _in_namespaces(channel: socket.socket, entered: Entered | None) -> None:
+def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
     """Forks process 1 of new namespaces, which returns; this process only waits for it."""
-    trees = namespaces.enter(entered.process) if entered else {}
-    if not entered:
+    trees = namespaces.enter(entered.process) if entered.process else {}
+    if not entered.process:
         namespaces.unshare()
     child = os.fork()
     if child == 0:
         namespaces.die_with_parent(signal.SIGKILL)
-        if entered:
+        if entered.process:
             namespaces.furnish_entered(trees, entered.shown)
         else:
-            namespaces.furnish()
+            namespaces.furnish(entered.shown)
         return
     channel.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -240,7 +240,7 @@ def main(argv: list[str]) -> int:
     isolation, outside, forks = argv[1], os.getpid(), "--forks" in argv
     try:
         if isolation == "network":
-            _in_namespaces(channel, Entered.among(argv))
+            _in_namespaces(channel, Entered.among(argv) or Entered.with_own(0))
         else:
             namespaces.adopt_orphans()
     except OSError as error:

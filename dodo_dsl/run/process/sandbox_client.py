@@ -56,7 +56,7 @@ class SandboxClient:
     async def open(self, slot: Slot, folder: Path, entered: Entered | None = None) -> None:
         """Starts the sandbox, which logs into ``folder`` and holds the slot's leases; raises BackendError.
 
-        With ``entered`` it has no network of its own, but a container's.
+        ``entered`` are its namespaces; None on the host.
         """
         self._words = (entered.word(),) if entered else ()
         folder.mkdir(parents=True, exist_ok=True)

@@ -112,3 +112,8 @@ def test_the_repository(tmp_path: Path) -> None:
     assert repository(folder) == (tmp_path / "a",)
     (folder.parent / ".git").mkdir()
     assert repository(folder) == (folder.parent, tmp_path / "a")
+
+
+def test_a_path_from_the_root_as_home_has_one_slash(tmp_path: Path) -> None:
+    problem, _ = HostPaths(tmp_path, (tmp_path,)).mount_problem("//.ssh")
+    assert problem == "'/.ssh' belongs to the host, so tests would share it"

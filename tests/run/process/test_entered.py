@@ -1,7 +1,7 @@
 """What a sandbox enters, as a word of its command line."""
 
 import asyncio
-import sys
+import os
 from pathlib import Path
 
 import pytest
@@ -14,24 +14,29 @@ from tests.run.scripted import plan
 
 
 def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
-    entered = Entered.with_own(12, tmp_path / "a b")
+    entered = Entered.with_own(12, tmp_path / "a b", Path("/tmp/../usr"))
     assert Entered.among(["3", "network", "--forks", entered.word()]) == entered
     assert entered.process == 12
-    assert entered.shown[0] == tmp_path / "a b"
-    assert Path(sys.prefix).resolve() in entered.shown
+    assert Path(*tmp_path.parts[:3]) in entered.shown
+    assert Entered.with_own(12, Path("/tmp"), Path("/tmp/a/b"), Path("/tmp/a")).shown.count(Path("/tmp/a")) == 1
+    assert not [path for path in entered.shown if path.name == ".."]
     assert Entered.among(["3", "network", "--forks"]) is None
 
 
-def test_a_sandbox_in_a_container_shows_own_services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Their folder may lie below ``/tmp``, which is the container's there."""
+def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may lie below ``/tmp``, which is another one there."""
     shown: list[Entered | None] = []
 
     async def opened(_client: SandboxClient, _slot: Slot, _folder: Path, entered: Entered | None) -> None:
         shown.append(entered)
 
     monkeypatch.setattr(SandboxClient, "open", opened)
-    folder = tmp_path / "repository/generated/test"
-    backend = ProcessBackend(plan(import_paths=("../..",)), folder, tmp_path / "report", "network", Slot(130))
-    asyncio.run(backend.open(container=12))
-    (entered,) = shown
-    assert entered is not None and entered.shown[:3] == (folder, tmp_path / "report", tmp_path / "repository")
+    folder = Path("/tmp/dodo-a/repository/generated/test")
+    one = plan(import_paths=("../../../../dodo-b",))
+    monkeypatch.setenv("LIBRARIES", f"/usr/lib{os.pathsep}/dev/shm/dodo-d/lib")
+    for container in (0, 12):
+        backend = ProcessBackend(one, folder, Path("/tmp/dodo-c/report"), "network", Slot(130))
+        asyncio.run(backend.open(container))
+        entered = shown.pop()
+        assert entered is not None and entered.process == container
+        assert {"dodo-a", "dodo-b", "dodo-c", "dodo-d"} <= {path.name for path in entered.shown}

@@ -14,6 +14,7 @@ from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.bus.session import Session
 from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.messages.message_set import MessageSet
+from services.base.process import _readiness
 from tests.services.base.conftest import ROOT, Process, Start
 
 MESSAGES = MessageSet.standard()
@@ -44,6 +45,15 @@ def test_ready_means_that_session_and_memory_are_there(start: Start, ready_file:
     assert service.end() == (0, "", "")
     assert not ready_file.exists()
     assert not Path("/tmp", name).exists()
+
+
+def test_a_link_in_the_place_of_the_ready_file_is_not_followed(tmp_path: Path, cid: int) -> None:
+    """The application may put it there as soon as the service has removed an old one."""
+    link, target = tmp_path / "ready", tmp_path / "target"
+    link.symlink_to(target)
+    with Session(cid) as session, pytest.raises(OSError, match="symbolic links"), _readiness(link, session):
+        pass
+    assert not target.exists()
 
 
 def test_steps_are_even_and_stamped_with_test_time(start: Start, cid: int) -> None:

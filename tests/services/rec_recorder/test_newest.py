@@ -43,3 +43,19 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
     with pytest.raises(RecordingFileError, match="exists and is not overwritten"):
         NewestPictures(path, 1500)
     assert path.read_bytes() == b"dear"
+
+
+def test_a_link_in_its_place_is_not_read(tmp_path: Path) -> None:
+    """Who may write to the folder would else get what the recorder can read."""
+    path, other = tmp_path / "frames.rec", tmp_path / "other"
+    other.write_bytes(b"secret" * 1000)
+    pictures = NewestPictures(path, 300)
+    pictures.write(picture(1))
+    path.unlink()
+    path.symlink_to(other)
+    for number in range(2, 6):
+        pictures.write(picture(number))
+    pictures.close()
+    assert not pictures.is_on
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["frames.rec", "other"]
+    assert path.is_symlink()

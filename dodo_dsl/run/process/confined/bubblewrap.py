@@ -33,6 +33,8 @@ class Mounts:
     """The folder; what is written there goes with the test."""
     home: Path
     shared: Mapping[str, Path]
+    mounted: Sequence[str] = ()
+    """What is mounted there for DoDo's services, which the application must neither see nor remove."""
     reads: Mapping[str, Path] = field(default_factory=dict)
     """By their paths; what is not there is shown as it is."""
 
@@ -80,7 +82,9 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
     read = (*_shown(confined, program), *confined.reads)
     hidden = _outermost(filter(os.path.exists, confined.hidden), (*read, confined.folder))
     around = [path for path in hidden if Path(confined.folder).is_relative_to(path)]
-    covered = [path for path in around if not any(Path(path).is_relative_to(one) for one in read)]
+    covered = [path for path in mounts.mounted if path not in (confined.folder, *read)]
+    covered += [path for path in around if not any(Path(path).is_relative_to(one) for one in read)]
+    covered = list(dict.fromkeys(covered))
     seen += [word for path in covered for word in ("--perms", "0755", "--tmpfs", path)]
     seen += [*_folders(_parents((HOME, confined.folder, *read))), *_read_only(read, mounts)]
     seen += ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]

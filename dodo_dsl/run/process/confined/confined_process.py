@@ -88,7 +88,7 @@ class ConfinedProcess:
 
 def _mounts(places: Places, confined: Confinement) -> bubblewrap.Mounts:
     reads = {path: places.read(path) for path in confined.reads}
-    return bubblewrap.Mounts(*places.folder(confined.folder), places.home, places.shared, reads)
+    return bubblewrap.Mounts(*places.folder(confined.folder), places.home, places.shared, places.mounted, reads)
 
 
 def _found(name: str, environment: Mapping[str, str], folder: str) -> str:

@@ -29,6 +29,8 @@ class Places:
         self.home = self._own("home")
         self.shared = {str(place): self._shallow(place) for place in namespaces.SHARED if place.is_dir()}
         """``/tmp`` and ``/dev/shm`` by their names, without the host's folders that are mounted there."""
+        self.mounted = tuple(str(path) for place in self.shared for path in Path(place).iterdir() if path.is_mount())
+        """What is mounted there, and must be a mount to the application as well: no other folder can be removed."""
         self._shown: dict[str, tuple[Path, bool]] = {}
         self._read: dict[str, Path] = {}
 
