@@ -57,7 +57,7 @@ realtime-tests:
 	$(AHEAD) $(PYTEST) -n $(RIGS) --dist loadgroup -m "realtime and not proof" --junitxml=$(JUNIT)/realtime.xml
 
 engine-tests:
-	$(PYTEST) -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
+	$(PYTEST) -n 2 --dist loadgroup -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
 
 fast-tests:
 	$(BEHIND) $(PYTEST) -n 2 -m "not slow" --junitxml=$(JUNIT)/fast.xml
