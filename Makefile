@@ -63,7 +63,7 @@ fast-tests:
 	$(BEHIND) $(PYTEST) -n 2 -m "not slow" --junitxml=$(JUNIT)/fast.xml
 
 slow-tests:
-	$(PYTEST) -n $(shell nproc) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
+	$(PYTEST) -n $(WORKERS) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
 
 tools:
 	@scripts/install-test-tools

@@ -124,9 +124,7 @@ FEW = {"docker": ("come-true", "unhealthy", "own-health"), "mixed": ("come-true"
         pytest.param("mixed", FEW["mixed"], id="mixed", marks=NOT_ROOT),
     ],
 )
-def test_conditions(
-    backend: str, names: tuple[str, ...], crate: Crate, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_conditions(backend: str, names: tuple[str, ...], crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that cannot come true ends the test, and names who waits for what."""
     monkeypatch.setattr(conditions, "LONGEST_S", 9.0)
     chosen = {name: TABLE[name] for name in names}

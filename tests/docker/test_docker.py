@@ -48,7 +48,7 @@ def results(report: Path) -> dict[str, dict[str, Any]]:
 
 
 def of_dodo() -> set[str]:
-    """The containers, networks and volumes of tests that the engine holds, without those that have a mark of their own."""
+    """The containers, networks and volumes of tests that the engine holds, without those that have a mark."""
     lists = (
         ("ps", "-a", "--format", "container {{.Names}}"),
         ("network", "ls", "--format", "network {{.Name}}"),

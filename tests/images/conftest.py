@@ -40,7 +40,8 @@ def engine_answers() -> bool:
 @contextlib.contextmanager
 def one_at_a_time(factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A file of this run of tests, which no other of its processes has now."""
-    note = factory.getbasetemp().parent / "images.json" if "PYTEST_XDIST_WORKER" in os.environ else Path(os.devnull)
+    own = factory.getbasetemp()
+    note = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "images.json"
     with note.open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield note
@@ -94,26 +95,19 @@ def _plugin(name: str) -> str | None:
     return next((str(folder / name) for folder in places if (folder / name).is_file()), None)
 
 
-@functools.cache
-def _all_images(base_image: str, factory: pytest.TempPathFactory) -> dict[str, str]:
-    with one_at_a_time(factory) as note:
-        base = with_programs(base_image)
-        if text := note.read_text():
-            return dict(json.loads(text))
-        if shutil.which("avr-gcc"):
-            make("firmware", "emulator")
-        made = build(base)
-        note.write_text(json.dumps(made))
-        return made
-
-
 @pytest.fixture(scope="session")
 def built(base_image: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """All images under the names that compiled tests ask for; the gantry's holds the emulated rig where it can be.
 
     They are built once, although this is another fixture in each folder that imports it, and in each process.
     """
-    return _all_images(base_image, tmp_path_factory)
+    with one_at_a_time(tmp_path_factory) as note:
+        base = with_programs(base_image)
+        if not note.read_text():
+            if shutil.which("avr-gcc"):
+                make("firmware", "emulator")
+            note.write_text(json.dumps(build(base)))
+        return dict(json.loads(note.read_text()))
 
 
 @pytest.fixture
