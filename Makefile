@@ -51,7 +51,7 @@ types: dev
 	.venv/bin/mypy
 
 quick-tests: dev
-	$(PYTEST) -n $(WORKERS) -m "not slow" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
+	$(PYTEST) -n $(WORKERS) -m "not slow and not thorough" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
 
 realtime-tests:
 	$(AHEAD) $(PYTEST) -n $(RIGS) --dist loadgroup -m "realtime and not proof" --junitxml=$(JUNIT)/realtime.xml

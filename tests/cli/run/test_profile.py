@@ -13,6 +13,7 @@ from tests.cli.run.test_command import ENDINGS, Command, dodo
 __all__ = ["dodo"]
 
 
+@pytest.mark.thorough
 def test_a_run_shows_and_writes_its_phases(dodo: Command) -> None:
     dodo.stages = ENDINGS["passed"]
     code, out, _ = dodo.run("--repeat", "3", "--profile")
