@@ -51,19 +51,19 @@ types: dev
 	.venv/bin/mypy
 
 quick-tests: dev
-	$(PYTEST) -n $(WORKERS) -m "not slow" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
+	$(PYTEST) -n $(WORKERS) -m "not slow and not thorough" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
 
 realtime-tests:
 	$(AHEAD) $(PYTEST) -n $(RIGS) --dist loadgroup -m "realtime and not proof" --junitxml=$(JUNIT)/realtime.xml
 
 engine-tests:
-	$(PYTEST) -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
+	$(PYTEST) -n 2 --dist loadgroup -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
 
 fast-tests:
 	$(BEHIND) $(PYTEST) -n 2 -m "not slow" --junitxml=$(JUNIT)/fast.xml
 
 slow-tests:
-	$(PYTEST) -n $(shell nproc) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
+	$(PYTEST) -n $(WORKERS) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
 
 tools:
 	@scripts/install-test-tools

@@ -59,6 +59,7 @@ def options_of(command: str, *words: str) -> set[str]:
     return {option for action in found._actions for option in action.option_strings}
 
 
+@pytest.mark.thorough
 def test_what_texts_name_exists() -> None:
     """Commands with their options, targets of make, and scripts."""
     targets = (ROOT / "Makefile").read_text()
@@ -76,6 +77,7 @@ def test_what_texts_name_exists() -> None:
             assert "pip install" not in text or path.suffix != ".py" or path.name == "decoder.py", path
 
 
+@pytest.mark.thorough
 def test_extras_are_those_of_the_project() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     del extras["dev"]
@@ -211,6 +213,7 @@ for check in (kernel.multicast, kernel.shared_memory):
 
 
 @pytest.mark.skipif(not shutil.which("ip") or os.geteuid() != 0, reason="needs iproute2 and root")
+@pytest.mark.thorough
 def test_a_machine_without_multicast_and_shared_memory() -> None:
     """Network and limits of its own: what doctor advises is typed there."""
     command = f"sysctl -q -w kernel.shmmni=7 && exec {shlex.quote(sys.executable)} -c {shlex.quote(IN_NAMESPACES)}"

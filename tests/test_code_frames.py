@@ -28,6 +28,7 @@ LINES = st.text(CHARACTERS, max_size=400)
 @example("a: " + "b" * 100_000, 3, 100_000, 74)
 @example("漢\t" * 50_000, 77_777, 9, 40)
 @example("e" + "\u0301" * 100_000, 50_000, 9, 40)
+@pytest.mark.thorough
 def test_the_place_of_any_line_is_shown_in_any_width(line: str, number: int, length: int, room: int) -> None:
     start = number % (len(line) + 1)
     before, place, behind = excerpt(line, start, length, room)
@@ -47,6 +48,7 @@ def test_the_place_of_any_line_is_shown_in_any_width(line: str, number: int, len
 @given(st.lists(st.tuples(LINES, st.integers(0), st.integers(1, 500)), min_size=1, max_size=3), st.integers(30, 200))
 @example([("a" * 24, 24, 1)], 30)
 @example([("a" * 24 + "\u0301", 24, 1)], 30)
+@pytest.mark.thorough
 def test_each_frame_of_several_has_carets_below_its_place(
     tmp_path_factory: pytest.TempPathFactory, places: list[tuple[str, int, int]], width: int
 ) -> None:

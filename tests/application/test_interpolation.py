@@ -58,6 +58,7 @@ def test_dotenv_files_are_read_as_compose_reads_them(tmp_path: Path) -> None:
 
 
 @given(st.dictionaries(st.text(string.ascii_letters, min_size=1), st.text(st.characters(exclude_characters="\0\r"))))
+@pytest.mark.thorough
 def test_dotenv_lines_are_read_back(values: dict[str, str]) -> None:
     doubled = {name: value.replace("$", "$$") for name, value in values.items()}
     assert interpolation.dotenv("\n".join(interpolation.dotenv_line(*pair) for pair in doubled.items())) == doubled

@@ -74,6 +74,7 @@ HUGE = {
 
 
 @pytest.mark.parametrize("services", HUGE.values(), ids=HUGE)
+@pytest.mark.thorough
 def test_what_would_grow_without_end_is_refused(services: dict[str, Any], tmp_path: Path) -> None:
     file = tmp_path / "docker-compose.yml"
     file.write_text(json.dumps({"services": services}))

@@ -49,6 +49,7 @@ def application(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Application:
     return plan_application(source, 140, "host", tmp_path / "generated" / "t", (), given=GIVEN)
 
 
+@pytest.mark.thorough
 def test_the_copy_has_them(application: Application) -> None:
     services = application.compose["services"]
     assert services["mapped"]["command"] == "--cid=140 --speed=0.5 --rate=${RATE:-2} --faster=${FASTER:-0.5}"

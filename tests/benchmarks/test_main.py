@@ -33,6 +33,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Runs]:
     return give
 
 
+@pytest.mark.thorough
 def test_it_writes_both_files_and_prints_the_table(
     tmp_path: Path, runs: Callable[..., Runs], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -45,12 +46,14 @@ def test_it_writes_both_files_and_prints_the_table(
     assert json.loads((tmp_path / "ledger.json").read_text())["benches"][1]["name"] == "bench_rec"
 
 
+@pytest.mark.thorough
 def test_one_that_failed_takes_no_others_with_it(tmp_path: Path, runs: Callable[..., Runs]) -> None:
     noted = runs(rated(1, 2, 3), failed=True)
     assert command.main(["bus", "rec", "-o", str(tmp_path)]) == 0
     assert len(noted) == 2 and "- ended with 3: bench_bus" in (tmp_path / "ledger.md").read_text()
 
 
+@pytest.mark.thorough
 def test_an_interrupt_keeps_what_was_measured(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -73,6 +76,7 @@ def test_an_interrupt_keeps_what_was_measured(
     assert "| interrupted before it |" in table
 
 
+@pytest.mark.thorough
 def test_the_set_up_counts(tmp_path: Path, runs: Callable[..., Runs]) -> None:
     """And what one benchmark takes too long goes off the others."""
     noted = runs(rated(1, 2, 3))
@@ -95,6 +99,7 @@ def test_a_worse_row_fails_the_command(
     assert " against old\n" in table and f"| {verdict} " in table
 
 
+@pytest.mark.thorough
 def test_two_checkouts_run_in_turns(tmp_path: Path, runs: Callable[..., Runs]) -> None:
     other = tmp_path / "other"
     (other / "benchmarks").mkdir(parents=True)

@@ -74,6 +74,7 @@ def test_one_that_fails_says_why_in_the_rows_that_it_did_not_come_to(folder: Pat
     assert (bench.trouble, bench.failed) == (why, True)
 
 
+@pytest.mark.thorough
 def test_one_that_hangs_is_ended_with_its_children_and_keeps_its_rows(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,6 +138,7 @@ def once_more(wait: Callable[..., int]) -> Callable[..., int]:
     return called
 
 
+@pytest.mark.thorough
 def test_a_part_that_fails_leaves_the_others(folder: Path) -> None:
     text = """
 from benchmarks.ledger.row import attempt, plan, rate_row, report
@@ -155,6 +157,7 @@ with attempt(three):
     assert ([(row.ours, row.note) for row in bench.rows], bench.failed) == (expected, False)
 
 
+@pytest.mark.thorough
 def test_one_without_rows_has_a_row_that_says_why(folder: Path) -> None:
     (folder / "bench_a.py").write_text("import time; time.sleep(999)")
     assert run(folder / "bench_a.py", 0.1).rows == (Row("bench_a", "", note="did not end in 0.1 s, and was ended"),)

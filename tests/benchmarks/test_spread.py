@@ -30,6 +30,7 @@ def test_order(one: list[float], other: list[float], order: int) -> None:
 
 @given(VALUES, VALUES)
 @settings(max_examples=30)
+@pytest.mark.thorough
 def test_the_order_turns_round(one: list[float], other: list[float]) -> None:
     a, b = Spread.of(one), Spread.of(other)
     assert a.low <= a.middle <= a.high

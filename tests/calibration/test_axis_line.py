@@ -23,6 +23,7 @@ def off_by(index: int, error: float) -> list[Reading]:
 
 
 @given(st.floats(3000, 3600), st.floats(2700, 3300))
+@pytest.mark.thorough
 def test_exact_readings_give_the_constants(steps: float, offset: float) -> None:
     line = fit(X, readings(steps, offset))
     assert (line.steps, line.offset) == pytest.approx((steps, offset), rel=1e-9)

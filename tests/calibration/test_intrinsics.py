@@ -19,6 +19,7 @@ def views() -> list[BoardView]:
     return [seen for seen in map(view, pictures()) if seen]
 
 
+@pytest.mark.thorough
 def test_a_known_camera_comes_back() -> None:
     found = intrinsics(views())
     assert (found.width, found.height, found.pictures) == (WIDTH, HEIGHT, 9)
@@ -33,6 +34,7 @@ def test_a_known_camera_comes_back() -> None:
     assert found.error < 0.2 and found.deviation < 1 and found.fovy == pytest.approx(48.87, abs=0.1)
 
 
+@pytest.mark.thorough
 def test_pictures_that_are_not_enough_are_refused() -> None:
     good = views()
     with pytest.raises(CalibrationProblem, match="5 pictures show the board, expected at least 6"):

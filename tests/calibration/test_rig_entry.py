@@ -114,6 +114,7 @@ trees = st.recursive(
 
 @settings(max_examples=40, deadline=None)
 @given(st.dictionaries(keys, trees, max_size=4), trees, st.sampled_from([True, False, None]), st.booleans())
+@pytest.mark.thorough
 def test_whatever_the_style_all_else_stays(rig: "dict[str, object]", after: object, flow: bool, last: bool) -> None:
     rigs = {"kiwi": rig} if last else {"kiwi": rig, "other": after}
     text = yaml.safe_dump({"dodo": 1, "rigs": rigs}, default_flow_style=flow, sort_keys=False)

@@ -35,6 +35,7 @@ def test_the_page_is_up_to_date(update_goldens: bool) -> None:
     assert PAGE.read_text() == catalogue.markdown(), "scripts/make-rules brings it up to date"
 
 
+@pytest.mark.thorough
 def test_the_catalogue_has_what_code_can_give() -> None:
     assert sorted(set(given_rules())) == RULES
 

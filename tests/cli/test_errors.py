@@ -106,6 +106,7 @@ def test_files_that_the_user_names_are_the_users(kind: type[OSError]) -> None:
         raise OSError(28, "full", "a.rec")
 
 
+@pytest.mark.thorough
 def test_commands_that_end_in_errors_name_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for words, code, said in (

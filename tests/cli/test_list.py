@@ -18,6 +18,7 @@ def dodo(*words: str) -> tuple[int, str, str]:
     return code, stdout.getvalue(), stderr.getvalue()
 
 
+@pytest.mark.thorough
 def test_a_broken_test_is_one_line_beside_the_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert dodo("new", "--deployment")[0] == dodo("new", "mine")[0] == dodo("new", "other")[0] == 0
@@ -29,6 +30,7 @@ def test_a_broken_test_is_one_line_beside_the_list(tmp_path: Path, monkeypatch: 
     assert err == f"{level}problems in tests/mine/mine.dodo.yml; dodo compile --check shows them\n"
 
 
+@pytest.mark.thorough
 def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     dodo("new", "--deployment")
@@ -44,6 +46,7 @@ def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch
     )
 
 
+@pytest.mark.thorough
 def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
     code, out, _ = dodo("list", "--services", "collision")
     assert code == 0
@@ -52,6 +55,7 @@ def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
     assert "  message: message, required\n" in dodo("list", "--services", "continuous-signal")[1]
 
 
+@pytest.mark.thorough
 def test_a_service_s_command_works_outside_the_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert dodo("list", "--services", "integrator")[1].splitlines()[-1].startswith("standalone: python -m services.")
     monkeypatch.chdir(tmp_path)
@@ -65,6 +69,7 @@ def test_a_service_s_command_works_outside_the_checkout(tmp_path: Path, monkeypa
     assert "python -m services.integrator" in done.stdout
 
 
+@pytest.mark.thorough
 def test_an_own_service_s_command_works_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "a b/my_services/judge"
     folder.mkdir(parents=True)
@@ -81,6 +86,7 @@ def test_an_own_service_s_command_works_anywhere(tmp_path: Path, monkeypatch: py
     assert done.stdout == "--cid=128\n"
 
 
+@pytest.mark.thorough
 def test_only_the_tests_that_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:"]\n')

@@ -35,6 +35,7 @@ def test_help_loads_no_command() -> None:
     }
 
 
+@pytest.mark.thorough
 def test_a_list_loads_nothing_of_plans() -> None:
     parts = ("dodo_dsl.plan", "dodo_dsl.emit", "dodo_dsl.run", "dodo_dsl.report", "jinja2", "numpy")
     assert [name for name in loaded("list", "--services") if name.startswith(parts)] == []

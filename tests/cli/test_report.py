@@ -64,6 +64,7 @@ def test_what_cannot_be_joined_is_a_sentence(here: Path) -> None:
 
 
 @pytest.mark.parametrize(("outcome", "code"), [("passed", 0), ("failed", 1), ("error", 3)])
+@pytest.mark.thorough
 def test_what_changed_decides_as_the_run_did(here: Path, outcome: str, code: int) -> None:
     write(here / "main", [named("a"), named("b")])
     write(here / "new", [named("a"), named("b", outcome=outcome, reason="hit wall")])

@@ -40,6 +40,7 @@ def test_a_shipped_test_that_the_deployment_leaves_out(repository: Path, word: s
     assert str(problem.value) == f"there is no test '{word}'; {said}: add \"dodo:\" to 'registry' in dodo.yml"
 
 
+@pytest.mark.thorough
 def test_problems_of_the_deployment_come_before_names_that_it_may_have(repository: Path) -> None:
     deployment(repository, "tests, dodo:")
     with pytest.raises(
@@ -48,12 +49,14 @@ def test_problems_of_the_deployment_come_before_names_that_it_may_have(repositor
         select(["my-test"], (), ())
 
 
+@pytest.mark.thorough
 def test_who_has_the_shipped_tests_is_not_told_to_add_them(repository: Path) -> None:
     deployment(repository, 'tests, "dodo:"')
     with pytest.raises(NoSuchTest, match=r"^there is no test 'sil-percept'; did you mean 'sil-perception'"):
         select(["sil-percept"], (), ())
 
 
+@pytest.mark.thorough
 def test_warnings_about_shipped_tests_are_not_for_who_did_not_write_them(repository: Path) -> None:
     deployment(repository, '"dodo:"')
     assert {d.rule for d in load([]).diagnostics if d.severity == "warning"} == {"clock-answers"}
@@ -90,6 +93,7 @@ def test_parameters_select_the_instances_that_have_them(repository: Path, word: 
         ("sil-closed-left-curve[{}=1]", "'{}' of 'sil-closed-left-curve' is a range of 'vary' and no parameter"),
     ],
 )
+@pytest.mark.thorough
 def test_wrong_parameters_are_told_with_a_suggestion(repository: Path, word: str, said: str) -> None:
     deployment(repository, '"dodo:"')
     (curve,) = select(["sil-closed-left-curve"], (), ()).specs

@@ -102,6 +102,7 @@ def test_each_fault_stops_the_test_that_has_it(word: str, file: str) -> None:
 
 
 @pytest.mark.usefixtures("repository")
+@pytest.mark.thorough
 def test_a_fault_of_one_instance_does_not_stop_another() -> None:
     assert not has_errors(select(["fast[freq=10 Hz]"], (), ()).diagnostics)
 
@@ -113,6 +114,7 @@ def test_all_tests_have_all_problems() -> None:
 
 
 @pytest.mark.usefixtures("repository")
+@pytest.mark.thorough
 def test_a_test_whose_level_cannot_be_read_is_not_left_out_by_level() -> None:
     assert "misspelt.dodo.yml error" in _said(select([], ["sil"], ()))
 

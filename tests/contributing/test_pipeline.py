@@ -18,6 +18,7 @@ PIPELINE = yaml.safe_load(FILE.read_text())
 JOBS = {name: f"make {name}" for name in ("check", "test", "proof")}
 
 
+@pytest.mark.thorough
 def test_gitlab_accepts_it() -> None:
     program = Path(sys.executable).parent / "check-jsonschema"
     options = ("--builtin-schema", "vendor.gitlab-ci", "--data-transform", "gitlab-ci")

@@ -102,6 +102,7 @@ def commands() -> Iterator[list[str]]:
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("recipe")
 def test_its_commands_show_the_service_and_pass_the_test(checkout: Path) -> None:
     printed = {words[0]: run(checkout, "dodo_dsl", *words) for words in commands()}
     assert list(printed) == ["list", "compile", "run"]
@@ -112,6 +113,7 @@ def test_its_commands_show_the_service_and_pass_the_test(checkout: Path) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("recipe")
 def test_what_checks_every_service_has_nothing_to_say(checkout: Path) -> None:
     run(checkout, "ruff", "format", "--check", "services/odometer", "tests/services/odometer")
     run(checkout, "ruff", "check", "services/odometer", "tests/services/odometer")

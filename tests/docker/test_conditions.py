@@ -113,11 +113,21 @@ BACKENDS = {"docker": Containers(SUBNETS), "mixed": Mixed(Containers(SUBNETS), (
 NOT_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container")
 
 
-@pytest.mark.parametrize("backend", ["docker", pytest.param("mixed", marks=NOT_ROOT)])
-def test_conditions(backend: str, crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
+FEW = {"docker": ("come-true", "unhealthy", "own-health"), "mixed": ("come-true", "init-fails")}
+
+
+@pytest.mark.parametrize(
+    ("backend", "names"),
+    [
+        pytest.param("docker", FEW["docker"], id="docker"),
+        pytest.param("docker", tuple(TABLE), id="docker, all", marks=pytest.mark.proof),
+        pytest.param("mixed", FEW["mixed"], id="mixed", marks=NOT_ROOT),
+    ],
+)
+def test_conditions(backend: str, names: tuple[str, ...], crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that cannot come true ends the test, and names who waits for what."""
     monkeypatch.setattr(conditions, "LONGEST_S", 9.0)
-    chosen = TABLE if backend == "docker" else {name: TABLE[name] for name in ("come-true", "init-fails")}
+    chosen = {name: TABLE[name] for name in names}
     scripts = Path("/scripts") if backend == "docker" else crate.bench.folder
     jobs = [waiting(crate, slug, scripts, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]
     backends: Backends = BACKENDS[backend]

@@ -22,6 +22,7 @@ import yaml
 from dodo_dsl import __version__
 from dodo_dsl.opendlv.bus.address import group
 from dodo_dsl.outcome import differs_each_run
+from tests.docker.compose import MARK
 from tests.realtime import wait_for_nobody
 from tests.run.desk import wait_for
 
@@ -47,14 +48,15 @@ def results(report: Path) -> dict[str, dict[str, Any]]:
 
 
 def of_dodo() -> set[str]:
-    """The containers, networks and volumes of tests that the engine holds."""
+    """The containers, networks and volumes of tests that the engine holds, without those that have a mark."""
     lists = (
         ("ps", "-a", "--format", "container {{.Names}}"),
         ("network", "ls", "--format", "network {{.Name}}"),
         ("volume", "ls", "--format", "volume {{.Name}}"),
     )
     found = (subprocess.run(["docker", *w], capture_output=True, text=True, check=True).stdout for w in lists)
-    return {line for text in found for line in text.splitlines() if " dodo-" in line}
+    lines = {line for text in found for line in text.splitlines() if " dodo-" in line}
+    return {line for line in lines if f" dodo-{MARK}-" not in line}
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,7 @@ from tests.run.faults import FAULTS
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
 
-@pytest.mark.parametrize("tls", [False, True], ids=["plain", "tls"])
+@pytest.mark.parametrize("tls", [pytest.param(False, marks=pytest.mark.proof), True], ids=["plain", "tls"])
 def test_both_sides_of_a_verdict(tls: bool, crate: Crate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if (engine := engine_socket()) is None or not shutil.which("openssl"):
         pytest.skip("there is no engine with a socket here, or no openssl")

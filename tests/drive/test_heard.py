@@ -6,7 +6,7 @@ import pytest
 
 from tests.drive import heard
 
-SHORT = {"lockstep": ["dil-static-rig", "sil-open-straight"], "realtime": ["dil-static-rig"]}
+SHORT = ["dil-static-rig", "sil-open-straight"]
 """One that plays a recording, one with a beacon."""
 
 
@@ -28,12 +28,7 @@ def compare(folder: Path, clock: str, tests: list[str]) -> None:
 
 @pytest.mark.slow
 def test_a_listener_in_lockstep(tmp_path: Path) -> None:
-    compare(tmp_path, "lockstep", SHORT["lockstep"])
-
-
-@pytest.mark.realtime
-def test_a_listener_in_real_time(tmp_path: Path) -> None:
-    compare(tmp_path, "realtime", SHORT["realtime"])
+    compare(tmp_path, "lockstep", SHORT)
 
 
 @pytest.mark.proof

@@ -24,6 +24,7 @@ from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from services.gantry.rig_table import ACCELERATION, BOUNDS, MICROSTEP
 from tests.drive.applications import KIWI, ROOT, dodo, kiwi, results
 from tests.drive.rig import Hardware, Pose, on_its_way, running
+from tests.drive.variants import registry, variant
 from tests.realtime import hurry
 
 LABELLED = """
@@ -185,17 +186,22 @@ def test_an_emulated_rig_that_is_held_up_for_a_moment_drives_on(
     assert "the emulated rig stood still for 0." in (tmp_path / "report" / "index.html").read_text()
 
 
-def test_two_laps_on_the_rig_that_turns_without_end(tmp_path: Path) -> None:
-    """Two turns of the yaw, past its index, after which it still knows its heading; each lap is half of the way."""
-    test = run(tmp_path, "hil-closed-oval", code=0)
+@pytest.mark.parametrize("laps", [1, pytest.param(2, marks=pytest.mark.proof)])
+def test_laps_on_the_rig_that_turns_without_end(tmp_path: Path, laps: int) -> None:
+    """A turn of the yaw each, past its index, after which it still knows its heading."""
+    gates = ["far", "finish", "far"][: 2 * laps - 1]
+    keys = {"evaluation": {"track": {"with": {"gates": gates}}}}
+    spec = variant(registry(tmp_path), "hil-closed-oval", "hil-laps", **keys)
+    application = str(KIWI / "docker-compose.yml")
+    test = run(tmp_path / "report", str(spec), "--application", application, code=0)
     checks = {check["name"]: check["value"] for check in test["checks"]}
-    assert (test["outcome"], checks["gates"]) == ("passed", 3)
-    assert checks["distance"] == pytest.approx(2 * (2 * math.pi * 0.6 + 0.9), rel=0.1)
-    recording = tmp_path / "hil-closed-oval" / "test.rec"
+    assert (test["outcome"], checks["gates"]) == ("passed", len(gates))
+    assert checks["distance"] == pytest.approx(laps * (2 * math.pi * 0.6 + 0.9), rel=0.1)
+    recording = tmp_path / "report" / "hil-laps" / "test.rec"
     measured, true = poses(recording, MEASURED), poses(recording, TRUE)
     same_at_rest(measured[0], true[0])
     turned = np.unwrap(true[:, 3])
-    assert turned[-1] - turned[0] == pytest.approx(4 * math.pi, abs=0.7)
+    assert turned[-1] - turned[0] == pytest.approx(2 * math.pi * laps, abs=0.7)
     assert np.abs(np.diff(turned)).max() < 0.1, "it never turned back around"
     seen = np.interp(measured[:, 0], true[:, 0], turned)
     assert np.abs(np.unwrap(measured[:, 3]) - seen).max() < 0.05
@@ -242,6 +248,7 @@ def test_a_test_as_dodo_new_writes_it_passes_on_the_rig(tmp_path: Path, monkeypa
     assert (test["slug"], test["outcome"]) == ("mine", "passed")
 
 
+@pytest.mark.proof
 def test_the_static_rig_in_the_dusk_before_a_background(tmp_path: Path) -> None:
     test = run(tmp_path, "hil-camera-scenes[light=0.5,clutter=60]", code=0)
     counts = {check["name"]: check["value"] for check in test["checks"]}

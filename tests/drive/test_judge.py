@@ -19,7 +19,7 @@ from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS
 from tests.drive.applications import ROOT
 from tests.drive.recordings import MESSAGES, Runs, judged, run
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("judged")]
 
 REGISTRY = ROOT / "tests_registry"
 STRAIGHT, CURVE, SIGNAL, DRIVER = "sil-closed-straight", "sil-closed-left-curve", "sil-open-straight", "dil-kiwi-track"

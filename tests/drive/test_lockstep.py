@@ -161,6 +161,7 @@ def test_the_judge_counts_test_time(tmp_path: Path) -> None:
     assert test["sim_s"] <= 1.0
 
 
+@pytest.mark.proof
 def test_repeated_under_load_it_is_the_same() -> None:
     """Verdict, way and pictures of a run alone and of one beside processes that take all of the processor."""
     command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), CURVE, "2", "10"]

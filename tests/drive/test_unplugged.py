@@ -107,8 +107,8 @@ def killed(name: str, module: str, reason: str) -> Way:
     return Way(name, partial(kill, module=module), reason, module=module)
 
 
-def stopped(name: str, module: str, reason: str) -> Way:
-    return Way(name, partial(stop, module=module), reason, module=module, short=True)
+def stopped(name: str, module: str, reason: str, short: bool = False) -> Way:
+    return Way(name, partial(stop, module=module), reason, module=module, short=short)
 
 
 WAYS = (
@@ -117,7 +117,7 @@ WAYS = (
     Way("kill_rig", kill_rig, "is lost: "),
     Way("reset", reset, "RESTARTED"),
     killed("kill_gantry", GANTRY, "service 'pose' of layer action was killed by SIGKILL"),
-    stopped("stop_gantry", GANTRY, "no Frame of the vehicle has come for 2 s"),
+    stopped("stop_gantry", GANTRY, "no Frame of the vehicle has come for 2 s", short=True),
     killed("kill_model", MODEL, "service 'vehicle' of layer action was killed by SIGKILL"),
     stopped("stop_model", MODEL, "no KinematicState of the vehicle has come for 1 s"),
     killed("kill_sandbox", SANDBOX, "the test's sandbox ended unexpectedly"),

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,6 +18,7 @@ def job(name: str, level: str = "sil", gated: bool = False, rig: str = "", minut
 
 
 @given(tests=TESTS, most=st.integers(1, 12))
+@pytest.mark.thorough
 def test_every_test_is_in_one_job_of_its_kind_and_none_has_much_more_to_do(
     tests: list[tuple[tuple[str, bool, str], float]], most: int
 ) -> None:

@@ -20,6 +20,7 @@ def of(*jobs: PipelineJob) -> Pipeline:
 
 
 @given(took=st.lists(st.floats(0, 600), min_size=1, max_size=30), runners=st.integers(1, 8), overhead=st.floats(0, 30))
+@pytest.mark.thorough
 def test_it_lies_between_the_bounds_of_list_scheduling(took: list[float], runners: int, overhead: float) -> None:
     """Graham's bounds: no less than an even share or the longest job, at most the share of the others plus the last."""
     times = {f"t{number}": seconds for number, seconds in enumerate(took)}

@@ -15,7 +15,7 @@ import yaml
 
 from tests.emit.readers import ROOT, check_schema, compose, first_instances, run, tree
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("many")]
 NUMBER = int(os.environ.get("DODO_MANY", "20"))
 TEXTS = (
     "Drive.",
@@ -111,6 +111,7 @@ def test_compose_accepts_it(generated: Path) -> None:
         assert (result.returncode, result.stderr) == (0, ""), folder.name
 
 
+@pytest.mark.proof
 def test_an_installed_wheel_gives_the_same_bytes(generated: Path, tmp_path: Path) -> None:
     wheel, site = tmp_path / "wheel", tmp_path / "site"
     pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]

@@ -25,6 +25,7 @@ def count(output: Path) -> int:
     return len(list(output.glob("*/test.json")))
 
 
+@pytest.mark.thorough
 def test_check_says_when_output_is_stale(output: Path) -> None:
     assert run("compile", "--check")[0] == 0
     layer = output / STRAIGHT / "action.compose.yml"
@@ -38,6 +39,7 @@ def test_check_says_when_output_is_stale(output: Path) -> None:
     assert layer.read_text() == before
 
 
+@pytest.mark.thorough
 def test_a_long_difference_is_shown_with_diff_only(output: Path) -> None:
     before = tree(output)
     for name in (CURVE, STRAIGHT):
@@ -107,6 +109,7 @@ def links(folder: Path) -> list[Path]:
     return [path for path in folder.rglob("*") if path.is_symlink()]
 
 
+@pytest.mark.thorough
 def test_files_that_tests_share_stand_once(pair: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each path of a test opens the file as before, and a compilation with fewer tests brings the copies back."""
     assert run("compile")[0] == 0
@@ -129,6 +132,7 @@ def test_files_that_tests_share_stand_once(pair: Path, monkeypatch: pytest.Monke
     assert run("compile", "sil-b")[0] == 0 and tree(pair) == alone
 
 
+@pytest.mark.thorough
 def test_files_of_the_repository_are_not_copied(pair: Path, tmp_path: Path) -> None:
     assert run("compile", "--files", "repository", "sil-b")[0] == 0
     assert [path for path in pair.rglob("*.json") if not path.is_symlink()] == [pair / "sil-b/test.json"]
@@ -146,6 +150,7 @@ def test_files_of_the_repository_are_not_copied(pair: Path, tmp_path: Path) -> N
     assert code == 2 and "needs an output folder in the repository" in err
 
 
+@pytest.mark.thorough
 def test_nothing_is_written_through_links_that_look_like_shared_files(pair: Path, tmp_path: Path) -> None:
     """A repository may hold its output, with links that lead elsewhere."""
     (tmp_path / "theirs").mkdir()

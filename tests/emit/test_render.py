@@ -19,6 +19,7 @@ SEARCH = "search.gitlab-ci.yml"
 """A child pipeline that also searches its test."""
 
 
+@pytest.mark.thorough
 def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     checked = compiler.load([])

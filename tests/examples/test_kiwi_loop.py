@@ -130,6 +130,7 @@ def test_a_slow_application_still_reaches_it(name: str) -> None:
 
 
 @pytest.mark.parametrize(("right", "yaw"), [(0.02, 4.0), *STARTS])
+@pytest.mark.thorough
 def test_reversed_steering_hits_a_wall(right: float, yaw: float) -> None:
     verdict = Loop("straight", right, yaw, reverse=True).run()
     assert verdict.outcome == "failed"

@@ -88,6 +88,7 @@ def size() -> tuple[str, str]:
     return f"--width={WIDTH}", f"--height={HEIGHT}"
 
 
+@pytest.mark.thorough
 def test_a_frame_is_announced_with_its_sample_time_and_answered_once(rig: Rig) -> None:
     rig.start("steering")
     rig.start("perception", f"--name={rig.name}", *size(), "--await-steering")
@@ -114,6 +115,7 @@ def test_a_frame_is_announced_with_its_sample_time_and_answered_once(rig: Rig) -
         assert [name for name, _, _ in rig.hear(*WHOLE)] == [*WHOLE]
 
 
+@pytest.mark.thorough
 def test_reverse_steers_the_other_way(rig: Rig) -> None:
     rig.start("steering", "--reverse")
     rig.start("perception", f"--name={rig.name}", *size(), "--await-steering")
@@ -122,6 +124,7 @@ def test_reverse_steers_the_other_way(rig: Rig) -> None:
         assert rig.hear(*WHOLE)[-2][2].groundSteering < -0.01
 
 
+@pytest.mark.thorough
 def test_perception_waits_for_the_camera_and_for_the_next_one(rig: Rig) -> None:
     perception = rig.start("perception", f"--name={rig.name}", *size())
     assert perception.stdout is not None
@@ -133,6 +136,7 @@ def test_perception_waits_for_the_camera_and_for_the_next_one(rig: Rig) -> None:
     assert perception.poll() is None
 
 
+@pytest.mark.thorough
 def test_memory_of_another_size_is_refused(rig: Rig) -> None:
     with SharedMemory.create(rig.name, WIDTH * HEIGHT * 3):
         perception = rig.start("perception", f"--name={rig.name}", *size())
@@ -142,6 +146,7 @@ def test_memory_of_another_size_is_refused(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("program", ["perception", "steering"])
+@pytest.mark.thorough
 def test_sigterm_ends_a_program_cleanly(rig: Rig, program: str) -> None:
     programs = {
         "steering": rig.start("steering", "--verbose"),
@@ -157,6 +162,7 @@ def test_sigterm_ends_a_program_cleanly(rig: Rig, program: str) -> None:
     assert (process.returncode, output, errors) == (0, b"", b"")
 
 
+@pytest.mark.thorough
 def test_perception_begins_when_steering_listens(rig: Rig) -> None:
     perception = rig.start("perception", f"--name={rig.name}", *size(), "--await-steering")
     assert rig.hear("SystemStatusMessage")[-1][2].description == "perception asks"

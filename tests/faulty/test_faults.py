@@ -169,6 +169,7 @@ def test_a_fault_belongs_to_a_bus_where_the_flag_says_so() -> None:
     assert fault_of("steering-nan", "129") == "steering-nan"
 
 
+@pytest.mark.thorough
 def test_the_program_refuses_an_unknown_fault() -> None:
     words = [
         sys.executable,

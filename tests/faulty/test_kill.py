@@ -14,8 +14,8 @@ LONG = {"slow-computing", "slow-sleeping"}  # take half a minute each: scripts/k
 CAUGHT = sorted(
     (fault for fault in FAULTS.values() if not fault.due and fault.name not in LONG), key=lambda fault: fault.name
 )
-FEW = sorted({(fault.kind, fault.test): fault for fault in CAUGHT}.values(), key=lambda fault: fault.name)
-"""One of each kind that each test catches."""
+FEW = [FAULTS[name] for name in ("pedal-zero", "steering-whole-degrees", "wrong-message", "yellow-ignored")]
+"""One of each kind, by each kind of evaluator."""
 FIRST_CID = 128
 SILENT = "4"  # tests at a time, as some of them only wait until an application has been silent for too long
 

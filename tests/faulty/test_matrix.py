@@ -43,6 +43,7 @@ def test_a_test_with_another_spec_runs_again(tmp_path: Path, asked: list[str]) -
     assert kept.missing("good", [TESTS[0], changed]) == [changed]
 
 
+@pytest.mark.thorough
 def test_the_shipped_tests_are_those_without_hardware() -> None:
     tests = {test.slug: test for test in shipped_tests()}
     assert tests["sil-open-straight"].kind == "open-loop"

@@ -72,6 +72,7 @@ def test_a_rig_that_knows_its_heading_looks_for_its_index_on_the_nearer_side(
     [("GOTO", 0.483), ("GOTOLEFT", 0.483), ("GOTORIGHT", 5.8)],
     ids=["shortest", "left", "right"],
 )
+@pytest.mark.thorough
 def test_a_heading_is_reached_the_way_round_that_is_asked_for(circle: Bench, word: str, way: float) -> None:
     circle.go(0, 0, 2.9)
     circle.extremes()
@@ -157,6 +158,7 @@ def test_a_reset_does_not_take_up_a_heading_when_the_counter_may_have_wrapped(ci
     assert circle.is_true()
 
 
+@pytest.mark.thorough
 def test_homing_forgets_how_many_turns_there_were(circle: Bench) -> None:
     wind(circle, 0.9)
     turn(circle, 0.9, 8)
@@ -174,6 +176,7 @@ def test_stop_keeps_a_position_however_many_turns_it_has(circle: Bench) -> None:
 
 @pytest.mark.parametrize("rate", [0.8, -0.8])
 @pytest.mark.parametrize("steps", [4, -4])
+@pytest.mark.thorough
 def test_a_motor_that_lost_steps_is_noticed_at_the_index_within_a_turn(circle: Bench, rate: float, steps: int) -> None:
     """Four full steps are the least that a motor slips by."""
     turn(circle, rate, 0.2)
@@ -188,6 +191,7 @@ def test_a_motor_that_lost_steps_is_noticed_at_the_index_within_a_turn(circle: B
     assert circle.is_true()
 
 
+@pytest.mark.thorough
 def test_an_index_that_is_off_by_less_than_a_slip_is_taken(circle: Bench) -> None:
     turn(circle, 0.8, 0.2)
     circle.command("miscount alpha 1")
@@ -198,6 +202,7 @@ def test_an_index_that_is_off_by_less_than_a_slip_is_taken(circle: Bench) -> Non
 
 
 @pytest.mark.parametrize("rate", [0.8, -0.8])
+@pytest.mark.thorough
 def test_an_index_that_is_lost_is_noticed_within_a_turn_and_when_homing(circle: Bench, rate: float) -> None:
     circle.command("switch alpha open")
     turn_until(circle, rate, Status.STALL, 8)
@@ -235,6 +240,7 @@ def test_a_coupling_that_slips_at_rest_is_noticed_where_the_index_is(circle: Ben
     assert circle.status() == Status.STALL
 
 
+@pytest.mark.thorough
 def test_silence_brakes_a_turn_after_500_ms(circle: Bench) -> None:
     turn(circle, 0.9, 1.2)
     circle.run(0.4)

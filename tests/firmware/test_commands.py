@@ -18,6 +18,7 @@ def test_a_fresh_rig_asks_for_calibrate_and_moves_nothing(fresh: Bench) -> None:
     assert fresh.extremes()["way"] == [0, 0, 0]
 
 
+@pytest.mark.thorough
 def test_goto_reaches_its_place_within_the_limits(bench: Bench) -> None:
     assert bench.send_line("$GOTO:0.8,-0.6,2.5") == []
     assert bench.status() == Status.MOVING
@@ -38,6 +39,7 @@ def test_goto_while_moving_brakes_first(bench: Bench) -> None:
     assert max(bench.extremes()["ramp"][:2]) <= 0.5
 
 
+@pytest.mark.thorough
 def test_positions_are_those_of_table_4_2(bench: Bench) -> None:
     """Step 0 is 0.9 m, 0.7 m and 83 / 0.55 degrees from the middle."""
     bench.go(*(low for low, _ in BOUNDS.values()))
@@ -58,6 +60,7 @@ def test_run_moves_each_axis_at_its_speed(bench: Bench, axis: int, direction: st
     assert [index for index in range(3) if way[index] > 0] == [axis]
 
 
+@pytest.mark.thorough
 def test_y1_and_y2_stay_square(bench: Bench) -> None:
     bench.keep_running("0,0.4,0", 1.5)
     bench.keep_running("0,-0.4,0", 1.5)

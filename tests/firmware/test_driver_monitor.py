@@ -36,6 +36,7 @@ def test_a_driver_that_does_not_obey_loses_its_current(bench: Bench, motor: str,
 
 
 @pytest.mark.parametrize("motor", MOTORS)
+@pytest.mark.thorough
 def test_a_driver_that_goes_the_other_way_is_a_fault_while_speeds_change(bench: Bench, motor: str) -> None:
     bench.keep_running(SPEED, 1)
     bench.command(f"deaf {motor} on")
@@ -46,6 +47,7 @@ def test_a_driver_that_goes_the_other_way_is_a_fault_while_speeds_change(bench: 
 
 
 @pytest.mark.parametrize("motor", MOTORS)
+@pytest.mark.thorough
 def test_a_driver_that_does_not_begin_is_a_fault(bench: Bench, motor: str) -> None:
     bench.command(f"deaf {motor} on")
     keep_sending(bench, "0.1,0.1,0.1", 0.25)
@@ -55,6 +57,7 @@ def test_a_driver_that_does_not_begin_is_a_fault(bench: Bench, motor: str) -> No
 
 
 @pytest.mark.parametrize("velocity", ["0.1,0.1,0.1", "-0.1,-0.1,-0.1", "0,0,0"])
+@pytest.mark.thorough
 def test_a_lost_command_is_sent_again(bench: Bench, velocity: str) -> None:
     bench.keep_running(SPEED, 1)
     for motor in MOTORS:
@@ -71,6 +74,7 @@ def test_a_lost_command_is_sent_again(bench: Bench, velocity: str) -> None:
 
 
 @pytest.mark.parametrize("motor", ["x", "alpha"])
+@pytest.mark.thorough
 def test_a_counter_that_does_not_follow_is_a_fault(bench: Bench, motor: str) -> None:
     bench.keep_running(SPEED, 0.6)
     bench.command(f"freeze {motor} on")
@@ -84,6 +88,7 @@ def test_a_counter_that_does_not_follow_is_a_fault(bench: Bench, motor: str) -> 
 
 
 @pytest.mark.parametrize("velocity", ["0.003,0,0", "0.05,-0.3,0.01", "1,1,1", "0,0,0.9", "-0.001,-0.001,-0.002"])
+@pytest.mark.thorough
 def test_drivers_that_obey_cause_no_fault(bench: Bench, velocity: str) -> None:
     """Whatever the speed, at each change of it, and at the edges."""
     for _ in range(3):

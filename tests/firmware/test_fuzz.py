@@ -33,6 +33,7 @@ speeds = st.one_of(st.sampled_from([-1.0, 1.0]), st.floats(-1, 1))
 
 @settings(max_examples=300, deadline=None, suppress_health_check=ONE_BENCH)
 @given(data=lines)
+@pytest.mark.thorough
 def test_only_valid_commands_move_the_core(bench: Bench, data: bytes) -> None:
     moves = FUZZ["valid_motion"](data)
     answers = bench.send(data + b"\n")

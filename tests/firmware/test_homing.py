@@ -10,6 +10,7 @@ from tests.firmware.programs import Bench
 HOME = (-0.9, -0.7, -2.63386)
 
 
+@pytest.mark.thorough
 def test_home_is_where_the_switches_open(fresh: Bench) -> None:
     fresh.send_line("$CALIBRATE")
     assert fresh.status() == Status.HOMING
@@ -27,6 +28,7 @@ def test_home_is_where_the_switches_open(fresh: Bench) -> None:
     [(-0.9012, -0.7012, -152.0), (0.9553, 0.7053, 171.6), (0.9553, -0.7012, 0.0), (0.0, 0.7053, -152.0)],
     ids=["home", "far end", "mixed", "some"],
 )
+@pytest.mark.thorough
 def test_it_finds_home_from_a_closed_switch_at_either_end(bench_program: Path, place: tuple[float, ...]) -> None:
     with Bench(bench_program, (place[0], place[1], place[2])) as bench:
         bench.calibrate()
@@ -115,6 +117,7 @@ def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, moto
     assert bench.status() == Status.NOT_CALIBRATED
 
 
+@pytest.mark.thorough
 def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
     fresh.command("tear x")
     fresh.send_line("$CALIBRATE")
@@ -122,6 +125,7 @@ def test_a_belt_that_is_off_is_noticed_by_the_way(fresh: Bench) -> None:
     assert 1.85 < fresh.extremes()["way"][0] < 1.9
 
 
+@pytest.mark.thorough
 def test_an_axis_that_never_arrives_is_a_fault(fresh: Bench) -> None:
     """Neither its switch nor its counter shows how far it is."""
     fresh.command("tear x")
@@ -135,6 +139,7 @@ def test_an_axis_that_never_arrives_is_a_fault(fresh: Bench) -> None:
     assert fresh.status() == Status.NOT_CALIBRATED
 
 
+@pytest.mark.thorough
 def test_a_switch_that_closed_by_mistake_is_not_home(fresh: Bench) -> None:
     fresh.send_line("$CALIBRATE")
     fresh.watch(1)
@@ -159,6 +164,7 @@ def test_only_stop_ends_it_early(fresh: Bench) -> None:
     assert not fresh.pose()["moves"]
 
 
+@pytest.mark.thorough
 def test_calibrate_brakes_first(bench: Bench) -> None:
     bench.keep_running("0.5,0,0", 1.2)
     bench.calibrate()

@@ -98,6 +98,7 @@ def test_a_switch_stops_its_axis_at_once_and_the_others_softly(bench: Bench, mot
     assert not bench.pose()["moves"]
 
 
+@pytest.mark.thorough
 def test_after_a_switch_only_calibrate_moves_the_rig(bench: Bench) -> None:
     close_in_motion(bench, "x", "0.1,0,0")
     for line in ("$RUN:-0.1,0,0", "$GOTO:0,0,0"):
@@ -132,6 +133,7 @@ def run_until_limit(bench: Bench, line: str, patience: float = 8.0) -> None:
 
 @pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
 @pytest.mark.parametrize("axis", AXES)
+@pytest.mark.thorough
 def test_a_switch_hit_while_the_axis_turns_is_left_the_way_it_came(bench: Bench, axis: str, far: bool) -> None:
     """The counter is wrong; the rig is commanded back, and hits the switch while it brakes."""
     sign, index = (1 if far else -1), AXES.index(axis)
@@ -192,6 +194,7 @@ def test_a_switch_that_is_stuck_closed_lets_nothing_move(bench: Bench, motor: st
 
 @pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
 @pytest.mark.parametrize("axis", AXES)
+@pytest.mark.thorough
 def test_a_rig_whose_counter_is_wrong_is_caught_by_its_switch(bench: Bench, axis: str, far: bool) -> None:
     """The end is nearer than the counters show."""
     sign = 1 if far else -1

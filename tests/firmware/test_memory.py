@@ -102,6 +102,7 @@ def test_nothing_of_a_trouble_is_lost_by_new_limits(bench: Bench) -> None:
     assert bench.send_line(line(TIGHT)) == bench.send_line("$FORGET") == [f"$ERROR:{int(Error.TROUBLE)}"]
 
 
+@pytest.mark.thorough
 def test_the_range_holds(tight: Bench) -> None:
     ends = {"x": BOUNDS["x"][0] + TIGHT[0], "y": BOUNDS["y"][0] + TIGHT[1], "yaw": TIGHT[2]}
     for axis, end in ends.items():
@@ -118,6 +119,7 @@ def test_the_range_holds(tight: Bench) -> None:
     assert tight.status() in (Status.IDLE, Status.MOVING)
 
 
+@pytest.mark.thorough
 def test_the_speed_and_the_acceleration_hold_of_run_and_goto(tight: Bench) -> None:
     assert (
         tight.send_line("$RUN:0.400001,0,0") == tight.send_line("$RUN:0,0,0.500001") == [f"$ERROR:{int(Error.BOUNDS)}"]
@@ -133,6 +135,7 @@ def test_the_speed_and_the_acceleration_hold_of_run_and_goto(tight: Bench) -> No
     assert tight.happened("slip") == []
 
 
+@pytest.mark.thorough
 def test_a_limit_between_what_the_driver_knows_is_no_fault(fresh: Bench) -> None:
     keep(fresh, (*WIDEST[:4], 0.9, 0.5, 0.9))
     fresh.calibrate()
@@ -158,6 +161,7 @@ def test_the_widest_limits_can_be_kept_and_are_the_built_in_ones(fresh: Bench) -
 
 
 @pytest.mark.parametrize("before", [None, OTHER], ids=["none", "others"])
+@pytest.mark.thorough
 def test_a_write_that_is_cut_leaves_the_limits_from_before_or_the_new_ones(
     fresh: Bench, before: tuple[float, ...] | None
 ) -> None:
@@ -176,6 +180,7 @@ def test_a_write_that_is_cut_leaves_the_limits_from_before_or_the_new_ones(
 
 
 @pytest.mark.parametrize("before", [None, WIDEST], ids=["none", "wider"])
+@pytest.mark.thorough
 def test_writes_that_are_cut_one_after_the_other_leave_the_limits_from_before_or_the_new_ones(
     fresh: Bench, before: tuple[float, ...] | None
 ) -> None:
@@ -203,6 +208,7 @@ def test_any_damage_of_one_copy_is_harmless(fresh: Bench) -> None:
 
 
 @pytest.mark.parametrize("at", [0, 1, 2, 12, 29, 30, 31])
+@pytest.mark.thorough
 def test_damage_of_both_copies_leaves_the_narrowest_limits_and_no_position(tight: Bench, at: int) -> None:
     for copy in range(COPIES):
         tight.command(f"memory flip {FIRST + copy * SIZE + at} 4")
@@ -243,6 +249,7 @@ def test_a_memory_that_does_not_take_its_limits_says_so(fresh: Bench) -> None:
     assert kept(fresh) == (pytest.approx(NARROWEST), Source.DAMAGED)
 
 
+@pytest.mark.thorough
 def test_a_rig_that_turns_without_end_keeps_limits_but_none_of_its_yaw(circle: Bench) -> None:
     limits = (1.2, 0.9, CIRCLE_YAW, 0.4, 0.5, 0.25, 0.5)
     assert kept(circle) == (pytest.approx((*WIDEST[:2], CIRCLE_YAW, *WIDEST[3:])), Source.BUILT)

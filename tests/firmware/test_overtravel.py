@@ -42,6 +42,7 @@ def recovers(bench: Bench) -> bool:
 
 @pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
 @pytest.mark.parametrize(("axis", "speed"), [("x", SAFE), ("y", SAFE), ("yaw", SPEED["yaw"])])
+@pytest.mark.thorough
 def test_up_to_this_speed_the_frame_is_not_hit(bench: Bench, axis: str, speed: float, far: bool) -> None:
     assert drive_into_switch(bench, axis, far, speed) == pytest.approx(speed, rel=0.15)
     bench.run(0.5)
@@ -51,6 +52,7 @@ def test_up_to_this_speed_the_frame_is_not_hit(bench: Bench, axis: str, speed: f
 
 @pytest.mark.parametrize("far", [True, False], ids=["far", "home"])
 @pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.thorough
 def test_at_full_speed_the_frame_is_hit_and_reported(bench: Bench, axis: str, far: bool) -> None:
     """A hard stop from 1 m/s makes the motor slip; friction alone needs 83 mm and not 15."""
     assert drive_into_switch(bench, axis, far, SPEED[axis]) > 0.99

@@ -28,6 +28,7 @@ def test_scripts_use_the_python_of_the_checkout(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.thorough
 def test_a_stale_file_is_named(tmp_path: Path) -> None:
     for name in ("firmware/protocol.yml", "scripts/make-protocol"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -113,6 +113,7 @@ def test_stop_does_not_hide_a_dip_of_the_supply(bench: Bench) -> None:
 
 @pytest.mark.parametrize("wire", ["spi", "clock", "data"])
 @pytest.mark.parametrize("line", ["$RUN:0.3,0.2,0.4", "$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
+@pytest.mark.thorough
 def test_drivers_that_cannot_be_reached_lose_their_current(bench: Bench, wire: str, line: str) -> None:
     for _ in range(15):
         bench.send_line(line)

@@ -60,6 +60,7 @@ def test_goto_acknowledges_it(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("line", ["$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
+@pytest.mark.thorough
 def test_goto_and_calibrate_brake_when_nobody_is_there(bench: Bench, line: str) -> None:
     bench.send_line(line)
     bench.watch(0.6)
@@ -75,6 +76,7 @@ def test_goto_and_calibrate_brake_when_nobody_is_there(bench: Bench, line: str) 
     assert bench.status() == (Status.IDLE if "GOTO" in line else Status.NOT_CALIBRATED)
 
 
+@pytest.mark.thorough
 def test_goto_brakes_when_nobody_is_there_before_it_sets_off(bench: Bench) -> None:
     bench.keep_running("0.8,0,0", 1.6)
     bench.send_line("$GOTO:-0.5,0,0")
@@ -105,6 +107,7 @@ def test_a_line_with_a_mistake_is_nobody(bench: Bench, motion: str, line: str) -
     assert bench.status() == Status.WATCHDOG
 
 
+@pytest.mark.thorough
 def test_calibrate_without_anybody_is_not_calibrated(bench: Bench) -> None:
     bench.send_line("$CALIBRATE")
     bench.run(2)

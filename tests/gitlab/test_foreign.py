@@ -108,7 +108,10 @@ def jobs(folder: Path, **variables: str) -> dict[str, dict[str, Any]]:
     return {job["name"]: job for job in listed if job["when"] != "never"}
 
 
-@pytest.mark.parametrize("case", CASES)
+FEW = ("both", "components with inputs", "a monorepo")
+
+
+@pytest.mark.parametrize("case", [c if c in FEW else pytest.param(c, marks=pytest.mark.proof) for c in CASES])
 def test_the_jobs_are_there_and_foreign_ones_stay(case: str, repository: Path) -> None:
     includes, text, foreign, expected, stage = CASES[case]
     (repository / ".gitlab-ci.yml").write_text(f"include:\n{includes}{text}")

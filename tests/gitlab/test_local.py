@@ -131,13 +131,18 @@ def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> 
     assert all((joined / name / "drive.html").is_file() for name in TESTS)
 
 
-def test_a_failing_application_fails_its_job(repository: Path) -> None:
-    """It steers the other way, hits a wall, and the exit code of a job of two tests says so; the report is kept."""
+def steer_the_other_way(repository: Path) -> None:
+    """The application hits a wall."""
     steering = repository / "kiwi/steering.py"
     right, wrong = "groundSteering=", "groundSteering=-"
     assert right in steering.read_text()
     steering.write_text(steering.read_text().replace(right, wrong))
     commit(repository)
+
+
+def test_a_failing_application_fails_its_job(repository: Path) -> None:
+    """The exit code of a job of two tests says so; the report is kept."""
+    steer_the_other_way(repository)
     run(repository, sys.executable, "-m", "dodo_dsl", "compile", "--jobs", "1")
     child = repository / "generated/child.gitlab-ci.yml"
     result = pipeline(repository, "--file", str(child.relative_to(repository)), "--variable", "PARENT_PIPELINE_ID=1")
@@ -148,6 +153,11 @@ def test_a_failing_application_fails_its_job(repository: Path) -> None:
     assert [case.get("name") for case in cases] == list(TESTS)
     assert all("wall" in str(failure.get("message")) for case in cases for failure in case.iter("failure"))
     assert cases[1].find("failure") is not None
+
+
+@pytest.mark.proof
+def test_and_so_does_one_job_for_all(repository: Path) -> None:
+    steer_the_other_way(repository)
     (repository / ".gitlab-ci.yml").write_text(ONE_JOB)
     result = pipeline(repository)
     assert result.returncode == 1, result.stdout[-4000:] + result.stderr[-2000:]

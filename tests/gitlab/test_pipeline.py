@@ -52,6 +52,7 @@ def searching(plan: Plan, *searches: SearchJobs) -> str:
     return render_pipeline(Suite((plan,)), "generated", searches).text
 
 
+@pytest.mark.thorough
 def test_workers_search_together_and_another_job_reports(
     plan: Plan, tmp_path: Path, accepted: Callable[..., None]
 ) -> None:
@@ -102,6 +103,7 @@ def test_more_tags_of_a_rig_tell_its_runner_from_others(on_rig: OnRig) -> None:
     assert made["real"]["tags"] == ["hil-dynamic", "rig-2"]
 
 
+@pytest.mark.thorough
 def test_any_rig_of_a_pool_is_one_job_that_locks_none_of_them(
     on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]
 ) -> None:
@@ -142,6 +144,7 @@ def test_tests_of_images_log_in_to_the_registry(plan: Plan) -> None:
     assert "--password-stdin" in made["default"]["before_script"][0]
 
 
+@pytest.mark.thorough
 def test_all_jobs_but_those_on_rigs_run_as_the_parent_wants(
     plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]
 ) -> None:
@@ -163,6 +166,7 @@ def test_all_jobs_but_those_on_rigs_run_as_the_parent_wants(
     assert "image" not in tagged["gate"] and "variables" not in tagged
 
 
+@pytest.mark.thorough
 def test_services_and_first_commands_are_for_all_jobs_but_those_on_rigs(
     plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]
 ) -> None:
@@ -186,6 +190,7 @@ def test_services_and_first_commands_are_for_all_jobs_but_those_on_rigs(
     assert yaml.safe_load(plain)["search a"]["before_script"] == [], "no login: it pulls nothing"
 
 
+@pytest.mark.thorough
 def test_without_a_test_there_is_a_job_that_says_so(tmp_path: Path, accepted: Callable[..., None]) -> None:
     """GitLab refuses a pipeline without jobs, and the parent decides whether it comes to this one."""
     text = render_pipeline(Suite(()), "generated").text
@@ -229,6 +234,7 @@ def test_a_login_leaves_the_user_s_own_plugins_in_place(plan: Plan, tmp_path: Pa
     assert [path.name for path in plugin.parent.iterdir()] == ["docker-compose"]
 
 
+@pytest.mark.thorough
 def test_packed_tests_share_jobs(plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]) -> None:
     plans = [replace(plan, slug=f"sil-{n}") for n in range(5)] + [replace(plan, slug="dil-0", level="dil")]
     rigs = [on_rig("hil-a", "kiwi"), on_rig("hil-b", "kiwi"), on_rig("hil-c", "other"), on_rig("hil-d", "emulated")]
@@ -261,6 +267,7 @@ def test_a_folder_is_one_word_to_the_shell(plan: Plan) -> None:
     assert line.startswith(f"dodo run --compiled 'out $(touch x)/{plan.slug}' ")
 
 
+@pytest.mark.thorough
 def test_gitlab_accepts_it(plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]) -> None:
     suite = Suite((plan, on_rig("hil-real", "kiwi"), on_rig("hil-model", "emulated")))
     file = render_pipeline(suite, "generated")
@@ -331,6 +338,7 @@ def test_an_artifact_over_the_limit_is_a_warning_that_names_the_largest_files(pl
     assert found(100, *(replace(copy, shared="1") for copy in (large, again))) == []
 
 
+@pytest.mark.thorough
 def test_jobs_with_files_of_the_repository_check_it_out(
     plan: Plan, tmp_path: Path, accepted: Callable[..., None]
 ) -> None:

@@ -145,6 +145,7 @@ def problems(name: str, folder: Path, inputs: dict[str, Any]) -> list[Any]:
     return pipeline_file.problems(folder)
 
 
+@pytest.mark.thorough
 def test_gitlab_accepts_them(tmp_path: Path, accepted: Callable[..., None]) -> None:
     for name in FOREIGN:
         for template in TEMPLATES:

@@ -61,6 +61,7 @@ def test_each_template_is_a_component() -> None:
     assert not list(folder.glob("*.yml"))
 
 
+@pytest.mark.thorough
 def test_gitlab_accepts_the_templates(tmp_path: Path, accepted: Callable[..., None]) -> None:
     """As they are, and as their jobs are with inputs, extended."""
     for template in TEMPLATES:
@@ -116,6 +117,7 @@ def test_one_job_is_included_twice_by_another_name() -> None:
 
 
 @each_parent
+@pytest.mark.thorough
 def test_what_the_child_s_jobs_have_reaches_the_compiler(template: Path, tmp_path: Path) -> None:
     """As GitLab hands it on, where a list in a text is written as Ruby does."""
     services = ["redis", {"name": "docker:dind", "alias": "docker", "command": ["--tls=false"]}]
@@ -213,6 +215,7 @@ def test_inputs_that_can_be_meant_are_taken() -> None:
     assert found["dodo-images"]["variables"]["DODO_PLATFORMS"] == "linux/amd64,linux/arm/v7"
 
 
+@pytest.mark.thorough
 def test_gitlab_accepts_what_dodo_new_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: Callable[..., None]
 ) -> None:
@@ -291,6 +294,7 @@ def test_no_template_names_a_host_or_shows_the_token(template: Path) -> None:
 
 
 @each_parent
+@pytest.mark.thorough
 def test_the_problems_are_in_the_log_and_in_a_file_that_can_be_browsed(template: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.dodo.yml").write_text("dodo: 1\nname: bad\n")
     job = included(template)["dodo-check"]
@@ -378,6 +382,7 @@ def run_images(tmp_path: Path, docker: str, compose: str = BUILT, **inputs: Any)
     return result
 
 
+@pytest.mark.thorough
 def test_the_user_s_own_plugins_are_found_beside_the_job_s_login(tmp_path: Path) -> None:
     """Docker looks for Compose and buildx below DOCKER_CONFIG, which the job sets."""
     plugin = tmp_path / ".docker/cli-plugins/docker-buildx"
@@ -388,6 +393,7 @@ def test_the_user_s_own_plugins_are_found_beside_the_job_s_login(tmp_path: Path)
     assert (tmp_path / "private/docker/cli-plugins/docker-buildx").samefile(plugin)
 
 
+@pytest.mark.thorough
 def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Callable[..., None]) -> None:
     result = run_images(tmp_path, DOCKER)
     assert result.returncode == 0, result.stderr
@@ -415,6 +421,7 @@ def test_images_are_pushed_and_handed_on_by_digest(tmp_path: Path, accepted: Cal
 
 
 @pytest.mark.parametrize("build", ["/", "{context: ., network: host}", "{context: ., dockerfile: ../../x}"])
+@pytest.mark.thorough
 def test_nothing_is_built_that_is_not_checked(tmp_path: Path, build: str) -> None:
     result = run_images(tmp_path, DOCKER, f"services: {{a: {{build: {build}, command: --cid=111}}}}\n")
     assert result.returncode == 1
@@ -429,11 +436,13 @@ def test_nothing_is_built_that_is_not_checked(tmp_path: Path, build: str) -> Non
         (("containerimage.digest", "image.name"), "The build of lane-finder has said no digest"),
     ],
 )
+@pytest.mark.thorough
 def test_a_build_without_images_fails(tmp_path: Path, change: tuple[str, str], said: str) -> None:
     result = run_images(tmp_path, DOCKER.replace(*change))
     assert (result.returncode, "".join(result.stdout.splitlines()[-1:])) == (1, said)
 
 
+@pytest.mark.thorough
 def test_images_are_built_for_the_platforms_that_are_asked_for(tmp_path: Path) -> None:
     assert run_images(tmp_path, DOCKER, platforms="linux/amd64,linux/arm64").returncode == 0
     calls = (tmp_path / "calls.txt").read_text()
@@ -445,11 +454,13 @@ def test_images_are_built_for_the_platforms_that_are_asked_for(tmp_path: Path) -
     assert gone == "buildx rm --force dodo-7"
 
 
+@pytest.mark.thorough
 def test_without_platforms_the_engine_builds_by_itself(tmp_path: Path) -> None:
     assert run_images(tmp_path, DOCKER).returncode == 0
     assert "dodo-7" not in (tmp_path / "calls.txt").read_text()
 
 
+@pytest.mark.thorough
 def test_an_application_without_a_build_has_no_images(tmp_path: Path, accepted: Callable[..., None]) -> None:
     """It runs as processes, or its images come from elsewhere; the deployment is triggered all the same."""
     result = run_images(tmp_path, DOCKER.replace(json.dumps(BAKE, indent=2), json.dumps(NO_BUILD, indent=2)))

@@ -389,6 +389,7 @@ def test_identities_follow_their_own_folder_of_the_kernel() -> None:
 
 @pytest.mark.parametrize("rig_name", ["", "emulated"])
 @pytest.mark.parametrize("port", ["/dev/ttyACM0", "socket://127.0.0.1:4242"])
+@pytest.mark.thorough
 def test_a_compiled_test_moves_no_hardware_without_a_rig(tmp_path: Path, rig_name: str, port: str) -> None:
     plan = Bench(tmp_path).plan()
     moves = PlannedService("action", "pose", "gantry", "x", ("python",), (Flag("serial", port),))

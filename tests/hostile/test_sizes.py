@@ -181,6 +181,7 @@ def message_data(payload: bytes) -> bytes:
     return bytes(MessageSet.standard().decode(IMAGE, payload).data)
 
 
+@pytest.mark.thorough
 def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> None:
     told: list[str] = []
     cameras = [image._replace(sender_stamp=number) for number in range(40) for image in video(1)]

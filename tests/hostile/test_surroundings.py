@@ -54,6 +54,7 @@ def test_a_user_without_a_home(words: tuple[str, ...]) -> None:
     assert "Traceback" not in result.stderr and "internal error" not in result.stderr
 
 
+@pytest.mark.thorough
 def test_paths_that_are_not_utf_8(tmp_path: Path, record: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """Every command takes paths that are not UTF-8."""
     folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe"))

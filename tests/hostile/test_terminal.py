@@ -66,6 +66,7 @@ PIECES = st.sampled_from(["#", "##", "[", "##[", "vso", "vso[", ":", "::", "::er
 
 
 @given(st.lists(PIECES | st.text(max_size=5), max_size=12))
+@pytest.mark.thorough
 def test_no_pieces_become_a_command(pieces: list[str]) -> None:
     """No pieces of text become a command together (property test)."""
     stream = StringIO()

@@ -125,6 +125,7 @@ def test_service_starts_from_an_image_that_holds_all_it_needs(
         assert await_health(container) == "healthy"
 
 
+@pytest.mark.proof
 def test_a_build_takes_another_prefix_and_tag(built: dict[str, str], base_image: str) -> None:
     reference = "dodo-test/base:images"
     try:
@@ -143,7 +144,7 @@ def test_shared_stages_do_not_pass_for_services(built: dict[str, str]) -> None:
     assert {config(built[name])["User"] for name in ("base", "geometry", "vision", "sandbox")} == {"10001:10001"}
 
 
-@pytest.mark.parametrize("name", ["sandbox", "virtual-camera"])
+@pytest.mark.parametrize("name", [pytest.param("sandbox", marks=pytest.mark.proof), "virtual-camera"])
 def test_nothing_is_writable_that_need_not_be(built: dict[str, str], name: str) -> None:
     """Looked at as root, who sees every folder; ``/dev`` and ``/proc`` are the engine's."""
     as_root = ("--user", "0")
@@ -224,6 +225,7 @@ def test_images_weigh_little_together(built: dict[str, str]) -> None:
     assert together <= SHARING * largest
 
 
+@pytest.mark.proof
 def test_a_second_build_makes_the_same_files(built: dict[str, str], base_image: str, tmp_path: Path) -> None:
     """The stage of the sources, built anew from files with other dates: its layers stay shared."""
     folder = tmp_path / "dodo-images-again"

@@ -143,6 +143,7 @@ def test_rigs_without_tests(tmp_path: Path, words: tuple[str, ...], said: str) -
     assert pull(tmp_path, "one:1", "", *words) == (Exit.USAGE, f"dodo images: {said}\n")
 
 
+@pytest.mark.thorough
 def test_tests_that_cannot_be_read_may_be_the_rigs(tmp_path: Path) -> None:
     pull(tmp_path, "one:1", "")
     for spec in (tmp_path / "tests").rglob("*.dodo.yml"):

@@ -74,6 +74,7 @@ def test_an_image_that_says_nothing_is_one_sentence(tmp_path: Path, monkeypatch:
         sbom.of_image("x", "x:1")
 
 
+@pytest.mark.thorough
 def test_the_environment_of_dodo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     stdout = StringIO()
@@ -86,6 +87,7 @@ def test_the_environment_of_dodo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert text == sbom.of_environment(), "the same every time"
 
 
+@pytest.mark.thorough
 def test_the_commands_write_a_bill_an_image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told_by(tmp_path, monkeypatch, json.dumps(TOLD))
     monkeypatch.chdir(tmp_path)

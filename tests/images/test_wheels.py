@@ -30,6 +30,7 @@ def test_every_requirement_has_a_wheel_for_64_bit_arm(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [folder.name]  # nothing half done is left
 
 
+@pytest.mark.thorough
 def test_what_pip_cannot_download_is_one_sentence_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

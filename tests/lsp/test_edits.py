@@ -39,6 +39,7 @@ def at(path: Path, text: str, word: str) -> dict[str, Any]:
         (VARIED, "light: {from", "sun", [("light: {from", "sun: {from"), ("vary.light", "vary.sun")]),
     ],
 )
+@pytest.mark.thorough
 def test_a_name_changes_in_the_whole_file(
     written: str, word: str, new: str, changes: list[tuple[str, str]], opened: Editor, repository: Repository
 ) -> None:
@@ -85,6 +86,7 @@ def actions(editor: Editor, path: Path, problem: dict[str, Any], *only: str) -> 
 @pytest.mark.parametrize(
     ("before", "after"), [("freq: 10 Hz", "freqq: 10 Hz"), ("uses: collision", "uses: colision"), ("level:", "levl:")]
 )
+@pytest.mark.thorough
 def test_a_quick_fix_mends_what_is_wrong(before: str, after: str, opened: Editor, repository: Repository) -> None:
     broken = SPEC.replace(before, after)
     (problem,) = opened.change(repository.spec, broken)
@@ -95,11 +97,13 @@ def test_a_quick_fix_mends_what_is_wrong(before: str, after: str, opened: Editor
     assert actions(opened, repository.spec, problem, "quickfix") == [action]
 
 
+@pytest.mark.thorough
 def test_no_quick_fix_without_one_way(opened: Editor, repository: Repository) -> None:
     (problem,) = opened.change(repository.spec, SPEC.replace("uses: collision", "uses: something"))
     assert actions(opened, repository.spec, problem) == []
 
 
+@pytest.mark.thorough
 def test_no_quick_fix_for_a_text_that_has_changed(opened: Editor, repository: Repository) -> None:
     (problem,) = opened.change(repository.spec, SPEC.replace("uses: collision", "uses: colision"))
     opened.type(repository.spec, SPEC)

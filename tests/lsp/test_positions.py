@@ -17,6 +17,7 @@ SIZES = {"utf-16": 2, "utf-8": 1, "utf-32": 4}
 
 
 @given(TEXTS, CODECS, st.data())
+@pytest.mark.thorough
 def test_positions_count_the_units_since_the_last_break(text: str, codec: PositionCodec, data: st.DataObject) -> None:
     """Against Python's encoders; a position inside a line break is that of the line's end."""
     offset = data.draw(st.integers(0, len(text)))

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.lsp.project import Projects
 from dodo_dsl.lsp.texts import Texts
@@ -26,6 +28,7 @@ def found(projects: Projects, shown: dict[Path, str]) -> list[tuple[Diagnostic, 
     return [project.checked.diagnostics for project in projects.check(shown)]
 
 
+@pytest.mark.thorough
 def test_what_is_not_checked_again_has_not_changed(repository: Repository) -> None:
     """Each state follows another one, from which everything that is still the same may be taken."""
     states = [(spec, LONGER, DEPLOYMENT) for spec in SPECS]

@@ -45,12 +45,14 @@ def test_hover_explains(word: str, parts: list[str], opened: Editor, repository:
     assert [part for part in parts if part not in text] == [], text
 
 
+@pytest.mark.thorough
 def test_hover_knows_what_an_extended_test_uses(opened: Editor, repository: Repository) -> None:
     opened.open(repository.longer)
     assert "Test time within which the goal" in hover(opened, repository.longer, LONGER, "max-time")
     opened.close(repository.longer)
 
 
+@pytest.mark.thorough
 def test_hover_explains_the_deployment(opened: Editor, repository: Repository) -> None:
     opened.open(repository.deployment)
     text = repository.deployment.read_text()
@@ -110,6 +112,7 @@ def test_what_is_required_comes_first(opened: Editor, repository: Repository) ->
     assert min(found.values(), key=lambda item: item["sortText"])["label"] == "map-path"
 
 
+@pytest.mark.thorough
 def test_completion_offers_placeholders(opened: Editor, repository: Repository) -> None:
     opened.change(repository.spec, MATRIX)
     found = offers(opened, repository, MATRIX.replace("freq: 10 Hz", "exposure: ${|"))
@@ -121,6 +124,7 @@ def target(editor: Editor, path: Path, text: str, word: str) -> tuple[Path, int]
     return (Path(found["uri"].removeprefix("file://")), found["range"]["start"]["line"]) if found else None
 
 
+@pytest.mark.thorough
 def test_definitions_lead_to_maps_and_manifests(opened: Editor, repository: Repository) -> None:
     camera = ROOT / "services" / "virtual_camera" / "service.yml"
     row = next(n for n, line in enumerate(camera.read_text().splitlines()) if line.startswith("  freq:"))
@@ -131,6 +135,7 @@ def test_definitions_lead_to_maps_and_manifests(opened: Editor, repository: Repo
     assert target(opened, repository.spec, SPEC, "closed-loop") is None
 
 
+@pytest.mark.thorough
 def test_definitions_lead_to_the_extended_test_and_the_application(opened: Editor, repository: Repository) -> None:
     opened.open(repository.longer)
     opened.open(repository.deployment)
@@ -159,6 +164,7 @@ def test_the_outline_has_layers_services_and_parameters(opened: Editor, reposito
     assert found["level"]["detail"] == "sil"
 
 
+@pytest.mark.thorough
 def test_requests_about_any_text_are_answered(opened: Editor, repository: Repository) -> None:
     for text in (
         "",

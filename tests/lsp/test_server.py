@@ -36,6 +36,7 @@ def places(problems: list[Message]) -> list[tuple[str, int, int]]:
 
 
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
+@pytest.mark.thorough
 def test_an_unsaved_text_has_the_problems_of_a_file(
     text: str, opened: Editor, repository: Repository, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -56,6 +57,7 @@ def test_an_unsaved_text_has_the_problems_of_a_file(
     assert opened.change(repository.spec, SPEC) == []
 
 
+@pytest.mark.thorough
 def test_a_problem_has_rule_range_severity_and_hint(opened: Editor, repository: Repository) -> None:
     (shown,) = opened.change(repository.spec, BROKEN["unit"])
     start = SPEC.splitlines()[8].index("10 Hz")
@@ -80,6 +82,7 @@ def test_columns_are_in_utf_16(opened: Editor, repository: Repository) -> None:
     assert place["end"] == {"line": 10, "character": line.index("frequ") + len("frequ") + 2}
 
 
+@pytest.mark.thorough
 def test_a_problem_of_another_file_is_shown_there(opened: Editor, repository: Repository) -> None:
     opened.type(repository.spec, SPEC.replace("  track: {uses", "  lane: {uses"))
     shown = opened.problems(repository.longer)
@@ -88,6 +91,7 @@ def test_a_problem_of_another_file_is_shown_there(opened: Editor, repository: Re
     assert opened.problems(repository.longer) == []
 
 
+@pytest.mark.thorough
 def test_the_deployment_is_checked_and_read_as_it_is_shown(opened: Editor, repository: Repository) -> None:
     text = repository.deployment.read_text()
     assert opened.open(repository.deployment) == []
@@ -98,6 +102,7 @@ def test_the_deployment_is_checked_and_read_as_it_is_shown(opened: Editor, repos
     opened.close(repository.deployment)
 
 
+@pytest.mark.thorough
 def test_what_is_saved_elsewhere_counts_at_once(opened: Editor, repository: Repository) -> None:
     """A map that lost its finish, and a test that the other one extends."""
     before = repository.map.read_text()
@@ -114,6 +119,7 @@ def test_what_is_saved_elsewhere_counts_at_once(opened: Editor, repository: Repo
 @pytest.mark.parametrize(
     "text", ["\0", "a: \ud83d", "\ufeffdodo: 1\n", "a: &a [*a]", "{" * 9000, "a: x\u2028b: {", "\t- a"]
 )
+@pytest.mark.thorough
 def test_no_text_ends_the_server(text: str, opened: Editor, repository: Repository) -> None:
     assert opened.change(repository.spec, text)
     assert opened.change(repository.spec, SPEC) == []
@@ -128,6 +134,7 @@ def test_a_test_outside_all_deployments_is_checked(running: Editor, tmp_path: Pa
     assert running.problems(path) == []
 
 
+@pytest.mark.thorough
 def test_a_client_may_count_in_code_points_and_leave(repository: Repository) -> None:
     with editor(repository.folder, ["utf-32"]) as one:
         text = SPEC.replace("dynamic-model}", "dynamic-model, with: {🚗🚗: 1, frequ: 1}}")
@@ -138,6 +145,7 @@ def test_a_client_may_count_in_code_points_and_leave(repository: Repository) -> 
         assert one.process.stderr.read() == b""
 
 
+@pytest.mark.thorough
 def test_the_server_ends_with_the_editor(repository: Repository) -> None:
     with editor(repository.folder) as one:
         assert one.process.stdin

@@ -15,6 +15,7 @@ from tests.plan.plans import BASE, plans
 
 @settings(max_examples=30, deadline=None)
 @given(plans)
+@pytest.mark.thorough
 def test_a_plan_survives_its_file(plan: Plan) -> None:
     assert from_json(to_json(plan)) == plan
 

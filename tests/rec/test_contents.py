@@ -137,6 +137,7 @@ def test_what_cannot_be_looked_into(tmp_path: Path, record: Callable[..., Path])
     ("name", "envelopes", "frames"),
     [("track-1-2025-05-08.rec", 591, 591), ("sim-2023-04-27.rec", 4972, 0), ("cones-2020-05-15.rec", 1595, 0)],
 )
+@pytest.mark.thorough
 def test_recordings_of_others(name: str, envelopes: int, frames: int, shared_data: Callable[[str], Path]) -> None:
     found = json.loads(dodo_rec("info", "--json", shared_data(name)).stdout)
     assert (found["envelopes"], found["frames"]) == (envelopes, {"packets": frames, "decoded": frames})

@@ -60,6 +60,7 @@ def test_recordings_become_one_set_with_ids_of_its_own(drives: list[Path], tmp_p
     assert [yellow[a["category_id"]] for a in found["annotations"]].count("yellow") == 1 + 3 + 5
 
 
+@pytest.mark.thorough
 def test_validation_has_recordings_of_its_own(drives: list[Path], tmp_path: Path) -> None:
     folder = tmp_path / "set"
     words = ("export", *drives, "--coco", "--validation", "40%", "-o")

@@ -33,6 +33,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @given(st.lists(marks, min_size=1, max_size=9))
+@pytest.mark.thorough
 def test_what_is_written_is_read_here_and_by_the_evaluator(path: Path, written: list[Mark]) -> None:
     check(written, WIDTH, HEIGHT, ())
     path.write_text(text(written, "truth.png", WIDTH, HEIGHT))
@@ -45,6 +46,7 @@ def test_what_is_written_is_read_here_and_by_the_evaluator(path: Path, written: 
 
 @settings(max_examples=50)
 @given(st.fixed_dictionaries({}, optional={"images": entries, "categories": entries, "annotations": entries}) | values)
+@pytest.mark.thorough
 def test_whatever_a_file_holds_is_refused_in_a_sentence(path: Path, document: object) -> None:
     path.write_text(json.dumps(document))
     with pytest.raises(TruthError, match=r"truth\.json: "):

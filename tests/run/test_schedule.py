@@ -4,6 +4,7 @@ import asyncio
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -42,6 +43,7 @@ def test_what_earlier_runs_used_counts_more_than_pictures() -> None:
 @given(
     jobs=st.lists(st.tuples(st.floats(0.1, 9), st.floats(0.1, 4)), min_size=1, max_size=12), capacity=st.floats(0.5, 4)
 )
+@pytest.mark.thorough
 def test_the_forecast_lies_between_what_is_possible(jobs: list[tuple[float, float]], capacity: float) -> None:
     """No shorter than the longest test or than all cores busy all the time, no longer than one by one."""
     named = {f"{n}": job for n, job in enumerate(jobs)}
@@ -59,6 +61,7 @@ def job(name: str) -> Job:
 
 
 @given(needs=st.lists(st.floats(0.1, 4), max_size=20), capacity=st.floats(0.5, 4))
+@pytest.mark.thorough
 def test_cores_are_never_given_twice(needs: list[float], capacity: float) -> None:
     taken = {"now": 0.0, "most": 0.0}
 

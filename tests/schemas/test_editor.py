@@ -33,6 +33,7 @@ def test_the_schema_is_what_the_manifests_say() -> None:
     assert editor_schema.generate(text, MANIFESTS) == text, "run `make schema`"
 
 
+@pytest.mark.thorough
 def test_a_schema_without_services_gets_them_back(tmp_path: Path) -> None:
     bare = json.loads(editor_schema.path().read_text())
     bare["$defs"] = {k: v for k, v in bare["$defs"].items() if not k.startswith(editor_schema.PREFIX)}

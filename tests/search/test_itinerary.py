@@ -25,6 +25,7 @@ def driven(runs: int, seed: int, of: Space = SPACE, proposes: bool = True) -> li
     return found
 
 
+@pytest.mark.thorough
 def test_the_sweep_comes_by_turns_with_what_is_proposed() -> None:
     order = [one for one, _ in driven(23, 1)]
     assert [one.swept for one in order[FIRST : FIRST + SWEPT + PROPOSED]] == [True] * SWEPT + [False] * PROPOSED
@@ -34,6 +35,7 @@ def test_the_sweep_comes_by_turns_with_what_is_proposed() -> None:
     assert all(one.swept for one, _ in driven(20, 1, proposes=False))
 
 
+@pytest.mark.thorough
 def test_a_crash_does_not_hide_by_how_little_good_values_differ() -> None:
     """As a tuning has it: the objective, negative, of a hill within a hundredth, beside values that crash."""
 
@@ -47,11 +49,13 @@ def test_a_crash_does_not_hide_by_how_little_good_values_differ() -> None:
     assert min(found for found in margins.values() if found is not None) < -0.0995
 
 
+@pytest.mark.thorough
 def test_more_drives_go_on_with_fewer() -> None:
     assert driven(18, 3) == driven(27, 3)[:18]
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.thorough
 def test_a_corner_of_a_hundredth_is_found(seed: int) -> None:
     """Uniform random drives need 69 in the median; these find it in half of that."""
     assert any(found < 0 for _, found in driven(34, seed))
@@ -67,6 +71,7 @@ def of_each(failing: bool) -> list[list[bool]]:
     return found
 
 
+@pytest.mark.thorough
 def test_the_sweep_gets_more_where_proposals_find_nothing() -> None:
     patient, impatient = [True] * SWEPT + [False] * PROPOSED, [True] * 7 + [False]
     _, *generations = of_each(failing=False)

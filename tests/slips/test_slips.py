@@ -94,6 +94,7 @@ CHARACTERS = "\t \n:-{}[]'\",#&*!|>%@`=;\u00a0" + string.ascii_lowercase[:3]
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, len(GOOD) - 1), st.integers(0, 3), st.text(CHARACTERS, max_size=3))
+@pytest.mark.thorough
 def test_no_change_of_a_few_characters_is_more_than_a_sentence(place: int, gone: int, new: str) -> None:
     """Whatever is typed, there is a file or a place within it, and a message of one line."""
     text = GOOD[:place] + new + GOOD[place + gone :]

@@ -1,5 +1,6 @@
 """YAML with positions: values of the core schema, places as an editor counts them, bounded on hostile input."""
 
+import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,6 +91,7 @@ _trees = st.recursive(_leaves, lambda t: st.lists(t, max_size=3) | st.dictionari
 
 
 @given(_trees)
+@pytest.mark.thorough
 def test_reads_what_pyyaml_writes_in_quotes(tree: object) -> None:
     """JSON is YAML: what stands in quotes and plain JSON numbers comes back as it was."""
     text = yaml.safe_dump(tree, default_style=None, default_flow_style=True, allow_unicode=False)

@@ -16,6 +16,7 @@ NAMING = ("wrong-type", "wrong-value", "missing-key", "name-differs", "name-rese
 
 
 @given(st.text(max_size=80) | st.sampled_from(sorted(KEYWORDS)) | st.from_regex(r"[a-z-]{0,80}", fullmatch=True))
+@pytest.mark.thorough
 def test_a_near_name_is_a_name(text: str) -> None:
     assert is_free(near(text))
     assert near(text) == text or not is_free(text)

@@ -64,6 +64,7 @@ def test_own_unit_is_exact(number: Decimal, unit: str) -> None:
 
 
 @given(st.text(max_size=30), st.sampled_from(UNITS))
+@pytest.mark.thorough
 def test_any_text_converts_or_is_refused(text: str, unit: str) -> None:
     try:
         assert convert(text, unit).is_finite()

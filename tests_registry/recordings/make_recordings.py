@@ -14,7 +14,7 @@ where its camera stands, in ordinary light, in bright light, and in the dusk.
 import importlib.util
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -172,10 +172,14 @@ def look(recorded: Recorded) -> None:
             now += 1_000_000 // CAMERA_HZ
 
 
-def make(folder: Path) -> None:
-    """Writes both recordings; one that is there is replaced."""
+RECORDINGS = {"kiwi-track": drive, "static-rig": look}
+
+
+def make(folder: Path, names: Iterable[str] = RECORDINGS) -> None:
+    """Writes recordings; one that is there is replaced."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, play in (("kiwi-track", drive), ("static-rig", look)):
+    for name in names:
+        play = RECORDINGS[name]
         path = folder / f"{name}.rec"
         part = path.with_suffix(".part")
         part.unlink(missing_ok=True)

@@ -107,10 +107,15 @@ class Segment:
         os.close(self.token)
 
     def remove(self) -> None:
-        """Wake all that wait and take everything away, the token file where it is still the same one."""
+        """Wake all that wait and take everything away, the token file where it is still the same one.
+
+        The mutex goes first: who wakes cannot take it, and so does not read the last content once more.
+        """
+        with suppress(sysv_ipc.Error):
+            self.mutex.remove()
         with suppress(OSError):
             self.wake()
-        for part in (self.condition, self.mutex, self.memory):
+        for part in (self.condition, self.memory):
             with suppress(sysv_ipc.Error):
                 part.remove()
         with suppress(FileNotFoundError):

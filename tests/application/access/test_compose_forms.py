@@ -202,7 +202,7 @@ def test_a_number_is_no_switch(number: int, meant: str, repository: Path) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hil", [False, True])
+@pytest.mark.parametrize("hil", [False, pytest.param(True, marks=pytest.mark.proof)])
 def test_what_compose_makes_of_the_copies(hil: bool, repository: Path) -> None:
     """All copies in one file: compose takes it, and shows nothing that is removed or refused."""
     known = [case for of_key in CASES.values() for case in of_key if not case.name.startswith(TOO_NEW)]

@@ -21,6 +21,7 @@ def test_everything_is_produced(example: str, tmp_path: Path) -> None:
     assert found(check, example, tmp_path) == []
 
 
+@pytest.mark.thorough
 def test_a_sender_stamp_that_no_service_sends(tmp_path: Path) -> None:
     (problem,) = check(context(CAMERA.format(more="frame-id: 7"), tmp_path))
     assert (problem.rule, problem.hint) == ("no-producer", "the test sends opendlv.sim.Frame/0")

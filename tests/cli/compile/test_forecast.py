@@ -39,6 +39,7 @@ def forecast(tmp_path: Path, capsys: pytest.CaptureFixture[str], *words: str | P
     return said.err if code else said.out.partition("\n")[2]
 
 
+@pytest.mark.thorough
 def test_times_of_reports_are_taken(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one = results(tmp_path / "one", **{STRAIGHT: 99.0})
     two = results(tmp_path / "two", **{STRAIGHT: 50.0, "sil-open-straight": 25.0})
@@ -50,18 +51,21 @@ def test_times_of_reports_are_taken(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert forecast(tmp_path, capsys, "2", *times).startswith("forecast with 2 runners: about 55 s (")
 
 
+@pytest.mark.thorough
 def test_a_test_without_a_time_may_take_its_timeout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line, note = forecast(tmp_path, capsys, "1").splitlines()
     assert line.startswith("forecast with 1 runner: at most ")
     assert note.startswith("note: sil-closed-straight and 1 more never ran here, and may take the whole timeout")
 
 
+@pytest.mark.thorough
 def test_what_has_no_times_is_refused_and_nothing_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "there is no " in forecast(tmp_path, capsys, "1", "--times", tmp_path / "gone.json", code=2)
     assert "--check does not write" in forecast(tmp_path, capsys, "1", "--check", code=2)
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.thorough
 def test_tests_share_jobs_by_their_times(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     times = results(tmp_path / "times", **{STRAIGHT: 99.0, "sil-open-straight": 60.0, "sil-open-left-curve": 30.0})
     words = [*times_of(times), "-o", str(tmp_path / "out"), "--jobs", "2"]

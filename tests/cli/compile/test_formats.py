@@ -107,6 +107,7 @@ def test_a_report_s_text_is_in_the_log(folder: Path, style: str) -> None:
 
 
 @pytest.mark.parametrize("style", REPORTS)
+@pytest.mark.thorough
 def test_what_is_stale_is_in_the_log(folder: Path, style: str) -> None:
     shutil.rmtree(folder / "tests/bad one")
     assert run("compile")[0] == 0

@@ -89,6 +89,7 @@ def test_the_pipeline_has_them() -> None:
     assert code == 1 and '-  tags: ["docker"]\n' in out
 
 
+@pytest.mark.thorough
 def test_images_that_were_built_reach_each_test(repository: Path) -> None:
     image = "DODO_IMAGE_STEERING=registry.example.org/steering@sha256:12"
     (repository / "images.env").write_text(f"{image}\n")

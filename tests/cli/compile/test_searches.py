@@ -20,6 +20,7 @@ def jobs() -> dict[str, dict[str, object]]:
     return dict(yaml.safe_load(Path("generated/child.gitlab-ci.yml").read_text()))
 
 
+@pytest.mark.thorough
 def test_jobs_of_the_search_are_added() -> None:
     search = (
         "--search",

@@ -42,6 +42,7 @@ def asked(line: str) -> list[str]:
         ("dodo explain wrong-un", ["wrong-unit"]),
     ],
 )
+@pytest.mark.thorough
 def test_a_line_goes_on(line: str, words: list[str]) -> None:
     assert set(words) <= set(asked(line))
 

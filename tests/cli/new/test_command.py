@@ -52,6 +52,7 @@ KINDS = [(level, kind) for level in LEVELS for kind in kinds(level)]
 
 
 @pytest.mark.parametrize(("level", "kind"), [(None, None), *KINDS])
+@pytest.mark.thorough
 def test_a_new_test_compiles_at_once(repository: Path, level: str | None, kind: str | None) -> None:
     options = [*(("--level", level) if level else ()), *(("--kind", kind) if kind else ())]
     code, out, err = dodo("new", "my-test", *options)
@@ -67,6 +68,7 @@ def test_a_new_test_compiles_at_once(repository: Path, level: str | None, kind: 
     assert dodo("compile")[0] == 0
 
 
+@pytest.mark.thorough
 def test_a_new_test_may_extend_another(repository: Path) -> None:
     assert dodo("new", "first")[0] == dodo("new", "second", "--extends", "first")[0] == 0
     assert dodo("compile", "--check") == (0, "2 tests checked: no problems\n", "")
@@ -74,6 +76,7 @@ def test_a_new_test_may_extend_another(repository: Path) -> None:
     assert spec["extends"] == "../first/first.dodo.yml"
 
 
+@pytest.mark.thorough
 def test_editors_find_the_schema(repository: Path) -> None:
     dodo("new", "first")
     line = (repository / "tests/first/first.dodo.yml").read_text().splitlines()[0]
@@ -98,6 +101,7 @@ def test_editors_find_the_schema(repository: Path) -> None:
     ],
     ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
 )
+@pytest.mark.thorough
 def test_what_cannot_be_begun_is_said_and_writes_nothing(repository: Path, words: list[str], said: str) -> None:
     assert dodo("new", "there")[0] == 0
     (repository / "tests/half").mkdir()
@@ -120,6 +124,7 @@ def test_what_no_template_is_for_begins_as_a_copy(repository: Path, level: str, 
     assert (spec.name, spec.level, spec.kind) == ("mine", level, kind)
 
 
+@pytest.mark.thorough
 def test_an_empty_folder_becomes_a_repository(empty: Path) -> None:
     code, out, err = dodo("new", "first")
     assert (code, err) == (0, "")
@@ -138,6 +143,7 @@ def test_an_empty_folder_becomes_a_repository(empty: Path) -> None:
     assert dodo("run", "first")[2] == f"dodo run: {NO_APPLICATION}\n"
 
 
+@pytest.mark.thorough
 def test_an_application_that_is_there_is_named(empty: Path) -> None:
     (empty / "compose.yaml").write_text("services: {app: {image: example, command: --cid=111}}\n")
     assert "name it in" not in dodo("new", "first")[1]
@@ -145,6 +151,7 @@ def test_an_application_that_is_there_is_named(empty: Path) -> None:
     assert dodo("compile") == (0, "1 test compiled into generated\n", "")
 
 
+@pytest.mark.thorough
 def test_a_folder_of_the_registry_is_made(empty: Path) -> None:
     (empty / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:", own/tests]\napplication: docker-compose.yml\n')
     code, out, _ = dodo("compile", "--check")
@@ -165,6 +172,7 @@ def test_a_folder_of_the_registry_is_made(empty: Path) -> None:
         ("registri: [tests]", "dodo.yml has problems:\n  dodo.yml:2:1: error[unknown-key]: unknown key 'registri'\n"),
     ],
 )
+@pytest.mark.thorough
 def test_a_deployment_that_takes_no_test_is_left_alone(empty: Path, registry: str, said: str) -> None:
     (empty / "dodo.yml").write_text(f"dodo: 1\n{registry}\n")
     before = contents(empty)
@@ -174,6 +182,7 @@ def test_a_deployment_that_takes_no_test_is_left_alone(empty: Path, registry: st
     assert contents(empty) == before
 
 
+@pytest.mark.thorough
 def test_without_a_name_it_lists_what_there_is(empty: Path) -> None:
     code, out, err = dodo("new")
     assert (code, err, list(empty.iterdir())) == (2, "", [])
@@ -201,6 +210,7 @@ def asked(patch: pytest.MonkeyPatch, answers: str, *words: str) -> tuple[int, st
         ("\n", ["--extends", "sil-open-straight"], ("my-sil-open-straight", "sil", "open-loop", True)),
     ],
 )
+@pytest.mark.thorough
 def test_in_a_terminal_it_asks(
     empty: Path, monkeypatch: pytest.MonkeyPatch, answers: str, words: list[str], expected: tuple[str, str, str, bool]
 ) -> None:
@@ -212,6 +222,7 @@ def test_in_a_terminal_it_asks(
     assert ("'Bad' is not a valid test name" in out) is ("Bad" in answers)
 
 
+@pytest.mark.thorough
 def test_who_answers_no_more_gets_nothing(empty: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code, _, err = asked(monkeypatch, "1\n")
     assert (code, list(empty.iterdir())) == (2, [])
@@ -236,6 +247,7 @@ SHIPPED = sorted(path.parent.name for path in package_data.registry().glob("*/*.
 
 
 @pytest.mark.parametrize("shipped", SHIPPED)
+@pytest.mark.thorough
 def test_a_shipped_test_is_copied_with_what_it_refers_to(repository: Path, shipped: str) -> None:
     (repository / "docker-compose.yml").write_text("services: {anything: {image: example, command: --cid=111}}\n")
     code, out, err = dodo("new", "my-own", "--extends", shipped)
@@ -251,6 +263,7 @@ def test_a_shipped_test_is_copied_with_what_it_refers_to(repository: Path, shipp
         assert (repository / "tests/my-own" / path).exists(), path
 
 
+@pytest.mark.thorough
 def test_a_copy_is_the_same_test(repository: Path) -> None:
     dodo("new", "mine", "--extends", "hil-dynamic")
     dodo("new", "further", "--extends", "mine")
@@ -264,6 +277,7 @@ def test_a_copy_is_the_same_test(repository: Path) -> None:
         ]
 
 
+@pytest.mark.thorough
 def test_a_copy_leaves_the_map_that_is_there(repository: Path) -> None:
     dodo("new", "first")
     place = repository / "tests/maps/straight/map.json"
@@ -274,6 +288,7 @@ def test_a_copy_leaves_the_map_that_is_there(repository: Path) -> None:
 
 
 @pytest.mark.parametrize("words", [[], ["--extends", "sil-closed-straight"]])
+@pytest.mark.thorough
 def test_nothing_is_written_into_an_installed_dodo(
     repository: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
 ) -> None:
@@ -286,6 +301,7 @@ def test_nothing_is_written_into_an_installed_dodo(
     assert contents(bundled) == before
 
 
+@pytest.mark.thorough
 def test_an_installed_dodo_is_no_folder_of_the_repository(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with_shipped(repository, '["dodo:"]')
     installed_in(repository, monkeypatch)
@@ -451,6 +467,7 @@ def test_who_has_included_the_templates_is_not_told_to(repository: Path) -> None
     assert "name your services" not in out
 
 
+@pytest.mark.thorough
 def test_the_image_of_a_pipeline_reaches_the_compose_file(repository: Path) -> None:
     dodo("new", "first")
     assert dodo("compile")[0] == 0

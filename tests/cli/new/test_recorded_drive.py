@@ -50,6 +50,7 @@ def write(path: Path, *streams: tuple[str, int, list[float]]) -> None:
 
 
 @pytest.mark.parametrize("file", ["drive.rec", "my drive: 2 #1.rec"])
+@pytest.mark.thorough
 def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> None:
     shutil.copy(SHIPPED, empty / file)
     code, out, err = dodo("new", "mine", "--level", "dil", "--rec", file)
@@ -65,6 +66,7 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
     assert (empty / "tests/recordings" / file).read_bytes() == SHIPPED.read_bytes()
 
 
+@pytest.mark.thorough
 def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: Path) -> None:
     """Such a test cannot be passed: ``new`` says so, and the check as long as it is so."""
     compose = empty / "compose.yml"
@@ -83,6 +85,7 @@ def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: 
     assert f"compose.yml:1:39: warning[application-memory]: {message}" in out
 
 
+@pytest.mark.thorough
 def test_a_recording_that_is_there_is_not_copied(empty: Path) -> None:
     shutil.copy(SHIPPED, empty / "drive.rec")
     assert dodo("new", "one", "--rec", "drive.rec")[0] == 0
@@ -96,6 +99,7 @@ def test_a_recording_that_is_there_is_not_copied(empty: Path) -> None:
     assert contents(empty) == before
 
 
+@pytest.mark.thorough
 def test_a_recording_without_pictures_is_played_in_real_time(empty: Path) -> None:
     """The preferred message with enough samples is judged, and others of it are named."""
     streams = [(STEERING, 3, [0.1] * 5), ("opendlv.proxy.PedalPositionRequest", 4, [0.1, 0.3] * 20)]
@@ -125,6 +129,7 @@ def test_a_recording_without_pictures_is_played_in_real_time(empty: Path) -> Non
         (["--rec", "few.rec", "--extends", "x"], "--level, --kind and --rec do not apply with --extends"),
     ],
 )
+@pytest.mark.thorough
 def test_what_makes_no_test_is_said(empty: Path, words: list[str], said: str) -> None:
     write(empty / "few.rec", (STEERING, 0, [0.1] * 9))
     before = contents(empty)
@@ -134,12 +139,14 @@ def test_what_makes_no_test_is_said(empty: Path, words: list[str], said: str) ->
 
 
 @pytest.mark.parametrize(("values", "limit"), [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30")])
+@pytest.mark.thorough
 def test_limits_have_two_digits_and_are_never_zero(empty: Path, values: list[float], limit: str) -> None:
     write(empty / "drive.rec", (STEERING, 0, values))
     assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
     assert f"max-mean: {limit} " in (empty / "tests/mine/mine.dodo.yml").read_text()
 
 
+@pytest.mark.thorough
 def test_sample_times_of_several_drives_become_those_of_receipt(empty: Path) -> None:
     """As in a public recording, in which recorded cones were processed again; the original stays as it is."""
     write(empty / "drive.rec", (STEERING, 0, [0.1, 0.3] * 20), ("opendlv.proxy.PedalPositionRequest", 0, [0.1] * 40))
@@ -156,6 +163,7 @@ def test_sample_times_of_several_drives_become_those_of_receipt(empty: Path) -> 
     assert dodo("compile", "--check")[0] == 0
 
 
+@pytest.mark.thorough
 def test_a_pause_is_not_shortened_and_another_stamp_than_the_applications_is_second(empty: Path) -> None:
     write(empty / "drive.rec", (STEERING, 7, [0.1, 0.2] * 20), (STEERING, 0, [0.1, 0.3] * 10))
     envelopes = list(read_envelopes(empty / "drive.rec"))
@@ -167,6 +175,7 @@ def test_a_pause_is_not_shortened_and_another_stamp_than_the_applications_is_sec
 
 
 @pytest.mark.parametrize("time", [0, 1])
+@pytest.mark.thorough
 def test_a_recording_with_times_that_cannot_be_right_makes_no_test(empty: Path, time: int) -> None:
     write(empty / "drive.rec", (STEERING, 0, [0.1] * 20))
     first, *others = read_envelopes(empty / "drive.rec")

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from dodo_dsl.cli.rank.score import rank, run_score
 from dodo_dsl.outcome import Outcome, Result
@@ -68,6 +67,8 @@ def test_runs_of_joined_reports_are_of_one_test() -> None:
 
 
 def test_the_interval_of_one_test_is_students() -> None:
+    from scipy import stats
+
     (ranked,) = rank({"a": [run(time) for time in (14.0, 15.0, 15.5, 13.0)]})
     scores = ranked.team.tests["t"].scores
     expected = stats.t.interval(0.95, 3, np.mean(scores), stats.sem(scores))
@@ -78,6 +79,8 @@ def test_the_interval_of_one_test_is_students() -> None:
 
 def test_the_interval_of_two_tests_is_welchs() -> None:
     """Of a difference and of a sum it is as wide."""
+    from scipy import stats
+
     first, second = (14.0, 15.0, 15.5, 14.5), (12.0, 13.0, 14.0, 12.5)
     (ranked,) = rank({"a": [*(run(time) for time in first), *(run(time, name="u") for time in second)]})
     scores = [test.scores for test in ranked.team.tests.values()]

@@ -19,6 +19,7 @@ SHOWN = re.findall(
 
 
 @pytest.mark.parametrize("words", sorted(set(SHOWN)))
+@pytest.mark.thorough
 def test_the_lines_shown_run(
     words: str, record: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

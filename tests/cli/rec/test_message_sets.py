@@ -70,6 +70,7 @@ def test_a_deployment_that_cannot_be_used_is_told_and_left_out(
     assert len(stderr.splitlines()) == 1
 
 
+@pytest.mark.thorough
 def test_a_file_that_disagrees_with_the_repository(rec: Path, tmp_path: Path) -> None:
     (tmp_path / "other.odvd").write_text(CONE.replace("uint32 colour", "float size"))
     found, stderr = names(rec, "--messages=../../other.odvd")

@@ -30,6 +30,7 @@ def dodo(*words: str, code: int) -> str:
     return output.getvalue()
 
 
+@pytest.mark.thorough
 def test_a_camera_is_measured_by_pictures_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dodo.yml").write_text(RIGS)
@@ -55,6 +56,7 @@ def test_a_camera_is_measured_by_pictures_and_written(tmp_path: Path, monkeypatc
     assert k1 and p1 and (float(k1.text), float(p1.text)) == pytest.approx((-0.12, 0.001), abs=0.01)
 
 
+@pytest.mark.thorough
 def test_a_camera_is_measured_in_a_dialogue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown = [np.full((480, 640), 235, np.uint8), *pictures()]
     asked = []

@@ -206,6 +206,7 @@ def test_a_real_rig_is_never_kept_up(dodo: Command) -> None:
     assert (code, "test runs on rig 'kiwi', which --keep would leave in motion" in err) == (2, True)
 
 
+@pytest.mark.thorough
 def test_quiet_says_only_the_counts_of_a_run_that_passed(dodo: Command) -> None:
     assert dodo.run("-q")[1] == "1 passed, 0 failed, 0 in error\n"
     dodo.stages = ENDINGS["failed"]

@@ -57,6 +57,7 @@ def test_none_begins_in_vain(words: list[str], started: list[ForkServer]) -> Non
     assert started == []
 
 
+@pytest.mark.thorough
 def test_one_that_has_begun_ends_with_a_command_that_is_refused(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dodo_dsl", "run", "--no-such-option"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MARK": str(tmp_path)}

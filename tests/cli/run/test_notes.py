@@ -40,6 +40,7 @@ def dodo(*words: str) -> tuple[int, str, str]:
         (["hil-dynamic"], ""),
     ],
 )
+@pytest.mark.thorough
 def test_hardware_keeps_its_clock_and_it_is_said(folder: Path, words: list[str], said: str) -> None:
     (folder / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:"]\n')
     code, out, err = dodo("run", *words)
@@ -47,6 +48,7 @@ def test_hardware_keeps_its_clock_and_it_is_said(folder: Path, words: list[str],
     assert err.startswith("dodo run: no application; ")
 
 
+@pytest.mark.thorough
 def test_who_cannot_be_a_process_is_told_what_to_write() -> None:
     assert dodo("new", "--deployment")[0] == dodo("new", "mine")[0] == 0
     code, _, err = dodo("run", "mine", "--backend", "process")

@@ -42,6 +42,7 @@ def selected(folder: Path, *words: str) -> tuple[list[str], str]:
     return sorted(job.test for job in jobs), said.getvalue()
 
 
+@pytest.mark.thorough
 def test_those_that_nobody_named_are_left_out(folder: Path) -> None:
     names, said = selected(folder, "--level", "sil", "--level", "hil")
     assert SAID in said and "sil-closed-straight" in names and not set(ON_THE_RIG) & set(names)
@@ -49,6 +50,7 @@ def test_those_that_nobody_named_are_left_out(folder: Path) -> None:
         selected(folder, "hil-*")
 
 
+@pytest.mark.thorough
 def test_they_run_where_they_are_named_or_can_run(folder: Path) -> None:
     assert selected(folder, "hil-dynamic") == (["hil-dynamic"], "")
     assert selected(folder, "hil-*", "--backend", "docker")[0] == ON_THE_RIG, "the rig is in an image"

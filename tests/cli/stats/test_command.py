@@ -18,6 +18,7 @@ def stats(*words: str) -> tuple[int, str]:
     return code, out.getvalue() + err.getvalue()
 
 
+@pytest.mark.thorough
 def test_a_table_and_the_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     code, text = stats("reuse")

@@ -35,6 +35,7 @@ def test_services_count_once() -> None:
 
 
 @given(TESTS)
+@pytest.mark.thorough
 def test_the_mean_is_that_over_all_orders(tests: list[list[str]]) -> None:
     every = [in_order(order) for order in itertools.permutations(tests)]
     assert averaged(tests) == pytest.approx(np.mean(every, axis=0))
@@ -71,6 +72,7 @@ def curves(tests: tuple[tuple[str, ...], ...]) -> set[tuple[int, ...]]:
     return set().union(*states.values())
 
 
+@pytest.mark.thorough
 def test_no_order_of_the_thesis_gives_its_figures() -> None:
     table = tuple(THESIS.values())
     assert tuple(in_order(table)) == (3, 6, 6, 6, 6, 7, 7, 9, 10)

@@ -9,5 +9,6 @@ from dodo_dsl.cli.stats.student_t import quantile
 
 
 @given(st.floats(0.5, 0.9999), st.integers(1, 200))
+@pytest.mark.thorough
 def test_quantiles(probability: float, freedom: int) -> None:
     assert quantile(probability, freedom) == pytest.approx(stats.t.ppf(probability, freedom), rel=1e-6, abs=1e-9)

@@ -122,6 +122,7 @@ def tune(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Tune]:
         signal.signal(number, handler)
 
 
+@pytest.mark.thorough
 def test_the_best_values_are_near_the_best_there_are(tune: Tune) -> None:
     code, out = tune("example", "--runs", "16")
     found = result()
@@ -137,6 +138,7 @@ def test_the_best_values_are_near_the_best_there_are(tune: Tune) -> None:
 
 
 @pytest.mark.parametrize(("more", "ends_at"), [(("--runs", "10"), 10), (("--runs", "2", "--samples", "1"), 7)])
+@pytest.mark.thorough
 def test_an_interrupted_tuning_goes_on_to_the_same_result(tune: Tune, more: tuple[str, ...], ends_at: int) -> None:
     """Among the optimiser's proposals, and among the samples held out."""
     words = ("example", "-j", "1", *more)
@@ -152,6 +154,7 @@ def test_an_interrupted_tuning_goes_on_to_the_same_result(tune: Tune, more: tupl
     assert (tune(*words)[0], tune.driven) == (0, [])
 
 
+@pytest.mark.thorough
 def test_drives_of_an_earlier_call_keep_their_folders(tune: Tune) -> None:
     """The recorder replaces no recording, so a drive in such a folder would end in error."""
     tune("example", "--runs", "1")
@@ -164,6 +167,7 @@ def test_drives_of_an_earlier_call_keep_their_folders(tune: Tune) -> None:
     assert min(int(slug.rpartition("-")[2]) for slug in tune.driven) == 8
 
 
+@pytest.mark.thorough
 def test_samples_held_out_are_others(tune: Tune) -> None:
     _, out = tune("example", "--runs", "4", "--samples", "2")
     found = result()
@@ -188,6 +192,7 @@ def test_an_application_elsewhere_is_tuned(tune: Tune, tmp_path_factory: pytest.
     assert (code, len(tune.driven)) == (0, 2), out
 
 
+@pytest.mark.thorough
 def test_the_mean_counts_more_than_the_worst(tune: Tune) -> None:
     tune("example", "--runs", "1", "--samples", "1")
     worst = result()["default"]["margin"]
@@ -214,6 +219,7 @@ def test_what_cannot_be_tuned(tune: Tune, old: str, new: str, words: tuple[str, 
     assert said in out
 
 
+@pytest.mark.thorough
 def test_a_rig_drives_no_further_than_it_may(tune: Tune) -> None:
     examples.write(RIG, Path())
     code, out = tune("example", "--runs", "9", "--metres", "18")
@@ -223,6 +229,7 @@ def test_a_rig_drives_no_further_than_it_may(tune: Tune) -> None:
     assert (tune("example", "--runs", "6")[0], len(tune.driven)) == (0, 3), "it goes on"
 
 
+@pytest.mark.thorough
 def test_a_rig_that_fails_is_no_fault_of_the_values(tune: Tune, monkeypatch: pytest.MonkeyPatch) -> None:
     examples.write(RIG, Path())
     monkeypatch.setattr(sys.modules[__name__], "CRASHES", 1.5)

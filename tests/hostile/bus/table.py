@@ -74,7 +74,7 @@ ATTACKS = (
     BusAttack("true-pose", STRAIGHT, "realtime", WALL, "host"),
     BusAttack("easy", SIGNAL, "lockstep", ""),
     BusAttack("easy", SIGNAL, "realtime", "", long=True),
-    BusAttack("finish", STRAIGHT, "lockstep", only(FRAME, "pose"), "host"),
+    BusAttack("finish", STRAIGHT, "lockstep", only(FRAME, "pose"), "host", long=True),
     BusAttack("finish", STRAIGHT, "realtime", only(FRAME, "pose"), "host", long=True),
     BusAttack("spy", STRAIGHT, "lockstep", WALL, "host"),
     BusAttack("spy", STRAIGHT, "realtime", WALL, "host", long=True),

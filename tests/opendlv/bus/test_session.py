@@ -127,6 +127,7 @@ IDS = [0, 5, 63, 64, 1090, 8191, 8192, 1_048_575, 1_048_576, 2**31 - 1, -1, -64,
 
 
 @pytest.mark.parametrize("is_kernel_able", [True, False])
+@pytest.mark.thorough
 def test_only_some_messages_are_heard(cid: int, is_kernel_able: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not is_kernel_able:
         monkeypatch.setattr(sessions.kernel_filter, "attach", lambda *_: False)
@@ -214,6 +215,7 @@ def test_without_the_kernel_s_time_a_datagram_came_now(cid: int, monkeypatch: py
     assert envelope and before <= envelope.received <= time.time_ns() // 1000 and two.lost == 0
 
 
+@pytest.mark.thorough
 def test_what_is_sent_directly_only_one_hears_in_the_order_of_arrival(cid: int) -> None:
     with Session(cid) as sender, Session(cid) as hearer, Session(cid) as other:
         for session in (hearer, other):

@@ -1,3 +1,4 @@
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -226,6 +227,33 @@ def test_a_reader_finds_the_mode_of_the_creator(mode: str, memory_name: str, mon
         with SharedMemory.attach(f"/{memory_name}") as reader:
             memory.buffer[11] = 5
             assert (reader.size, reader.buffer[11]) == (12, 5)
+
+
+def test_whom_the_end_wakes_does_not_read_the_last_content_again(
+    mode: str, memory_name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However long its creator is kept from going on once it has woken the reader."""
+    memory = SharedMemory.create(memory_name, SIZE)
+    write(memory, 7, TIME)
+    wake, is_over, seen = memory._segment.wake, threading.Event(), list[int]()
+
+    def late() -> None:
+        wake()
+        reader.join(10.0)
+
+    def read() -> None:
+        with SharedMemory.attach(memory_name) as theirs, contextlib.suppress(SharedMemoryError):
+            theirs.wait()
+            with theirs.lock():
+                seen.append(theirs.buffer[0])
+        is_over.set()
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    until_waiting(memory, 1)
+    monkeypatch.setattr(type(memory._segment), "wake", lambda _: late())
+    memory.close()
+    assert is_over.is_set() and seen == []
 
 
 def test_waiting_for_posix_memory_ends(memory_name: str) -> None:

@@ -64,12 +64,14 @@ def flat(values: dict[str, Any]) -> dict[str, Any]:
 
 
 @given(st.lists(VALUES, min_size=1, max_size=20))
+@pytest.mark.thorough
 def test_what_was_encoded_is_decoded(messages: MessageSet, values: list[dict[str, Any]]) -> None:
     payloads = [messages.encode(messages.type(8000)(**v)) for v in values]
     assert decoded(messages, payloads) == ([flat(v) for v in values], [True] * len(values))
 
 
 @given(st.lists(st.binary(max_size=60), min_size=1, max_size=8), VALUES, st.integers(0, 60))
+@pytest.mark.thorough
 def test_any_bytes_are_decoded_as_the_codec_does(
     messages: MessageSet, payloads: list[bytes], values: dict[str, Any], cut: int
 ) -> None:

@@ -1,6 +1,7 @@
 """Many numbers at once are the same as one by one."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,6 +31,7 @@ def test_any_bytes_are_read_as_the_codec_reads_them(data: bytes) -> None:
 
 
 @given(st.lists(st.integers(-(2**55), 2**55 - 1), max_size=20))
+@pytest.mark.thorough
 def test_signed_numbers(values: list[int]) -> None:
     zigzag = np.array([value << 1 if value >= 0 else ~(value << 1) for value in values], np.int64)
     assert varints.signed(zigzag).tolist() == values

@@ -42,6 +42,7 @@ def test_numbers_are_those_of_protobuf(value: int, before: bytes, behind: bytes)
 
 
 @given(st.lists(FIELDS, max_size=9))
+@pytest.mark.thorough
 def test_fields_are_split_where_they_begin(fields: list[tuple[int, int, bytes]]) -> None:
     data = b"".join(field(*each) for each in fields)
     found = list(wire.chunks(data))

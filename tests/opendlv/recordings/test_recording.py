@@ -53,6 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @given(st.lists(envelopes, min_size=1, max_size=60))
+@pytest.mark.thorough
 def test_stream_and_index_give_what_was_written(folder: Path, written: list[Envelope]) -> None:
     path = write(folder, b"".join(map(encode_frame, written)))
     assert read(path) == (written, Damage())
@@ -70,6 +71,7 @@ def test_stream_and_index_give_what_was_written(folder: Path, written: list[Enve
 
 
 @given(st.lists(st.tuples(no_magic, envelopes.map(encode_frame) | unusual), min_size=1, max_size=40), no_magic)
+@pytest.mark.thorough
 def test_garbage_between_frames_is_skipped_and_told(
     folder: Path, parts: list[tuple[bytes, bytes]], rest: bytes
 ) -> None:
@@ -87,6 +89,7 @@ def test_garbage_between_frames_is_skipped_and_told(
 
 
 @given(st.lists(envelopes, min_size=2, max_size=20), st.data())
+@pytest.mark.thorough
 def test_a_cut_file_gives_all_whole_frames(folder: Path, written: list[Envelope], data: st.DataObject) -> None:
     plain = [e._replace(payload=e.payload.replace(b"\x0d", b"")) for e in written]
     frames = [encode_frame(e) for e in plain]
@@ -100,6 +103,7 @@ def test_a_cut_file_gives_all_whole_frames(folder: Path, written: list[Envelope]
 
 
 @given(st.binary(max_size=400) | st.lists(st.sampled_from([b"\x0d\xa4", b"\x00", b"\x08\x02", b"\xff"])).map(b"".join))
+@pytest.mark.thorough
 def test_any_bytes_are_read_or_skipped_once(folder: Path, data: bytes) -> None:
     path = write(folder, data)
     found, damage = read(path)

@@ -32,6 +32,7 @@ def few_bytes_at_a_time() -> object:
 
 
 @given(st.lists(st.tuples(GARBAGE, ENVELOPES), max_size=9), GARBAGE)
+@pytest.mark.thorough
 def test_frames_are_found_between_garbage(pieces: list[tuple[bytes, Envelope]], behind: bytes) -> None:
     data = b"".join(garbage + encode_frame(envelope) for garbage, envelope in pieces) + behind
     scanner = Scanner(io.BytesIO(data))

@@ -43,10 +43,12 @@ def trace() -> str:
     return (pages.DOCS / pages.TRACE).read_text()
 
 
+@pytest.mark.thorough
 def test_the_sheet_shows_todays_camera() -> None:
     assert unlike(read(pages.SHEET), pages.sheet()) <= MOST_UNLIKE, f"docs/{pages.SHEET} is {DRAW}"
 
 
+@pytest.mark.thorough
 def test_other_drives_are_unlike() -> None:
     """As pages that changed are: the comparison can fail."""
     drives = [read(name) for name in ("tutorial/hit-wall.png", "drive-viewer.png", "drive-viewer-perception.png")]

@@ -14,6 +14,7 @@ VALUES = st.recursive(st.none() | st.integers() | st.text(), st.lists, max_leave
 
 
 @given(VALUES)
+@pytest.mark.thorough
 def test_a_script_holds_one_value_and_no_tag(value: object) -> None:
     text = script(value)
     begin, _, rest = text.partition(" = ")

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from dodo_dsl.report.viewer import page
 from dodo_dsl.report.viewer.names import SHARED
 from tests.report.viewer import drives, failures
@@ -23,6 +25,7 @@ print(sorted({"av", "cv2", "PIL", "shapely"} & set(sys.modules)))
 """
 
 
+@pytest.mark.thorough
 def test_a_page_is_cheap_to_write(tmp_path: Path) -> None:
     drive = failures.wall_hit()
     drives.write(tmp_path / "report", [drive])

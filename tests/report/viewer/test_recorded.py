@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
 from dodo_dsl.report.viewer import recorded
@@ -43,6 +44,7 @@ def test_damage_strangers_and_times_of_other_clocks_are_left_out(tmp_path: Path)
     ]
 
 
+@pytest.mark.thorough
 def test_long_channels_are_thinned_unless_they_are_judged(tmp_path: Path) -> None:
     payload = MESSAGES.encode(MESSAGES.type(STEERING)(groundSteering=1))
     count = 2 * recorded.MOST_SAMPLES + 1

@@ -23,6 +23,7 @@ from tests.run.scripted import plan
         ("services.app.image must be a string", "rejects the compiled test: services.app.image must be a string"),
     ],
 )
+@pytest.mark.thorough
 def test_a_command_without_compose_is_not_the_tests_fault(
     stderr: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -66,6 +66,7 @@ def test_the_first_processes_of_the_application(proc: Proc) -> None:
 
 
 @pytest.mark.parametrize(("isolation", "pid"), [("host", 10), ("host", 11), ("network", 11)])
+@pytest.mark.thorough
 def test_a_test_on_the_network_of_another_host_does_not_begin(
     isolation: str, pid: int, proc: Proc, tmp_path: Path
 ) -> None:

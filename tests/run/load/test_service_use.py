@@ -129,6 +129,7 @@ BUSY = "end = time.process_time() + 0.3\nwhile time.process_time() < end: pass\n
     ],
     ids=["quiet", "busy", "busy-child", "large", "forks"],
 )
+@pytest.mark.thorough
 def test_the_kernel_s_own(code: str, processor_s: float, megabytes: int) -> None:
     with started("") as plain, started(code) as process:
         time.sleep(0.05)  # forks go to sleep
@@ -148,6 +149,7 @@ subprocess.run([sys.executable, "-c", code])
 """
 
 
+@pytest.mark.thorough
 def test_a_process_that_begins_after_the_first_look_counts_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sandbox that is looked at while it is set up has not started the application yet."""
     monkeypatch.setattr(service_use, "_LOOK_S", 1e6)

@@ -42,6 +42,7 @@ def test_an_answer_from_a_program_that_holds_the_leases() -> None:
         os.close(writer)
 
 
+@pytest.mark.thorough
 def test_a_program_that_hangs_is_ended() -> None:
     with pytest.raises(ProgramTimeout, match=r"the rig's program gave no answer within 0\.2 s"):
         asyncio.run(query(PYTHON, ["import time; time.sleep(600)"], patience_s=0.2))
@@ -70,6 +71,7 @@ time.sleep(600)
     assert (tmp_path / "stopped").exists()
 
 
+@pytest.mark.thorough
 def test_a_rig_in_use_is_waited_for_and_then_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DODO_LEASES", str(tmp_path))
     held = leases.try_lease("cid-121", {"test": "hil-other"})

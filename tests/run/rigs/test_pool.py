@@ -77,6 +77,7 @@ def test_each_takes_another_rig_and_the_next_the_first_that_comes_free(folder: P
     assert [path.name for path in folder.glob("queue.*")] == []
 
 
+@pytest.mark.thorough
 def test_who_waits_for_one_rig_and_who_waits_for_any_are_one_queue() -> None:
     """The second came first for both, so it has the rig that comes free first; the third wants the other one."""
 

@@ -71,7 +71,7 @@ def on_the_rig(place: Place) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("killed", ["sandbox", "runner", "both"])
+@pytest.mark.parametrize("killed", ["sandbox", pytest.param("runner", marks=pytest.mark.proof), "both"])
 def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place, killed: str) -> None:
     run = drive(place)
     inner = sandbox(run)

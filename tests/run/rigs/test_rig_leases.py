@@ -75,6 +75,7 @@ def test_who_has_waited_for_the_cid_is_not_the_last_for_the_device(folder: Path)
     assert order == ["both", "device"]
 
 
+@pytest.mark.thorough
 def test_a_busy_device_gives_the_cid_back(folder: Path) -> None:
     (name,) = device_leases(["/dev/null"])
     held = leases.try_lease(name, {"test": "theirs"})

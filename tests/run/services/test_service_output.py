@@ -50,6 +50,7 @@ def expected_lines(data: bytes) -> list[bytes]:
 
 
 @given(st.lists(st.binary(max_size=40) | st.sampled_from([b"\n", b"a\n", b'{"dodo": "ready"}\n']), max_size=20))
+@pytest.mark.thorough
 def test_lines_do_not_depend_on_how_they_were_written(chunks: list[bytes]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         read = Read(Path(folder), chunks)

@@ -254,5 +254,6 @@ KINDS = st.sampled_from(["verdict", "ready", "lost", "time", "stuck"]) | VALUES
         {"dodo": KINDS}, optional=dict.fromkeys(("outcome", "reason", "checks", "messages", "s"), VALUES)
     )
 )
+@pytest.mark.thorough
 def test_any_message_is_read(message: dict[str, Any]) -> None:
     read_line(CLOCK, True, json.dumps(message).encode())

@@ -71,6 +71,7 @@ WORDS = st.builds("--{}{}".format, NAMES, st.just("") | st.text().map("={}".form
 
 
 @given(st.lists(st.text() | WORDS))
+@pytest.mark.thorough
 def test_any_words_give_flags_or_one_sentence(words: list[str]) -> None:
     try:
         flags = parse(MANIFEST, [*NEEDED, *words])

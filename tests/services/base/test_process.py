@@ -66,6 +66,7 @@ def test_steps_are_even_and_stamped_with_test_time(start: Start, cid: int) -> No
     assert all(envelope.sample_time <= envelope.sent for envelope in pedals)
 
 
+@pytest.mark.thorough
 def test_what_it_emulates_stood_still(start: Start, cid: int) -> None:
     with Session(cid) as session:
         service = start("--role=echo", "--freq=20")
@@ -112,6 +113,7 @@ def test_a_message_decides(start: Start, cid: int) -> None:
     assert service.end() == (0, "", "")
 
 
+@pytest.mark.thorough
 def test_a_source_that_runs_out_ends_the_judge(start: Start, cid: int) -> None:
     with Session(cid) as session:
         judge = start("--role=judge", "--verbose")
@@ -127,6 +129,7 @@ def test_a_source_that_runs_out_ends_the_judge(start: Start, cid: int) -> None:
     assert "DEBUG: the end has come" in err
 
 
+@pytest.mark.thorough
 def test_the_memory_of_a_source_stays_until_it_is_stopped(start: Start, cid: int) -> None:
     name = f"dodo-test-{uuid.uuid4().hex}"
     with Session(cid) as session:
@@ -213,6 +216,7 @@ def test_memory_that_another_process_has(start: Start) -> None:
         assert Path("/tmp", name).exists()
 
 
+@pytest.mark.thorough
 def test_the_example_of_the_help_runs(start: Start, ready_file: Path) -> None:
     text = start("--help").end()
     assert text[0] == 0

@@ -71,6 +71,7 @@ def test_two_ways_are_one_too_many() -> None:
         service("--points=0 0,1 1", "--length=3")
 
 
+@pytest.mark.thorough
 def test_on_the_bus(cid: int, tmp_path: Path) -> None:
     with (
         Session(cid) as session,

@@ -39,6 +39,7 @@ def test_a_picture_is_checked(
     assert ("error" in result) == (picture is None)
 
 
+@pytest.mark.thorough
 def test_the_program_prints_its_result(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "services.camera.health_check", f"--source={tmp_path}/none.png"]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
@@ -55,6 +56,7 @@ def test_the_program_prints_its_result(tmp_path: Path) -> None:
         ("lost", "rpicam-vid ended with code 1"),
     ],
 )
+@pytest.mark.thorough
 def test_a_live_camera_is_checked_when_it_has_settled(monkeypatch: pytest.MonkeyPatch, mode: str, words: str) -> None:
     """It is dark at first, as it finds its exposure."""
     if mode in ("dark", "frozen"):

@@ -41,6 +41,7 @@ def test_why_it_ended(rpicam: Path, monkeypatch: pytest.MonkeyPatch, mode: str, 
     camera.close()
 
 
+@pytest.mark.thorough
 def test_one_that_does_not_go_is_killed(rpicam: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FAKE_MODE", "stubborn")
     monkeypatch.setattr("services.camera.rpicam.PATIENCE", 0.2)

@@ -58,6 +58,7 @@ MANNERS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("manner", MANNERS)
+@pytest.mark.thorough
 def test_manners_change_nothing(toys: Toys, manner: str) -> None:
     application = toys.application(**MANNERS[manner])
     way, stepper = toys.run(application)
@@ -67,6 +68,7 @@ def test_manners_change_nothing(toys: Toys, manner: str) -> None:
     assert most - 2 <= stepper.application.answers.surplus <= most
 
 
+@pytest.mark.thorough
 def test_who_watches_sees_each_picture(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where a camera is kept from showing it at once, after it has said that it will."""
     show = AnnouncedMemory.announce
@@ -84,6 +86,7 @@ def test_who_watches_sees_each_picture(toys: Toys, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.thorough
 def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """A third of what clock and services tell each other is lost, some comes twice, some after the next."""
     chance = random.Random(seed)
@@ -127,6 +130,7 @@ def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPa
     assert close(way, expected(21))
 
 
+@pytest.mark.thorough
 def test_an_application_without_an_answer_of_its_own_is_awaited_by_its_readers(toys: Toys) -> None:
     """Nothing is known to answer: it has done what it does when it waits for the next picture."""
     toys.answers = ()
@@ -136,6 +140,7 @@ def test_an_application_without_an_answer_of_its_own_is_awaited_by_its_readers(t
     assert len(application.seen) == 21
 
 
+@pytest.mark.thorough
 def test_all_that_such_an_application_says_of_a_picture_is_heard_with_the_next_step(toys: Toys) -> None:
     toys.answers, toys.relayed = (), (BOX,)
     toys.run(toys.application(boxes=2, pause=lambda frame: 0.02 * (frame % 3)))
@@ -150,6 +155,7 @@ def test_an_application_without_a_camera_may_answer_at_once(toys: Toys) -> None:
     assert stepper.application.frames == 21
 
 
+@pytest.mark.thorough
 def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
     """One answers at once and long before the other is even seen."""
     toys.cast = {**DRIVE, "other": lambda _, memory: Eye(memory())}
@@ -160,6 +166,7 @@ def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
     assert len(slow.seen) in (20, 21)
 
 
+@pytest.mark.thorough
 def test_a_slow_reader_beside_the_one_that_answers_sees_each_picture_once(toys: Toys) -> None:
     """It is told of a picture, and gets to it when the next one is drawn already."""
     toys.readers = 2
@@ -188,6 +195,7 @@ def test_the_test_time_is_limited(toys: Toys) -> None:
     assert len(application.seen) in (5, 6)
 
 
+@pytest.mark.thorough
 def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.3)
     gone = threading.Event()
@@ -224,6 +232,7 @@ def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: p
     assert close(way, expected(6))
 
 
+@pytest.mark.thorough
 def test_silence_is_named_with_frame_and_message(toys: Toys) -> None:
     toys.patience = Patience(0.5, 0.2)
     with pytest.raises(ApplicationSilent) as caught:
@@ -231,6 +240,7 @@ def test_silence_is_named_with_frame_and_message(toys: Toys) -> None:
     assert str(caught.value) == "the application did not answer frame 1 within 0.5 s (GroundSteeringRequest missing)"
 
 
+@pytest.mark.thorough
 def test_an_end_in_the_middle_is_named(toys: Toys) -> None:
     toys.patience = Patience(2.0, 0.2)
     with pytest.raises(ApplicationSilent) as caught:
@@ -253,6 +263,7 @@ def test_the_stepper_goes_to_the_time_that_a_source_tells() -> None:
     assert stepper.now == 1130
 
 
+@pytest.mark.thorough
 def test_messages_on_the_channel_wake_nobody_else(cid: int) -> None:
     with Session(cid) as other:
         ours, theirs = (channel.ClockChannel(cid, other.messages) for _ in range(2))

@@ -40,6 +40,7 @@ else:
 """
 
 
+@pytest.mark.thorough
 def test_threads_that_ended_and_children_count(tmp_path: Path) -> None:
     (tmp_path / "burn.py").write_text(BURN)
     command = [sys.executable, str(tmp_path / "burn.py")]

@@ -47,6 +47,7 @@ def test_who_is_stopped_before_the_begin_reports_nothing(cid: int, capsys: pytes
     assert capsys.readouterr().out == ""
 
 
+@pytest.mark.thorough
 def test_without_a_runner_it_begins_by_itself(
     cid: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

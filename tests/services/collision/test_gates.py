@@ -64,6 +64,7 @@ def test_gates_are_counted_as_shapely_finds_them(
 
 
 @given(corners, lines)
+@pytest.mark.thorough
 def test_the_share_is_where_shapely_finds_the_crossing(
     path: list[tuple[int, int]], ends: tuple[tuple[float, float], tuple[float, float]]
 ) -> None:

@@ -448,6 +448,7 @@ def test_poses_that_are_not_newer_are_ignored() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-0.5, 4), st.floats(-0.3, 0.3), st.floats(-180, 180)), min_size=1, max_size=8))
+@pytest.mark.thorough
 def test_no_vehicle_passes_that_was_seen_on_a_wall(poses: list[tuple[float, float, float]]) -> None:
     it = judge()
     shown = [(0.0, 0.0, 0.0, 0.0), *((index + 1.0, *pose) for index, pose in enumerate(poses))]

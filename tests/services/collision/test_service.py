@@ -159,6 +159,7 @@ def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
     return process.returncode, output, errors
 
 
+@pytest.mark.thorough
 def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
     flags = (f"--cid={cid}", f"--map-path={lane}", "--goal=finish", "--walls=left,right")
     with Session(cid) as session, running("collision", lane, *flags) as process:

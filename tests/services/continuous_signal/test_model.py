@@ -65,6 +65,7 @@ def test_the_measures_are_those_of_the_thesis(heard: list[tuple[int, float]], ba
 
 
 @given(samples, st.floats(0, 3), st.integers(1, 15 * SECOND))
+@pytest.mark.thorough
 def test_time_is_judged_as_its_held(heard: list[tuple[int, float]], band: float, hold: int) -> None:
     """Against numpy on a grid: every 10 ms has the distance of the sample that holds then, or none."""
     step = SECOND // 100
@@ -88,6 +89,7 @@ def test_time_is_judged_as_its_held(heard: list[tuple[int, float]], band: float,
     assert found.coverage.gap_begin in edges and found.coverage.gap_end in edges
 
 
+@pytest.mark.thorough
 def test_a_thousand_samples_against_numpy() -> None:
     """A golden check: a noisy sine against a table of 50 Hz."""
     random_ = np.random.default_rng(4)
@@ -327,6 +329,7 @@ def test_the_window() -> None:
     st.lists(st.tuples(st.integers(-2 * SECOND, 12 * SECOND), st.floats(-5, 5)), min_size=1, unique_by=lambda s: s[0]),
     st.randoms(),
 )
+@pytest.mark.thorough
 def test_the_order_of_samples_does_not_matter(heard: list[tuple[int, float]], random_: random.Random) -> None:
     mixed = list(heard)
     random_.shuffle(mixed)

@@ -100,6 +100,7 @@ def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
     return process.returncode, output, errors
 
 
+@pytest.mark.thorough
 def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
     start = time.time_ns() // 1000 - 10_100_000
     limits = ("--band=0.05", "--min-share=0.5", "--max-delay=60")
@@ -123,6 +124,7 @@ def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
     assert checks["samples"]["value"] == 101
 
 
+@pytest.mark.thorough
 def test_another_sender_stamp_is_part_of_the_reason(table: Path, cid: int, tmp_path: Path) -> None:
     start = time.time_ns() // 1000
     with (

@@ -29,6 +29,7 @@ def interpolated(knots: list[int], values: list[float], time: int) -> float | No
 
 
 @given(times, st.data())
+@pytest.mark.thorough
 def test_between_its_samples_it_is_a_straight_line_and_beyond_them_nothing(
     knots: list[int], data: st.DataObject
 ) -> None:

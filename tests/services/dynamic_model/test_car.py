@@ -56,6 +56,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
 
 
 @given(st.binary(max_size=100) | st.text("mas: 1\n[]{}&*!'-", max_size=40).map(str.encode))
+@pytest.mark.thorough
 def test_any_bytes_are_a_car_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
     path = tmp_path_factory.getbasetemp() / "any.yml"
     path.write_bytes(data)

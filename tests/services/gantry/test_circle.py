@@ -99,6 +99,7 @@ def test_a_heading_may_have_the_name_of_another_turn() -> None:
     assert not start.near(Position(0, 0, -3.1), Position(0, 0, 3.1))
 
 
+@pytest.mark.thorough
 def test_the_health_check_turns_around_and_passes_the_index_to_either_side(line: tuple[FakeRig, Link]) -> None:
     rig, link = line
     assert run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)["ok"]
@@ -106,6 +107,7 @@ def test_the_health_check_turns_around_and_passes_the_index_to_either_side(line:
     assert words == ["GOTOLEFT", "GOTOLEFT", "GOTORIGHT"]
 
 
+@pytest.mark.thorough
 def test_a_rig_that_loses_its_index_on_the_way_round_is_not_fit(line: tuple[FakeRig, Link]) -> None:
     rig, link = line
     rig.lost_index = True

@@ -83,6 +83,7 @@ scales = st.floats(0.91, 1.1)
     scales, scales, scales, st.floats(-11, 11), st.floats(0.12, 1.9), st.floats(0.12, 1.4), st.floats(35, 170),
     st.floats(0.12, 1.0),
 )  # fmt: skip
+@pytest.mark.thorough
 def test_what_the_memory_keeps_is_never_beyond_a_true_limit(
     x: float, y: float, yaw: float, shift: float, far_x: float, far_y: float, turn: float, speed: float
 ) -> None:

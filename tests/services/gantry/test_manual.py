@@ -31,6 +31,7 @@ def test_status_moves_nothing(rig: FakeRig) -> None:
     assert not rig.commands("GOTO") and not rig.commands("CALIBRATE") and rig.last() == "STOP"
 
 
+@pytest.mark.thorough
 def test_it_goes_and_stops_at_the_end(rig: FakeRig) -> None:
     result = manual(rig, "goto", "-0.5", "0.25", "90")
     assert [result["x"], result["y"], result["yaw"]] == pytest.approx([-0.5, 0.25, 90], abs=0.01)

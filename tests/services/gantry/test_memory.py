@@ -146,6 +146,7 @@ def test_a_firmware_without_a_memory_is_taken_and_told(
     assert "has no memory for limits; its firmware does not keep speed 0.4 m/s" in caplog.text
 
 
+@pytest.mark.thorough
 def test_the_service_writes_them_when_it_calibrates(line: tuple[FakeRig, Link]) -> None:
     rig, _ = line
     assert "calibrate it" in refusal("gantry", f"--serial={rig.path}", f"--limits={TEXT}")
@@ -158,6 +159,7 @@ def test_the_service_writes_them_when_it_calibrates(line: tuple[FakeRig, Link]) 
     assert order.index("SETLIMITS") < order.index("CALIBRATE") < order.index("GOTO")
 
 
+@pytest.mark.thorough
 def test_by_hand_they_are_written_by_calibrate_and_shown_by_status(
     line: tuple[FakeRig, Link], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -172,6 +174,7 @@ def test_by_hand_they_are_written_by_calibrate_and_shown_by_status(
     assert (shown["speed"], shown["x"], shown["from"]) == (0.4, 1.85, "kept")
 
 
+@pytest.mark.thorough
 def test_the_health_check_writes_them_first(line: tuple[FakeRig, Link], monkeypatch: pytest.MonkeyPatch) -> None:
     rig, link = line
     monkeypatch.setattr("services.gantry.health_check._homing", lambda *_: [])

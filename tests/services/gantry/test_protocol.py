@@ -86,6 +86,7 @@ def test_answers(text: str, found: Position | Status | Refusal | None) -> None:
 
 
 @given(st.lists(answers, max_size=8), st.lists(st.integers(1, 20), min_size=1))
+@pytest.mark.thorough
 def test_answers_come_through_however_they_are_cut(sent: list[Answer], cuts: list[int]) -> None:
     data, lines, found = b"".join(map(line, sent)), LineReader(), []
     index = 0

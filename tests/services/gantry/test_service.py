@@ -156,6 +156,7 @@ def test_a_watchdog_of_its_own_accord_ends_the_test(cid: int, rig: FakeRig) -> N
         assert "got no command for 500 ms and braked by itself" in process.stderr.read()
 
 
+@pytest.mark.thorough
 def test_garbage_and_lines_in_parts_do_no_harm(rig: FakeRig) -> None:
     rig.noise, rig.chopped = b"\xff\x00$0.\n$$,,\nok\n$12", True
     with ready(rig) as model:
@@ -174,6 +175,7 @@ def test_a_rig_that_refuses_to_move_ends_the_test(rig: FakeRig, code: int, name:
     assert rig.last() == "STOP" and not any(rig.velocity)
 
 
+@pytest.mark.thorough
 def test_a_line_that_comes_damaged_is_sent_again(rig: FakeRig, caplog: pytest.LogCaptureFixture) -> None:
     with ready(rig) as model:
         drive_here(model, lambda: any(rig.velocity), vx=0.2)
@@ -192,6 +194,7 @@ def test_an_outage_of_the_line_ends_the_test(rig: FakeRig) -> None:
         rig.plug()
 
 
+@pytest.mark.thorough
 def test_a_rig_that_falls_silent_ends_the_test_and_is_stopped(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link, "SILENCE", 0.2)
     with ready(rig) as model:
@@ -201,6 +204,7 @@ def test_a_rig_that_falls_silent_ends_the_test_and_is_stopped(rig: FakeRig, monk
     assert rig.last() == "STOP"
 
 
+@pytest.mark.thorough
 def test_a_rig_that_never_answers(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link, "PATIENCE", 0.5)
     rig.silent = True
@@ -261,6 +265,7 @@ def refused(rig: FakeRig, *flags: str) -> str:
     return refusal("gantry", *(flags or (f"--serial={rig.path}",)))
 
 
+@pytest.mark.thorough
 def test_it_calibrates_only_on_request(rig: FakeRig) -> None:
     rig.calibrated = False
     error = refused(rig)
@@ -290,6 +295,7 @@ def test_a_signal_on_the_way_to_the_start_stops_the_rig(cid: int, rig: FakeRig) 
     assert rig.last() == "STOP"
 
 
+@pytest.mark.thorough
 def test_a_start_that_is_not_reached(rig: FakeRig) -> None:
     rig.status = 2
     error = refused(rig, f"--serial={rig.path}", "--patience=1", "--x=0.2")

@@ -32,6 +32,7 @@ def test_angles_are_yaw_then_pitch_then_roll(roll: float, pitch: float, yaw: flo
 
 @settings(deadline=None)
 @given(velocities, rates, st.floats(0, 0.5))
+@pytest.mark.thorough
 def test_displacement_is_the_limit_of_ever_smaller_steps(
     v: tuple[float, float, float], w: tuple[float, float, float], dt: float
 ) -> None:
@@ -89,6 +90,7 @@ def test_angles_come_back_from_the_quaternion(roll: float, pitch: float, yaw: fl
 
 
 @given(st.floats(-3, 3), st.floats(-1.5, 1.5), st.floats(-3, 3))
+@pytest.mark.thorough
 def test_angles_are_those_of_scipy(roll: float, pitch: float, yaw: float) -> None:
     q = quaternion(roll, pitch, yaw)
     expected = Rotation.from_quat(q).as_euler("ZYX")[::-1]

@@ -16,6 +16,7 @@ UNIT = Box(0, 0, 1, 1)
 
 
 @given(st.lists(boxes, max_size=6), st.lists(boxes, max_size=6))
+@pytest.mark.thorough
 def test_overlaps_are_those_of_pycocotools_and_shapely(found: list[Box], true: list[Box]) -> None:
     scores = overlaps(found, true)
     assert scores.shape == (len(found), len(true))

@@ -9,6 +9,7 @@ times = st.lists(st.floats(-1, 11, width=32), max_size=20)
 
 
 @given(st.lists(st.booleans(), max_size=40), st.randoms())
+@pytest.mark.thorough
 def test_unanswered_frames_against_numpy(answered: list[bool], random: np.random.Generator) -> None:
     frames = [JudgedFrame(i, f"at {i} s", float(i) if yes else None) for i, yes in enumerate(answered)]
     random.shuffle(frames)  # type: ignore[arg-type]

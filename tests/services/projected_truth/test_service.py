@@ -70,6 +70,7 @@ def drawn(resources: ExitStack, x: float, y: float, yaw: float, *flags: str) -> 
 
 
 @pytest.mark.parametrize("flags", [(), LENS, SENSOR, (*LENS, *SENSOR)])
+@pytest.mark.thorough
 def test_it_says_what_a_virtual_camera_at_the_same_place_says(resources: ExitStack, flags: tuple[str, ...]) -> None:
     """The pose at the picture's time lies between two measured ones; the boxes have the picture's sample time."""
     projection = Projection(resources, "--frame-id=4", "--latency=0.01", *flags)

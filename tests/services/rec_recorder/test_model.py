@@ -15,6 +15,7 @@ envelopes = st.builds(Envelope, st.integers(1, 5000), st.binary(max_size=300), t
 
 
 @given(st.lists(envelopes, max_size=20))
+@pytest.mark.thorough
 def test_what_is_written_is_read_again(tmp_path_factory: pytest.TempPathFactory, written: list[Envelope]) -> None:
     path = tmp_path_factory.mktemp("rec") / "drive.rec"
     with RecordingFile(path) as recording:

@@ -36,6 +36,7 @@ def straight():
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(-0.2, 0.2), st.floats(-0.3, 3), st.floats(0.05, 0.3), st.floats(-0.2, 0.2), st.floats(1.0, 2.2))
+@pytest.mark.thorough
 def test_a_box_holds_the_projection_of_all_corners(straight, x, y, z, pitch, yaw):
     """Any camera without roll: each box is that of the model's corners by the pinhole equation, cut at the edges."""
     for box in SceneTruth(straight, classes_of([], straight.bodies.names), ALL).boxes(

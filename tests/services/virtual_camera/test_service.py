@@ -162,6 +162,7 @@ EVERYTHING = [
 ]
 
 
+@pytest.mark.thorough
 def test_seed_and_time_alone_decide_what_is_drawn_by_lot(camera):
     frames = [(0.0, 0.1, 0.0), (0.0, 0.13, 0.05)]
     first = camera(*EVERYTHING).shoot(*frames)
@@ -201,6 +202,7 @@ def test_true_boxes_follow_as_three_messages_each(camera):
     assert min(map(len, sides.values())) > 3
 
 
+@pytest.mark.thorough
 def test_limits_leave_out_what_is_too_little(camera):
     frame = (0.0, 0.0, 0.0)
 

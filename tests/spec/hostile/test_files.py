@@ -83,6 +83,7 @@ def test_ten_megabytes(folder: Path) -> None:
     refused(folder, "too-large")
 
 
+@pytest.mark.thorough
 def test_thousands_of_mistakes(folder: Path) -> None:
     write(folder, "dodo: 1\nname: t\n" + "".join(f"key-{i}: {{}}\n" for i in range(3000)))
     code, said = compiled(folder)

@@ -34,6 +34,7 @@ def test_processes_that_end_meanwhile_are_no_problem(tmp_path: Path) -> None:
     assert above({10: 1}, PARENTS, tmp_path) == {}
 
 
+@pytest.mark.thorough
 def test_what_only_a_descriptor_holds_counts_once() -> None:
     """Also where a child holds it, too, as forks do."""
     me, parents = os.getpid(), {os.getpid(): 1}

@@ -103,6 +103,7 @@ def test_neither_umask_nor_tmpdir_decide_about_its_folders(own: Path, monkeypatc
     assert list(elsewhere.iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_what_it_may_read_is_shown_as_its_own_where_the_kernel_can(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def owners() -> object:
         places = Places(USER)
@@ -115,6 +116,7 @@ def test_what_it_may_read_is_shown_as_its_own_where_the_kernel_can(own: Path, mo
 
 
 @pytest.mark.parametrize("place", namespaces.SHARED, ids=str)
+@pytest.mark.thorough
 def test_folders_of_shared_places_stay_where_they_are_needed_and_files_do_not(place: Path) -> None:
     with tempfile.TemporaryDirectory(dir=place) as name, tempfile.NamedTemporaryFile(dir=place) as file:
         Path(name, "test").touch()

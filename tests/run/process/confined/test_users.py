@@ -57,6 +57,7 @@ def test_each_gets_an_id_of_its_own() -> None:
 
 
 @as_root
+@pytest.mark.thorough
 def test_an_id_comes_free_with_its_holder() -> None:
     assert leased((USER + 1,)) == [USER + 1]
     deadline = time.monotonic() + 60

@@ -47,6 +47,7 @@ raw = st.lists(st.builds(sent, names, st.integers(8, 9)), max_size=3)
 
 
 @given(st.lists(st.tuples(relayed, raw), min_size=1, max_size=5))
+@pytest.mark.thorough
 def test_steps_are_those_of_the_clock_whatever_was_on_the_bus(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[list[Envelope], list[Envelope]]]
 ) -> None:

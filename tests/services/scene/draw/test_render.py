@@ -163,6 +163,7 @@ def test_faces_towards_the_light_are_brighter(cube_at):
     assert len(set(red.tolist())) == 2
 
 
+@pytest.mark.thorough
 def test_a_map_without_blocks_stands_on_a_patterned_ground(write_map):
     image = draw(write_map({}), 0, 0, 0.1)
     assert len(np.unique(image[:240].reshape(-1, 4), axis=0)) == 1

@@ -86,6 +86,7 @@ def test_groups_are_linked_bodies():
     assert groups({9}, [(1, 2), (4, 3), (2, 3), (6, 7)]) == [[1, 2, 3, 4], [6, 7], [9]]
 
 
+@pytest.mark.thorough
 def test_too_many_faces_are_not_cut_up_and_that_is_told(write_map, caplog):
     steps = 2 * MAX_FACES
     ring = [(math.cos(a), math.sin(a) * (1.2 + 0.1 * math.cos(3 * a))) for a in np.arange(steps) * 2 * math.pi / steps]

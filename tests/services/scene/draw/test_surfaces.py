@@ -52,6 +52,7 @@ def traced(camera: Pinhole, pose: CameraPose, half: float, tile: float) -> tuple
     st.floats(-1, 1), st.floats(0.3, 2), st.floats(-0.3, 0.3), st.floats(0.0, 1.2), st.floats(-3.1, 3.1),
     st.sampled_from([16, 64, 333]),
 )  # fmt: skip
+@pytest.mark.thorough
 def test_a_textured_floor_is_what_rays_see(x, z, roll, pitch, yaw, size):
     camera, pose = Pinhole(160, 120, math.radians(60)), CameraPose.at(x, -x, z, roll, pitch, yaw)
     image = np.zeros((120, 160, 4), np.uint8)

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose
@@ -21,6 +22,7 @@ def test_clutter_stands_around_the_models_and_has_no_name():
     assert {copies.name for copies in boxes} == {""}
 
 
+@pytest.mark.thorough
 def test_the_seed_alone_decides_the_clutter():
     def drawn(seed):
         renderer = Renderer(load_scene(STRAIGHT, SceneOptions(clutter=30, seed=seed)), 160, 120, 1.0)

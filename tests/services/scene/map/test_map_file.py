@@ -144,6 +144,7 @@ values = st.recursive(
 
 @settings(deadline=None)
 @given(st.dictionaries(st.sampled_from(["model", "block"]), st.lists(values, max_size=2)))
+@pytest.mark.thorough
 def test_whatever_stands_in_a_map_is_read_or_refused(tmp_path_factory, content):
     folder = tmp_path_factory.getbasetemp() / "any"
     folder.mkdir(exist_ok=True)
