@@ -19,7 +19,7 @@ class Arguments(argparse.ArgumentParser):
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        from dodo_dsl.search.address import masked
+        from dodo_dsl.search.postgres import masked
 
         choice = _CHOICE.fullmatch(message)
         super().error(masked(_wrong_choice(choice) if choice else message))

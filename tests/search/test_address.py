@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.search.address import masked
+from dodo_dsl.search.postgres import masked
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.search.regression import name_of
+from dodo_dsl.search.shrinking import name_of
 
 LONG = "sil-" + "-".join(["chicane"] * 7)
 

@@ -16,17 +16,16 @@ from typing import Any
 import pytest
 
 from dodo_dsl import advice, compiler
-from dodo_dsl.cli import selection
+from dodo_dsl.cli import search_session, selection
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.search import command
-from dodo_dsl.cli.search.drives import Drives
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.search import itinerary
-from dodo_dsl.search.itinerary import FIRST
+from dodo_dsl.search import sampling_order
+from dodo_dsl.search.drives import Limits
+from dodo_dsl.search.sampling_order import FIRST
 from tests.check import examples
-from tests.cli.search.drives import LIMIT, SPEC, stages, start_of
 from tests.run import scripted
 from tests.run.scripted import ScriptedBackend, ScriptedBackends
+from tests.search.scripted_drives import LIMIT, SPEC, stages, start_of
 
 
 @dataclass
@@ -69,7 +68,7 @@ def search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Search]:
     examples.write(SPEC, tmp_path)
     made = Search()
     monkeypatch.setattr(asyncio, "run", scripted.run)
-    monkeypatch.setattr(command, "Processes", lambda *_: ScriptedBackends(made.backend))
+    monkeypatch.setattr(search_session, "Processes", lambda *_: ScriptedBackends(made.backend))
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     yield made
     for number, handler in before.items():
@@ -201,7 +200,7 @@ def test_what_a_killed_search_left_of_a_drive_is_gone_when_it_drives_again(searc
 def test_a_search_is_interrupted_between_drives_too(
     search: Search, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
-    monkeypatch.setattr(itinerary, "propose", lambda *_: os.kill(os.getpid(), number))
+    monkeypatch.setattr(sampling_order, "propose", lambda *_: os.kill(os.getpid(), number))
     code, out = search("example", "--runs", "18")
     assert (code, "the same command goes on" in out, len(set(search.driven))) == (130, True, FIRST + 1)
 
@@ -253,7 +252,7 @@ def test_a_search_goes_on_in_another_folder(search: Search, tmp_path: Path, monk
 
 
 def test_a_search_by_time_begins_no_drive_after_it(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Drives, "is_over", property(lambda _: len(search.driven) >= 5))
+    monkeypatch.setattr(Limits, "are_reached", property(lambda _: len(search.driven) >= 5))
     code, _ = search("example", "--minutes", "60", "-j", "1")
     assert (code in (0, 1), len(search.driven)) == (True, 5)
     assert result()["nominal"]["outcome"] == "passed"

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.cli import search_session
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.tune import command
 from dodo_dsl.margins import with_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
@@ -115,7 +115,7 @@ def tune(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Tune]:
     examples.write(SPEC, tmp_path)
     made = Tune()
     monkeypatch.setattr(asyncio, "run", scripted.run)
-    monkeypatch.setattr(command, "Processes", lambda *_: ScriptedBackends(made.backend))
+    monkeypatch.setattr(search_session, "Processes", lambda *_: ScriptedBackends(made.backend))
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     yield made
     for number, handler in before.items():

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from dodo_dsl.search.shrink import changed, most_drives, nearest, shrink
+from dodo_dsl.search.shrinking import changed, most_drives, nearest, shrink
 from dodo_dsl.search.space import texts
 from dodo_dsl.search.store import Drive
 from dodo_dsl.spec.instances.vary import Values

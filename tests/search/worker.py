@@ -1,4 +1,4 @@
-"""``python -m tests.cli.search.worker FILE KILLED_AT WORD...``: ``dodo search`` in a process, with scripted drives.
+"""``python -m tests.search.worker FILE KILLED_AT WORD...``: ``dodo search`` in a process, with scripted drives.
 
 Each drive takes a moment, and writes its name into FILE when it begins. The process kills itself in drive number
 KILLED_AT, 0 for none.
@@ -11,12 +11,12 @@ import sys
 import time
 from pathlib import Path
 
+from dodo_dsl.cli import search_session
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.search import command
 from dodo_dsl.plan.model import Plan
-from tests.cli.search.drives import stages
 from tests.run import scripted
 from tests.run.scripted import ScriptedBackend, ScriptedBackends
+from tests.search.scripted_drives import stages
 
 _DRIVE_S = 0.15
 
@@ -34,7 +34,7 @@ def work(file: Path, killed_at: int, *words: str) -> int:
         return ScriptedBackend(plan, stages(plan))
 
     asyncio.run = scripted.run  # type: ignore[assignment]
-    command.Processes = lambda *_: ScriptedBackends(backend)  # type: ignore[assignment,misc]
+    search_session.Processes = lambda *_: ScriptedBackends(backend)  # type: ignore[assignment,misc]
     return main(["search", *words], sys.stdout, sys.stderr)
 
 

@@ -14,12 +14,12 @@ from typing import Any
 import pytest
 
 from tests.check import examples
-from tests.cli.search.drives import SPEC
 from tests.search.database import Database, served
+from tests.search.scripted_drives import SPEC
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 _BEGUN: list[subprocess.Popen[str]] = []
 RUNS = ("--runs", "20", "-j", "1")
 
@@ -66,7 +66,7 @@ def alone(folder: Path, database: Database) -> str:
 
 def worker(name: str, *words: str, killed_at: int = 0) -> subprocess.Popen[str]:
     """Begins to search, with a report and a list of drives called ``name``."""
-    command = [sys.executable, "-m", "tests.cli.search.worker", f"{name}.txt", str(killed_at), "example"]
+    command = [sys.executable, "-m", "tests.search.worker", f"{name}.txt", str(killed_at), "example"]
     command += ["--isolation", "host", "--report", name, *words]
     _BEGUN.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True))
     return _BEGUN[-1]
