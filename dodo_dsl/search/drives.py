@@ -217,7 +217,9 @@ class Drives:
         if any(point.spec.rig for point in points):
             return 1
         is_long = self.limits.deadline is None and not self.store.is_shared
-        return max(1, int(self.machine.order.capacity)) * (_ROUND if is_long else 1)
+        size = max(1, int(self.machine.order.capacity)) * (_ROUND if is_long else 1)
+        on_host = any(point.spec.isolation == "host" for point in points)
+        return min(size, len(self.checked.deployment.cids)) if on_host else size
 
     def _claimed(self, missing: dict[int, Point], most: int) -> dict[int, Point]:
         """Takes up to ``most`` of the first points out of ``missing``, and those that others have driven."""

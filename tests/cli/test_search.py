@@ -227,6 +227,13 @@ def test_more_runs_continue_the_sweep(search: Search) -> None:
     assert result() == result("whole")
 
 
+def test_a_round_on_the_host_has_no_more_drives_than_there_are_cids(search: Search) -> None:
+    with Path("dodo.yml").open("a") as deployment:
+        deployment.write("cids: 130-132\n")
+    code, out = search("example", "--runs", "5", "--sweep", "-j", "1")
+    assert (code in (0, 1), len(set(search.driven))) == (True, 6), out
+
+
 def test_another_seed_is_another_search(search: Search) -> None:
     search("example", "--runs", "1")
     code, out = search("example", "--runs", "1", "--seed", "1")
