@@ -1,6 +1,5 @@
 """``dodo search`` with drives whose end follows from their values."""
 
-import asyncio
 import json
 import os
 import re
@@ -16,16 +15,15 @@ from typing import Any
 import pytest
 
 from dodo_dsl import advice, compiler
-from dodo_dsl.cli import search_session, selection
+from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.search import sampling_order
 from dodo_dsl.search.drives import Limits
 from dodo_dsl.search.sampling_order import FIRST
 from tests.check import examples
-from tests.run import scripted
-from tests.run.scripted import ScriptedBackend, ScriptedBackends
-from tests.search.scripted_drives import LIMIT, SPEC, stages, start_of
+from tests.run.scripted import ScriptedBackend
+from tests.search.scripted_drives import LIMIT, SPEC, scripted_commands, stages, start_of
 
 
 @dataclass
@@ -61,18 +59,10 @@ def result(report: str = "report") -> dict[str, Any]:
 
 
 @pytest.fixture
-def search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Search]:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    monkeypatch.setenv("DODO_HISTORY", str(tmp_path / "history.jsonl"))
-    examples.write(SPEC, tmp_path)
+def search(tmp_path: Path) -> Iterator[Search]:
     made = Search()
-    monkeypatch.setattr(asyncio, "run", scripted.run)
-    monkeypatch.setattr(search_session, "Processes", lambda *_: ScriptedBackends(made.backend))
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield made
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    with scripted_commands(tmp_path, SPEC, made.backend):
+        yield made
 
 
 def test_the_result_is_that_of_the_values_driven(search: Search) -> None:
@@ -169,17 +159,20 @@ def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
     assert len(search.driven) == 17 + len(twice)
 
 
-@pytest.mark.parametrize("ends_at", [7, 15], ids=["while it sweeps", "while it proposes"])
-def test_an_interrupted_search_goes_on_to_the_same_result(search: Search, ends_at: int) -> None:
-    search("example", "--runs", "18", "-j", "1", report="whole")
-    whole = set(search.driven)
-    search.ends_at = ends_at
-    code, out = search("example", "--runs", "18", "-j", "1")
-    assert code == 130
-    assert "the same command goes on" in out
-    before = set(search.driven)
+def test_an_interrupted_search_goes_on_to_the_same_result(search: Search) -> None:
+    """It is interrupted while it sweeps, and again while it drives what the optimiser proposed."""
+    words = ("example", "--runs", "16", "-j", "1")
+    search(*words, report="whole")
+    whole, before = set(search.driven), set[str]()
+    for ends_at in (7, 11):
+        search.ends_at = ends_at
+        code, out = search(*words)
+        assert (code, "the same command goes on" in out) == (130, True)
+        assert len(before & set(search.driven)) <= 1
+        before |= set(search.driven)
+    assert "example--run-14" in before
     search.ends_at = None
-    assert search("example", "--runs", "18", "-j", "1")[0] == 1
+    assert search(*words)[0] == 1
     assert result() == result("whole")
     assert before | set(search.driven) == whole
     assert len(before & set(search.driven)) <= 1
